@@ -1,0 +1,1 @@
+"""Clock, loop, samples and recording: knows no robot and no sensor brand."""

@@ -1,0 +1,107 @@
+"""Time: the one place that reads it and the one place that waits."""
+
+import ctypes
+import select
+import time
+from typing import Protocol, runtime_checkable
+
+NS_PER_S = 1_000_000_000
+_POLL_NS = 100_000  # a link without a descriptor is looked at this often
+
+
+@runtime_checkable
+class Readable(Protocol):
+    """Something that bytes or frames arrive at."""
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, or -1 if there is none."""
+        ...
+
+    def is_readable(self) -> bool:
+        """Return whether something has arrived and waits to be read."""
+        ...
+
+
+class Clock(Protocol):
+    """Tells the time and waits; everything else is told the time."""
+
+    def now_ns(self) -> int:
+        """Return the monotonic time [ns]."""
+        ...
+
+    def utc_ns(self) -> int:
+        """Return UTC [ns since 1970]."""
+        ...
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Return at monotonic time `t_ns`, at once if it has passed."""
+        ...
+
+    def wait(self, link: Readable, deadline_ns: int) -> bool:
+        """Return True when `link` has something to read, False at the deadline."""
+        ...
+
+
+class _Timespec(ctypes.Structure):
+    _fields_ = [("sec", ctypes.c_long), ("nsec", ctypes.c_long)]  # noqa: RUF012
+
+
+_CLOCK_MONOTONIC = 1
+_TIMER_ABSTIME = 1
+
+
+class SystemClock:
+    """The clock of the machine: CLOCK_MONOTONIC, absolute deadlines."""
+
+    def __init__(self) -> None:
+        libc = ctypes.CDLL(None, use_errno=True)
+        self._nanosleep = libc.clock_nanosleep
+        self._deadline = _Timespec()
+
+    def now_ns(self) -> int:
+        """Return CLOCK_MONOTONIC [ns]."""
+        return time.monotonic_ns()
+
+    def utc_ns(self) -> int:
+        """Return CLOCK_REALTIME [ns since 1970]."""
+        return time.time_ns()
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Sleep with clock_nanosleep to the absolute time `t_ns`."""
+        self._deadline.sec, self._deadline.nsec = divmod(t_ns, NS_PER_S)
+        self._nanosleep(
+            _CLOCK_MONOTONIC, _TIMER_ABSTIME, ctypes.byref(self._deadline), None
+        )
+
+    def wait(self, link: Readable, deadline_ns: int) -> bool:
+        """Wait for `link`, with select where it has a descriptor."""
+        descriptor = link.fileno()
+        while not link.is_readable():
+            left = deadline_ns - time.monotonic_ns()
+            if left <= 0:
+                return False
+            if descriptor >= 0:
+                ready = select.select([descriptor], [], [], left / NS_PER_S)[0]
+                if ready:
+                    return True
+            else:
+                self.sleep_until(min(deadline_ns, time.monotonic_ns() + _POLL_NS))
+        return True
+
+
+def utc_offset_ns(clock: Clock, tries: int = 20) -> tuple[int, int]:
+    """Return (offset, uncertainty) [ns] such that UTC = monotonic + offset.
+
+    UTC is read between two readings of the monotonic clock; of `tries` the tightest
+    pair is kept, and half its width is the uncertainty.
+    """
+    best: tuple[int, int] | None = None
+    for _ in range(tries):
+        before = clock.now_ns()
+        utc = clock.utc_ns()
+        after = clock.now_ns()
+        half = (after - before + 1) // 2
+        if best is None or half < best[1]:
+            best = (utc - (before + after) // 2, half)
+    assert best is not None
+    return best

@@ -1,0 +1,236 @@
+"""One cycle: read, check, command, sample. It has no waiting of its own."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+
+from acquisition.devices import (
+    Arm,
+    ArmReading,
+    SafetyMode,
+    Vector,
+    WrenchSample,
+    WrenchSensor,
+)
+from acquisition.guard import Action, GuardState, Limits, Observation, Verdict, check
+from acquisition.loop import Tick
+from acquisition.sample import MOTOR_FRESH_SHIFT, Flag, Sample
+
+_ZERO = np.zeros(7)
+CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
+
+
+class ArmState(IntEnum):
+    """What the arm is doing (architecture: safety states)."""
+
+    IDLE = 0
+    FLOAT = 1
+    HOLD = 2
+    DAMP = 3
+    UNKNOWN = 4
+
+
+class ControlLaw(Protocol):
+    """Torques from positions."""
+
+    def enter(self, state: ArmState, reading: ArmReading) -> None:
+        """Begin `state` without a jump in torque."""
+        ...
+
+    def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
+        """Return (joint torques, their gravity part) [N m], shapes (7,)."""
+        ...
+
+    def joint7_offset(self, reading: ArmReading) -> float:
+        """Return how far joint 7 is from where it was locked [rad]."""
+        ...
+
+
+class FootObserver(Protocol):
+    """Fills in what follows from joints and wrench: foot and traction."""
+
+    def observe(
+        self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
+    ) -> float:
+        """Write foot pose, twist, wrench and traction; return the sole's speed."""
+        ...
+
+
+@dataclass(slots=True)
+class ControlStatus:
+    """What the console sees of the loop."""
+
+    state: ArmState = ArmState.IDLE
+    safety: SafetyMode = SafetyMode.UNKNOWN
+    verdict: Verdict | None = None
+    ft_age_ns: int = 0
+
+
+class Cycle:
+    """The work of one period, with the devices, the law and the guard given.
+
+    `sink` receives the bytes of every sample; `on_wrench` the sensor's own samples.
+    """
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        arm: Arm,
+        sensor: WrenchSensor,
+        law: ControlLaw,
+        observer: FootObserver,
+        limits: Limits,
+        sink: Callable[[memoryview], None],
+        on_wrench: Callable[[list[WrenchSample]], None],
+        extra_flags: int = 0,
+    ) -> None:
+        self._arm = arm
+        self._sensor = sensor
+        self._law = law
+        self._observer = observer
+        self._limits = limits
+        self._sink = sink
+        self._on_wrench = on_wrench
+        self._extra_flags = extra_flags
+        self._guard = GuardState()
+        self._sample = Sample()
+        self._wrench: WrenchSample | None = None
+        self._wrench_ns = 0
+        self._requested: ArmState | None = None
+        self.is_recording = False
+        self.status = ControlStatus()
+
+    def request(self, state: ArmState) -> None:
+        """Ask for a state; it is entered at the next complete reading."""
+        self._requested = state
+        self.status.verdict = None
+
+    def __call__(self, tick: Tick) -> None:
+        """Run the cycle `tick`."""
+        reading = self._arm.read(tick.now_ns)
+        is_new = self._take_wrench(tick.now_ns)
+        status = self.status
+        status.safety = self._arm.safety_mode()
+        self._enter_requested(reading)
+        tau, tau_gravity = self._torque(reading)
+        sample = self._sample
+        speed = self._observer.observe(
+            reading, self._wrench if is_new else None, sample
+        )
+        verdict = self._judge(tick, reading, speed, tau)
+        if verdict.action is not Action.NONE:
+            self._obey(verdict, reading)
+            tau, tau_gravity = self._torque(reading)
+        sent = sample.torque_command
+        if reading.missing_cycles == 0:
+            sent = self._arm.send(tau, tau_gravity)
+        self._fill(tick, reading, sent, tau_gravity, tau, is_new)
+        self._sink(sample.payload())
+
+    def _take_wrench(self, now_ns: int) -> bool:
+        """Drain the sensor; return whether the used sample is fresh."""
+        samples = self._sensor.poll(now_ns)
+        if samples:
+            self._on_wrench(samples)
+            newest = samples[-1]
+            if newest.is_valid:
+                self._wrench = newest
+                self._wrench_ns = newest.t_ns
+        if self._wrench_ns == 0:
+            self._wrench_ns = now_ns
+        age = now_ns - self._wrench_ns
+        self.status.ft_age_ns = age
+        return self._wrench is not None and age <= self._limits.ft_stale_ns
+
+    def _enter_requested(self, reading: ArmReading) -> None:
+        state = self._requested
+        if state is None or reading.missing_cycles:
+            return
+        self._requested = None
+        if state is ArmState.IDLE:
+            self._arm.idle()
+        elif self.status.safety is not SafetyMode.ACTIVE:
+            return
+        self._enter(state, reading)
+
+    def _enter(self, state: ArmState, reading: ArmReading) -> None:
+        self.status.state = state
+        self._law.enter(state, reading)
+
+    def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
+        if self.status.state in {ArmState.IDLE, ArmState.UNKNOWN}:
+            return _ZERO, _ZERO
+        return self._law.torque(reading)
+
+    def _judge(
+        self, tick: Tick, reading: ArmReading, speed: float, tau: Vector
+    ) -> Verdict:
+        status = self.status
+        seen = Observation(
+            reading=reading,
+            safety=status.safety,
+            foot_speed=speed,
+            joint7_offset=self._law.joint7_offset(reading),
+            ft_age_ns=status.ft_age_ns,
+            tau=tau,
+            is_recording=self.is_recording,
+            is_powered=status.state not in {ArmState.IDLE, ArmState.UNKNOWN},
+            is_late=tick.is_late,
+        )
+        self._guard, verdict = check(self._limits, self._guard, seen)
+        return verdict
+
+    def _obey(self, verdict: Verdict, reading: ArmReading) -> None:
+        """Enter the state the guard asks for; a fault is never made milder."""
+        state = self.status.state
+        if verdict.action is Action.IDLE:
+            confirmed = self._arm.idle()
+            self._enter(ArmState.IDLE if confirmed else ArmState.UNKNOWN, reading)
+        elif verdict.action is Action.DAMP:
+            self._enter(ArmState.DAMP, reading)
+        elif state is ArmState.FLOAT:
+            self._enter(ArmState.HOLD, reading)
+        if self.status.verdict is None or verdict.action is Action.IDLE:
+            self.status.verdict = verdict
+        self.is_recording = False
+
+    def _fill(  # noqa: PLR0913, PLR0917
+        self,
+        tick: Tick,
+        reading: ArmReading,
+        sent: Vector,
+        tau_gravity: Vector,
+        tau: Vector,
+        is_new: bool,
+    ) -> None:
+        sample = self._sample
+        flags = int(self.status.safety) | self._extra_flags
+        flags |= reading.fresh << MOTOR_FRESH_SHIFT
+        if reading.is_complete:
+            flags |= Flag.ARM_FRESH
+        if is_new:
+            flags |= Flag.FT_FRESH
+        if self._wrench is not None:
+            sample.ft_ns[0] = self._wrench.t_ns
+            sample.ft_counter[0] = self._wrench.counter & 0xFFFFFFFF
+            if self._wrench.is_saturated:
+                flags |= Flag.FT_SATURATED
+        if tick.is_late:
+            flags |= Flag.DEADLINE_MISSED
+        if self.status.state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
+            flags |= Flag.JOINT7_LOCKED
+        if abs(float((sent - tau).sum())) > 0.05:
+            flags |= Flag.TORQUE_CLIPPED
+        if sample.traction[2] > CONTACT_FORCE:
+            flags |= Flag.CONTACT
+        sample.cycle[0] = tick.number
+        sample.flags[0] = flags
+        sample.host_ns[0] = reading.host_ns
+        sample.arm_ns[0] = reading.arm_ns
+        sample.counts[:] = reading.counts
+        sample.position[:] = reading.q
+        sample.velocity[:] = reading.qd
+        sample.torque_command[:] = sent
+        sample.torque_gravity[:] = tau_gravity

@@ -1,0 +1,114 @@
+"""What the loop asks of an arm and of a wrist sensor."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+
+
+class SafetyMode(IntEnum):
+    """State of the arm's safety circuit, numbered as in the recording."""
+
+    E_STOP = 0
+    IDLE = 1
+    ACTIVE = 2
+    UNKNOWN = 7
+
+
+@dataclass(slots=True)
+class ArmReading:
+    """Joint positions of one cycle.
+
+    Attributes:
+        host_ns: monotonic time at which the positions were asked for [ns].
+        arm_ns: monotonic time at which the last reply arrived [ns], 0 = none.
+        counts: motor positions as received [encoder counts], seven of them.
+        q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
+        qd: joint velocities [rad/s], shape (7,), filtered as the controller uses them.
+        qd7_raw: unfiltered one-cycle difference of joint 7 [rad/s].
+        fresh: bit i set = the reply of motor i+1 arrived in this cycle.
+        is_complete: all seven replies arrived.
+        missing_cycles: incomplete cycles in a row, 0 = this one is complete.
+    """
+
+    host_ns: int
+    arm_ns: int
+    counts: list[int]
+    q: Vector
+    qd: Vector
+    qd7_raw: float
+    fresh: int
+    is_complete: bool
+    missing_cycles: int
+
+
+@dataclass(slots=True)
+class WrenchSample:
+    """One sample of the wrist sensor as it came.
+
+    Attributes:
+        t_ns: monotonic time of acquisition as well as it is known [ns].
+        counter: device time or counter as received; 0 = the device has none.
+        wrench: fx fy fz tx ty tz in the sensor frame [N, N m], calibrated, not tared.
+        status: device status bits as received.
+        is_valid: the device vouches for the numbers.
+        is_saturated: a measuring range was exceeded.
+    """
+
+    t_ns: int
+    counter: int
+    wrench: tuple[float, float, float, float, float, float]
+    status: int
+    is_valid: bool
+    is_saturated: bool
+
+
+class Arm(Protocol):
+    """A robot arm with seven joints that takes joint torques."""
+
+    def read(self, now_ns: int) -> ArmReading:
+        """Ask for the joint positions and return them; waits 1.5 ms at most."""
+        ...
+
+    def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
+        """Send joint torques [N m] and return them as sent: clipped, rounded.
+
+        When a motor's limit cuts, `tau_gravity` is kept and the rest scaled.
+        """
+        ...
+
+    def safety_mode(self) -> SafetyMode:
+        """Return the last known state of the safety circuit; does not wait."""
+        ...
+
+    def idle(self) -> bool:
+        """Brake the arm, then send zero torque; return whether it is confirmed."""
+        ...
+
+    def close(self) -> None:
+        """Give the bus back; the arm is idle afterwards."""
+        ...
+
+
+class WrenchSensor(Protocol):
+    """A six-axis force/torque sensor in the wrist."""
+
+    def open(self) -> None:
+        """Configure the device and start its stream; raises when it is silent."""
+        ...
+
+    def poll(self, now_ns: int) -> list[WrenchSample]:
+        """Return every sample that has arrived since the last call, oldest first."""
+        ...
+
+    def describe(self) -> dict[str, str]:
+        """Return model, serial number, firmware and rate for the recording."""
+        ...
+
+    def close(self) -> None:
+        """Stop the stream and give the port back."""
+        ...

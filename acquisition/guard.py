@@ -1,0 +1,253 @@
+"""The guard: limits and the state of the arm in, a verdict out. Pure."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from acquisition.devices import ArmReading, SafetyMode, Vector
+
+MS = 1_000_000
+S = 1_000_000_000
+
+
+class Action(Enum):
+    """What the arm has to do."""
+
+    NONE = "none"
+    HOLD = "hold"
+    DAMP = "damp"
+    IDLE = "idle"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The guard's decision.
+
+    Attributes:
+        action: what the arm does from this cycle on.
+        reason: name of the failure as in the message catalogue; empty for none.
+        facts: numbers for the message.
+    """
+
+    action: Action
+    reason: str = ""
+    facts: tuple[tuple[str, float], ...] = ()
+
+
+OK = Verdict(Action.NONE)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Where the guard steps in.
+
+    Attributes:
+        q_lower: lower joint limits [rad], shape (7,).
+        q_upper: upper joint limits [rad], shape (7,).
+        qd: joint speed limits [rad/s], shape (7,).
+        tau: joint torque limits [N m], shape (7,).
+        foot_speed: largest speed of the sole [m/s].
+        joint7: largest displacement of the locked joint 7 [rad].
+        ft_stale_ns: age at which a force sample is flagged [ns].
+        ft_stop_ns: age at which a trial is stopped [ns].
+        hold_after_missing: incomplete cycles in a row that end in hold.
+        idle_after_missing: incomplete cycles in a row that end in idle.
+        late_per_second: late cycles in a second that end in hold.
+        armed_inside: a joint's position limit counts after it was this far inside
+            [rad]: the home position lies on two stops.
+    """
+
+    q_lower: Vector
+    q_upper: Vector
+    qd: Vector
+    tau: Vector
+    foot_speed: float = 0.8
+    joint7: float = 0.050
+    ft_stale_ns: int = 6 * MS
+    ft_stop_ns: int = 20 * MS
+    hold_after_missing: int = 5
+    idle_after_missing: int = 25
+    late_per_second: int = 10
+    armed_inside: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class GuardState:
+    """What the guard remembers between cycles.
+
+    Attributes:
+        armed: bit i set = the position limit of joint i+1 counts.
+        late: times of the late cycles of the last second [ns].
+    """
+
+    armed: int = 0
+    late: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What the guard looks at in one cycle.
+
+    Attributes:
+        reading: joint positions and velocities.
+        safety: state of the safety circuit.
+        foot_speed: speed of the sole [m/s].
+        joint7_offset: displacement of joint 7 from where it was locked [rad].
+        ft_age_ns: age of the force sample [ns].
+        tau: joint torques about to be sent [N m], shape (7,).
+        is_recording: a trial is being recorded.
+        is_powered: the arm is meant to be powered (not idle).
+        is_late: this cycle began after its deadline.
+    """
+
+    reading: ArmReading
+    safety: SafetyMode
+    foot_speed: float
+    joint7_offset: float
+    ft_age_ns: int
+    tau: Vector
+    is_recording: bool
+    is_powered: bool
+    is_late: bool
+
+
+def check(
+    limits: Limits, state: GuardState, seen: Observation
+) -> tuple[GuardState, Verdict]:
+    """Return the next state and the most severe verdict of this cycle.
+
+    Order: what takes the arm away (safety circuit, silence), then motion, then what
+    only ends the trial (sensor, cadence).
+    """
+    now = seen.reading.host_ns
+    state = _remember(limits, state, seen, now)
+    if not seen.is_powered:
+        return state, OK
+    for verdict in (
+        _check_safety(seen),
+        _check_silence(limits, seen),
+        _check_numbers(seen),
+        _check_position(limits, state, seen),
+        _check_speed(limits, seen),
+        _check_torque(limits, seen),
+        _check_trial(limits, seen),
+        _check_cadence(limits, state, now),
+    ):
+        if verdict.action is not Action.NONE:
+            return state, verdict
+    return state, OK
+
+
+def _remember(
+    limits: Limits, state: GuardState, seen: Observation, now: int
+) -> GuardState:
+    armed = state.armed
+    if armed != 0x7F and seen.reading.is_complete:
+        q = seen.reading.q
+        inside = (q > limits.q_lower + limits.armed_inside) & (
+            q < limits.q_upper - limits.armed_inside
+        )
+        armed |= int(np.packbits(inside, bitorder="little")[0])
+    late = state.late
+    if seen.is_late or (late and late[0] < now - S):
+        kept = tuple(t for t in late if t >= now - S)
+        late = (*kept, now) if seen.is_late else kept
+    if armed == state.armed and late is state.late:
+        return state
+    return replace(state, armed=armed, late=late)
+
+
+def _check_safety(seen: Observation) -> Verdict:
+    if seen.safety is SafetyMode.E_STOP:
+        return Verdict(Action.IDLE, "estop")
+    if seen.safety is SafetyMode.IDLE:
+        return Verdict(Action.IDLE, "pendant-idle")
+    return OK
+
+
+def _check_silence(limits: Limits, seen: Observation) -> Verdict:
+    missing = seen.reading.missing_cycles
+    if missing >= limits.idle_after_missing:
+        return Verdict(Action.IDLE, "can-silence", (("ms", missing * 2.0),))
+    if missing >= limits.hold_after_missing:
+        silent = float(7 - seen.reading.fresh.bit_count())
+        return Verdict(
+            Action.HOLD, "can-silence", (("ms", missing * 2.0), ("silent", silent))
+        )
+    return OK
+
+
+def _check_numbers(seen: Observation) -> Verdict:
+    total = float(seen.reading.q.sum() + seen.reading.qd.sum() + seen.tau.sum())
+    if total - total != 0.0:  # NaN or infinite
+        return Verdict(Action.IDLE, "not-a-number")
+    return OK
+
+
+def _check_position(limits: Limits, state: GuardState, seen: Observation) -> Verdict:
+    q = seen.reading.q
+    outside = (q < limits.q_lower) | (q > limits.q_upper)
+    if not outside.any():
+        return OK
+    for joint in np.flatnonzero(outside).tolist():
+        if state.armed >> joint & 1:
+            low, high = float(limits.q_lower[joint]), float(limits.q_upper[joint])
+            value = float(q[joint])
+            limit = low if value < low else high
+            facts = (("joint", joint + 1.0), ("value", value), ("limit", limit))
+            return Verdict(Action.DAMP, "joint-limit", facts)
+    return OK
+
+
+def _check_speed(limits: Limits, seen: Observation) -> Verdict:
+    speed = np.abs(seen.reading.qd)
+    over = speed > limits.qd
+    if over.any():
+        joint = int(np.flatnonzero(over)[0])
+        facts = (
+            ("joint", joint + 1.0),
+            ("value", float(speed[joint])),
+            ("limit", float(limits.qd[joint])),
+        )
+        return Verdict(Action.DAMP, "overspeed", facts)
+    if seen.foot_speed > limits.foot_speed:
+        facts = (("value", seen.foot_speed), ("limit", limits.foot_speed))
+        return Verdict(Action.DAMP, "foot-speed", facts)
+    return OK
+
+
+def _check_torque(limits: Limits, seen: Observation) -> Verdict:
+    over = np.abs(seen.tau) > limits.tau
+    if not over.any():
+        return OK
+    joint = int(np.flatnonzero(over)[0])
+    facts = (
+        ("joint", joint + 1.0),
+        ("value", float(abs(seen.tau[joint]))),
+        ("limit", float(limits.tau[joint])),
+    )
+    return Verdict(Action.DAMP, "torque-limit", facts)
+
+
+def _check_trial(limits: Limits, seen: Observation) -> Verdict:
+    if not seen.is_recording:
+        return OK
+    if abs(seen.joint7_offset) > limits.joint7:
+        facts = (
+            ("mrad", abs(seen.joint7_offset) * 1e3),
+            ("limit", limits.joint7 * 1e3),
+        )
+        return Verdict(Action.HOLD, "joint7-slip", facts)
+    if seen.ft_age_ns > limits.ft_stop_ns:
+        facts = (("ms", seen.ft_age_ns / MS), ("limit", limits.ft_stop_ns / MS))
+        return Verdict(Action.HOLD, "ft-stale", facts)
+    return OK
+
+
+def _check_cadence(limits: Limits, state: GuardState, now: int) -> Verdict:
+    late = len(state.late)
+    if late > limits.late_per_second and state.late[-1] == now:
+        facts = (("late", float(late)), ("limit", float(limits.late_per_second)))
+        return Verdict(Action.HOLD, "loop-late", facts)
+    return OK

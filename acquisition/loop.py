@@ -1,0 +1,90 @@
+"""The loop: absolute deadlines on a fixed grid, late cycles skipped and counted."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from acquisition.clock import Clock
+
+PERIOD_NS = 2_000_000
+LATE_NS = 500_000  # a cycle that begins later than this missed its deadline
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """When a cycle runs.
+
+    Attributes:
+        number: cycle number; counts the skipped ones too.
+        now_ns: when it began [ns].
+        deadline_ns: when it should have begun [ns].
+        is_late: it began more than 0.5 ms after its deadline, or cycles were skipped.
+    """
+
+    number: int
+    now_ns: int
+    deadline_ns: int
+    is_late: bool
+
+
+@dataclass(slots=True)
+class LoopStats:
+    """What the loop has to say about its own time keeping."""
+
+    cycles: int = 0
+    skipped: int = 0
+    late: int = 0
+    worst_late_ns: int = 0
+
+
+class Loop:
+    """Calls `cycle` on a grid of `period_ns`; the grid never moves.
+
+    A cycle that overruns makes the loop skip whole periods: there is no burst of
+    catch-up cycles, and the numbers of the skipped cycles are missing in the record.
+    """
+
+    def __init__(
+        self,
+        cycle: Callable[[Tick], None],
+        clock: Clock,
+        period_ns: int = PERIOD_NS,
+    ) -> None:
+        self._cycle = cycle
+        self._clock = clock
+        self._period_ns = period_ns
+        self._next_ns: int | None = None
+        self._number = 0
+        self.stats = LoopStats()
+
+    def run(self, cycles: int) -> None:
+        """Run until `cycles` periods have passed on the grid."""
+        end = self._number + cycles
+        while self._number < end:
+            self.step()
+
+    def step(self) -> None:
+        """Wait for the next deadline and run one cycle."""
+        clock = self._clock
+        if self._next_ns is None:
+            self._next_ns = clock.now_ns() + self._period_ns
+        clock.sleep_until(self._next_ns)
+        now = clock.now_ns()
+        behind = (now - self._next_ns) // self._period_ns
+        if behind > 0:
+            self._next_ns += behind * self._period_ns
+            self._number += behind
+            self.stats.skipped += behind
+        late_ns = now - self._next_ns
+        is_late = behind > 0 or late_ns > LATE_NS
+        self.stats.late += is_late
+        self.stats.worst_late_ns = max(
+            self.stats.worst_late_ns, late_ns + behind * self._period_ns
+        )
+        self._cycle(Tick(self._number, now, self._next_ns, is_late))
+        self.stats.cycles += 1
+        self._number += 1
+        self._next_ns += self._period_ns
+
+    def restart_grid(self) -> None:
+        """Begin a new grid at the next step, after a pause on purpose."""
+        self._next_ns = None

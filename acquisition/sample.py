@@ -1,0 +1,130 @@
+"""The record of one cycle: flags, channels and the layout it is stored in."""
+
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.messages import CYCLE
+
+Record = NDArray[np.void]
+
+
+class Flag(IntFlag):
+    """Bits of `Cycle.flags` from 3 on; bits 0-2 hold the safety mode."""
+
+    ARM_FRESH = 1 << 3
+    FT_FRESH = 1 << 4
+    FT_SATURATED = 1 << 5
+    TORQUE_CLIPPED = 1 << 6
+    LIMIT_WARNING = 1 << 7
+    SAFETY_WARNING = 1 << 8
+    SAFETY_FAULT = 1 << 9
+    DEADLINE_MISSED = 1 << 10
+    JOINT7_LOCKED = 1 << 11
+    CONTACT = 1 << 12
+    SIMULATED = 1 << 13
+
+
+SAFETY_MODE_MASK = 0b111
+MOTOR_FRESH_SHIFT = 14  # bits 14-20: the reply of motor 1..7 is fresh
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """What one field of a recorded message means."""
+
+    field: str
+    unit: str
+    frame: str
+    sign: str
+
+
+CHANNELS = (
+    Channel("cycle.host_ns", "ns", "host clock", "CLOCK_MONOTONIC at cycle start"),
+    Channel("cycle.arm_ns", "ns", "host clock", "last joint reply arrived, 0 = none"),
+    Channel("cycle.ft_ns", "ns", "host clock", "used F/T sample taken, 0 = none"),
+    Channel("cycle.ft_counter", "us or count", "sensor clock", "as received"),
+    Channel("cycle.counts", "encoder counts", "motors 1..7", "as received"),
+    Channel("cycle.position", "rad", "joints 1..7", "Denavit-Hartenberg, distal"),
+    Channel("cycle.velocity", "rad/s", "joints 1..7", "as the controller used it"),
+    Channel("cycle.torque_command", "N m", "joints 1..7", "as sent"),
+    Channel("cycle.torque_gravity", "N m", "joints 1..7", "gravity + effective mass"),
+    Channel("cycle.wrench", "N, N m", "ft_sensor", "force of the ground on the foot"),
+    Channel("cycle.wrench_raw", "N, N m", "ft_sensor", "as the sensor reads, untared"),
+    Channel("cycle.foot_position", "m", "wam_base", "centre of the sole"),
+    Channel(
+        "cycle.foot_orientation", "1", "wam_base", "quaternion x y z w of the foot"
+    ),
+    Channel("cycle.foot_velocity", "m/s, rad/s", "wam_base", "linear, angular"),
+    Channel(
+        "cycle.traction",
+        "m/s, N, N",
+        "terrain",
+        "v_t > 0 in ordinary slip, F_t > 0 against it, F_n > 0 in compression",
+    ),
+)
+
+
+class Sample:
+    """One record of the loop, filled in place cycle after cycle.
+
+    Every attribute is a numpy view into one payload of traction_msgs/Cycle: scalars
+    have shape (1,), vectors their own length. `payload()` copies the bytes out.
+    """
+
+    __slots__ = (
+        "_bytes",
+        "arm_ns",
+        "counts",
+        "cycle",
+        "data",
+        "flags",
+        "foot_orientation",
+        "foot_position",
+        "foot_velocity",
+        "ft_counter",
+        "ft_ns",
+        "host_ns",
+        "position",
+        "torque_command",
+        "torque_gravity",
+        "traction",
+        "velocity",
+        "wrench",
+        "wrench_raw",
+    )
+
+    cycle: NDArray[np.uint32]
+    flags: NDArray[np.uint32]
+    host_ns: NDArray[np.uint64]
+    arm_ns: NDArray[np.uint64]
+    ft_ns: NDArray[np.uint64]
+    ft_counter: NDArray[np.uint32]
+    counts: NDArray[np.int32]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    torque_command: NDArray[np.float64]
+    torque_gravity: NDArray[np.float64]
+    wrench: NDArray[np.float64]
+    wrench_raw: NDArray[np.float64]
+    foot_position: NDArray[np.float64]
+    foot_orientation: NDArray[np.float64]
+    foot_velocity: NDArray[np.float64]
+    traction: NDArray[np.float64]
+
+    def __init__(self) -> None:
+        buffer = bytearray(CYCLE.template)
+        self.data: Record = np.frombuffer(buffer, CYCLE.dtype)
+        self._bytes = memoryview(buffer)
+        for name in CYCLE.dtype.names or ():
+            if name in self.__slots__:
+                column = self.data[name]
+                setattr(self, name, column[0] if column.ndim > 1 else column)
+        for name in ("wrench", "wrench_raw", "traction"):
+            getattr(self, name)[:] = np.nan
+
+    def payload(self) -> memoryview:
+        """Return the bytes of the record as they stand now, without a copy."""
+        return self._bytes

@@ -1,0 +1,1 @@
+"""Trial files: one MCAP file per trial, written once, verified, never changed."""

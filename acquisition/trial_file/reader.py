@@ -1,0 +1,258 @@
+"""TrialReader: whole chunks of a trial file into numpy arrays, hostile files refused."""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import zstandard
+from mcap.exceptions import McapError
+from mcap.reader import SeekingReader
+from mcap.records import ChunkIndex
+from mcap.summary import Summary
+
+from acquisition.errors import TrialFileError
+from acquisition.messages import CYCLE, TRUTH, Layout
+from acquisition.sample import Record
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD_LIMIT = 16 * 1024 * 1024
+MAX_CHUNKS = 100_000
+MAX_ROWS = 10_000_000
+_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
+_CHUNK_HEAD = struct.Struct("<BQQQQI")  # opcode, length, start, end, size, crc
+_MESSAGE = 5
+_MESSAGE_INDEX = 7
+_CHUNK = 6
+
+_ERRORS = (
+    McapError,
+    struct.error,
+    ValueError,
+    KeyError,
+    OSError,
+    MemoryError,
+    OverflowError,
+    RuntimeError,
+    zstandard.ZstdError,
+)
+
+
+@contextmanager
+def _as_trial_file_error(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except TrialFileError:
+        raise
+    except _ERRORS as error:
+        detail = str(error) or type(error).__name__
+        raise TrialFileError(
+            path, f"is not a readable trial file ({detail})"
+        ) from error
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Messages of one topic.
+
+    Attributes:
+        data: records in the layout of the message, shape (n,).
+        log_time: UTC [ns], shape (n,).
+        sequence: message sequence numbers, shape (n,).
+    """
+
+    data: Record
+    log_time: "np.ndarray[tuple[int], np.dtype[np.uint64]]"
+    sequence: "np.ndarray[tuple[int], np.dtype[np.uint32]]"
+
+
+class TrialReader:
+    """Reads one trial file; everything it returns has been checked.
+
+    Raises:
+        TrialFileError: the file is missing, foreign, truncated, damaged or hostile.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with _as_trial_file_error(path), path.open("rb") as file:
+            self.size = path.stat().st_size
+            self._check_magic(file)
+            reader = SeekingReader(
+                file, validate_crcs=True, record_size_limit=RECORD_LIMIT
+            )
+            header = reader.get_header()
+            if header.profile != "ros2":
+                raise TrialFileError(path, f"has profile {header.profile!r}, not ros2")
+            summary = reader.get_summary()
+            if summary is None or summary.statistics is None:
+                raise TrialFileError(path, "has no summary: was it closed properly?")
+            self.summary: Summary = summary
+            self._check_offsets()
+            self.metadata = self._read_metadata(reader)
+            self.attachments = {a.name: a.data for a in reader.iter_attachments()}
+        if "trial" not in self.metadata:
+            raise TrialFileError(path, "is an MCAP file, but no trial of Traction")
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recording was ended properly."""
+        return self.metadata.get("result", {}).get("complete") == "true"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the trial came from simulated devices."""
+        return self.metadata["trial"].get("simulated") == "true"
+
+    def cycles(self) -> Rows:
+        """Return all records of `/cycle` in order."""
+        return self._rows("/cycle", CYCLE)
+
+    def truth(self) -> Rows:
+        """Return all records of `/truth` in order (truth files of simulations)."""
+        return self._rows("/truth", TRUTH)
+
+    def topic_counts(self) -> dict[str, int]:
+        """Return the number of messages per topic, from the statistics."""
+        assert self.summary.statistics is not None
+        counts = self.summary.statistics.channel_message_counts
+        return {c.topic: counts.get(i, 0) for i, c in self.summary.channels.items()}
+
+    def _rows(self, topic: str, layout: Layout) -> Rows:
+        with _as_trial_file_error(self.path):
+            channel = self._channel(topic, layout.type_name)
+            count = self.topic_counts()[topic]
+            row_bytes = _HEAD.size + layout.size
+            if count > MAX_ROWS or count * row_bytes > 2 * 2**30:
+                raise TrialFileError(self.path, f"claims {count} messages of {topic}")
+            out = np.empty(count, f"V{row_bytes}")
+            filled = 0
+            with self.path.open("rb") as file:
+                for index in self.summary.chunk_indexes:
+                    filled += self._read_chunk(file, index, channel, out[filled:])
+            if filled != count:
+                raise TrialFileError(
+                    self.path, f"{topic}: {filled} messages, {count} announced"
+                )
+            return self._split(out, layout, channel)
+
+    def _split(self, out: Record, layout: Layout, channel: int) -> Rows:
+        names = ["op", "length", "channel", "sequence", "log_time", "publish", "data"]
+        formats = ["u1", "<u8", "<u2", "<u4", "<u8", "<u8", layout.dtype]
+        dtype = np.dtype(
+            {
+                "names": names,
+                "formats": formats,
+                "offsets": [0, 1, 9, 11, 15, 23, 31],
+                "itemsize": _HEAD.size + layout.size,
+            }
+        )
+        rows = out.view(dtype)
+        length = _HEAD.size - 9 + layout.size
+        good = (rows["op"] == _MESSAGE) & (rows["length"] == length)
+        if not bool((good & (rows["channel"] == channel)).all()):
+            raise TrialFileError(self.path, "has an index that points at no message")
+        frame = layout.dtype["frame_id"].itemsize
+        if len(rows) and not bool((rows["data"]["frame_id_length"] == frame).all()):
+            raise TrialFileError(self.path, "has messages of an unknown layout")
+        return Rows(
+            data=np.ascontiguousarray(rows["data"]),
+            log_time=rows["log_time"].copy(),
+            sequence=rows["sequence"].copy(),
+        )
+
+    def _read_chunk(
+        self, file: IO[bytes], index: ChunkIndex, channel: int, out: Record
+    ) -> int:
+        offset = index.message_index_offsets.get(channel)
+        if offset is None:
+            return 0
+        data = self._decompress(file, index)
+        offsets = self._message_offsets(file, offset, channel, len(data))
+        row_bytes = out.dtype.itemsize
+        if len(offsets) > len(out) or len(data) < row_bytes:
+            raise TrialFileError(self.path, "has more messages than announced")
+        windows = np.ndarray(
+            (len(data) - row_bytes + 1,), f"V{row_bytes}", data, strides=(1,)
+        )
+        if offsets.size and int(offsets.max()) >= len(windows):
+            raise TrialFileError(self.path, "has an index outside its chunk")
+        out[: len(offsets)] = windows[offsets.astype(np.int64)]
+        return len(offsets)
+
+    def _decompress(self, file: IO[bytes], index: ChunkIndex) -> bytes:
+        """Return the records of a chunk; checks sizes before and CRC after."""
+        if index.uncompressed_size > RECORD_LIMIT:
+            raise TrialFileError(self.path, "has a chunk that states over 16 MiB")
+        if index.compression not in ("", "zstd"):
+            raise TrialFileError(
+                self.path, f"uses compression {index.compression!r}, expected zstd"
+            )
+        file.seek(index.chunk_start_offset)
+        head = file.read(_CHUNK_HEAD.size)
+        opcode, _, _, _, size, crc = _CHUNK_HEAD.unpack(head)
+        name_length = struct.unpack("<I", file.read(4))[0]
+        if opcode != _CHUNK or size != index.uncompressed_size or name_length > 16:
+            raise TrialFileError(self.path, "has a chunk that its index does not match")
+        file.seek(name_length, 1)
+        stored = struct.unpack("<Q", file.read(8))[0]
+        if stored != index.compressed_size or stored > self.size:
+            raise TrialFileError(self.path, "has a chunk of impossible length")
+        raw = file.read(stored)
+        data = _unzstd(raw, size, self.path) if index.compression else raw
+        if len(data) != size or (crc and zlib.crc32(data) != crc):
+            raise TrialFileError(self.path, "has a chunk whose checksum is wrong")
+        return data
+
+    def _message_offsets(
+        self, file: IO[bytes], offset: int, channel: int, limit: int
+    ) -> "np.ndarray[tuple[int], np.dtype[np.uint64]]":
+        file.seek(offset)
+        opcode, _, found, size = struct.unpack("<BQHI", file.read(15))
+        if opcode != _MESSAGE_INDEX or found != channel or size > 16 * limit:
+            raise TrialFileError(self.path, "has a damaged message index")
+        pairs = np.frombuffer(file.read(size), "<u8")
+        return pairs[1::2]
+
+    def _channel(self, topic: str, type_name: str) -> int:
+        for number, channel in self.summary.channels.items():
+            if channel.topic == topic:
+                schema = self.summary.schemas.get(channel.schema_id)
+                if schema is None or schema.name != type_name:
+                    raise TrialFileError(self.path, f"{topic} is not a {type_name}")
+                return number
+        raise TrialFileError(self.path, f"has no topic {topic}")
+
+    def _check_magic(self, file: IO[bytes]) -> None:
+        if self.size < 2 * len(MAGIC) or file.read(len(MAGIC)) != MAGIC:
+            raise TrialFileError(self.path, "is no MCAP file")
+        file.seek(-len(MAGIC), 2)
+        if file.read(len(MAGIC)) != MAGIC:
+            raise TrialFileError(
+                self.path,
+                "is cut off: it does not end as an MCAP file does",
+                hint=f"Salvage it: traction recover {self.path}",
+            )
+        file.seek(0)
+
+    def _check_offsets(self) -> None:
+        chunks = self.summary.chunk_indexes
+        if len(chunks) > MAX_CHUNKS:
+            raise TrialFileError(self.path, f"states {len(chunks)} chunks")
+        for chunk in chunks:
+            if chunk.chunk_start_offset + chunk.chunk_length > self.size:
+                raise TrialFileError(self.path, "has a chunk beyond its end")
+
+    def _read_metadata(self, reader: SeekingReader) -> dict[str, dict[str, str]]:
+        return {m.name: dict(m.metadata) for m in reader.iter_metadata()}
+
+
+def _unzstd(raw: bytes, size: int, path: Path) -> bytes:
+    stated = zstandard.frame_content_size(raw)
+    if stated not in (-1, size):
+        raise TrialFileError(path, f"has a chunk that would unpack to {stated} bytes")
+    return zstandard.ZstdDecompressor().decompress(raw, max_output_size=size)

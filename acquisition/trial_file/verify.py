@@ -1,0 +1,119 @@
+"""Read a finished file back and hold it against what the writer counted."""
+
+import hashlib
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.reader import MAGIC, TrialReader
+from acquisition.trial_file.writer import WriterCounts
+
+PERIOD_NS = 2_000_000
+PERIOD_TOLERANCE = 0.02
+_FOOTER = struct.Struct("<BQQQI")
+_DATA_END = struct.Struct("<BQI")
+REQUIRED_METADATA = ("trial", "clock", "provenance", "channels", "result")
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """A file that was read back completely.
+
+    Attributes:
+        sha256: hex digest of the file.
+        size: bytes.
+        cycles: records of `/cycle`, 0 for a truth file.
+        duration: from first to last cycle [s].
+        worst_gap: longest time between two cycles [s].
+    """
+
+    sha256: str
+    size: int
+    cycles: int
+    duration: float
+    worst_gap: float
+
+
+def verify(path: Path, counts: WriterCounts | None = None) -> Verified:
+    """Check magics, CRCs, counts, cadence, clock and attachments of `path`.
+
+    Args:
+        path: a finished trial file, under its `.partial` name or its own.
+        counts: what the writer counted, when it is at hand.
+
+    Raises:
+        TrialFileError: anything does not hold.
+    """
+    reader = TrialReader(path)
+    content = path.read_bytes()
+    _check_crcs(path, content)
+    missing = [name for name in REQUIRED_METADATA if name not in reader.metadata]
+    if missing:
+        raise TrialFileError(path, f"lacks metadata {', '.join(missing)}")
+    _check_attachments(reader)
+    if counts is not None and reader.topic_counts() != {
+        topic: counts.messages.get(topic, 0) for topic in reader.topic_counts()
+    }:
+        raise TrialFileError(path, "holds other messages than were written")
+    cycles, duration, worst = _check_cycles(reader)
+    digest = hashlib.sha256(content).hexdigest()
+    return Verified(digest, len(content), cycles, duration, worst)
+
+
+def _check_crcs(path: Path, content: bytes) -> None:
+    """Compare the CRCs of data section and summary, which no mcap reader checks."""
+    footer_at = len(content) - len(MAGIC) - _FOOTER.size
+    opcode, _, summary_start, _, summary_crc = _FOOTER.unpack_from(content, footer_at)
+    if opcode != 2 or not 0 < summary_start <= footer_at:
+        raise TrialFileError(path, "has no footer where it should be")
+    summary = content[summary_start : footer_at + _FOOTER.size - 4]
+    if zlib.crc32(summary) != summary_crc:
+        raise TrialFileError(path, "has a summary whose checksum is wrong")
+    end_at = summary_start - _DATA_END.size
+    opcode, _, data_crc = _DATA_END.unpack_from(content, end_at)
+    if opcode != 15 or zlib.crc32(content[:end_at]) != data_crc:
+        raise TrialFileError(path, "has data whose checksum is wrong")
+
+
+def _check_attachments(reader: TrialReader) -> None:
+    provenance = reader.metadata["provenance"]
+    for key, digest in provenance.items():
+        if not key.startswith("sha256:"):
+            continue
+        name = key.removeprefix("sha256:")
+        found = reader.attachments.get(name)
+        if found is None or hashlib.sha256(found).hexdigest() != digest:
+            raise TrialFileError(reader.path, f"has no sound attachment {name}")
+
+
+def _check_cycles(reader: TrialReader) -> tuple[int, float, float]:
+    if "/cycle" not in reader.topic_counts():
+        return 0, 0.0, 0.0
+    rows = reader.cycles()
+    result = reader.metadata["result"]
+    numbers = rows.data["cycle"].astype(np.int64)
+    host_ns = rows.data["host_ns"].astype(np.int64)
+    if len(numbers) != int(result["cycles_written"]):
+        raise TrialFileError(reader.path, f"holds {len(numbers)} cycles, not as stated")
+    if len(numbers) < 2:
+        raise TrialFileError(reader.path, "holds fewer than two cycles")
+    steps = np.diff(numbers)
+    if bool((steps < 1).any()):
+        raise TrialFileError(reader.path, "has cycles out of order")
+    if int((steps - 1).sum()) != int(result["cycles_missed"]):
+        raise TrialFileError(reader.path, "lacks other cycles than it states")
+    offset = int(reader.metadata["clock"]["utc_offset_ns"])
+    if bool((rows.log_time.astype(np.int64) - host_ns != offset).any()):
+        raise TrialFileError(reader.path, "has times that do not follow its clock")
+    gaps = np.diff(host_ns)
+    median = float(np.median(gaps / steps))
+    if abs(median - PERIOD_NS) > PERIOD_TOLERANCE * PERIOD_NS:
+        raise TrialFileError(
+            reader.path, f"has a median period of {median / 1e6:.3f} ms, not 2 ms"
+        )
+    duration = float(host_ns[-1] - host_ns[0]) * 1e-9
+    return len(numbers), duration, float(gaps.max()) * 1e-9

@@ -1,0 +1,313 @@
+"""TrialWriter: cycles, sensor samples and events into one MCAP file."""
+
+import contextlib
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from acquisition.cdr import CdrWriter, encode_log, encode_string
+from acquisition.devices import WrenchSample
+from acquisition.errors import TrialFileError
+from acquisition.messages import CYCLE, TRUTH, schema_text
+from acquisition.sample import CHANNELS, Record
+
+CHUNK_BYTES = 262_144
+FORMAT_VERSION = "1"
+JOINT_NAMES = [f"wam_j{joint}" for joint in range(1, 8)]
+NS_PER_S = 1_000_000_000
+
+_TOPICS = {
+    "/robot_description": "std_msgs/msg/String",
+    "/cycle": "traction_msgs/msg/Cycle",
+    "/joint_states": "sensor_msgs/msg/JointState",
+    "/wrench": "geometry_msgs/msg/WrenchStamped",
+    "/foot/pose": "geometry_msgs/msg/PoseStamped",
+    "/foot/twist": "geometry_msgs/msg/TwistStamped",
+    "/events": "rcl_interfaces/msg/Log",
+    "/ft/raw": "traction_msgs/msg/WrenchBatch",
+}
+TRUTH_TOPIC = "/truth"
+
+
+@dataclass(frozen=True, slots=True)
+class TrialHeader:
+    """What is known before the first cycle.
+
+    Attributes:
+        trial: metadata `trial` (session, terrain, operator, ...), strings.
+        utc_offset_ns: UTC = monotonic + this, one number for the whole file [ns].
+        offset_uncertainty_ns: half width of the reading that gave it [ns].
+        rate_hz: nominal rate of the loop.
+        provenance: software, machine and device identities, strings.
+        attachments: file name to content, e.g. `config.toml`.
+        robot_description: URDF of the arm.
+        views_every: every how many cycles the 50 Hz views are written, 0 = never.
+    """
+
+    trial: Mapping[str, str]
+    utc_offset_ns: int
+    offset_uncertainty_ns: int
+    provenance: Mapping[str, str]
+    attachments: Mapping[str, bytes]
+    robot_description: str
+    rate_hz: int = 500
+    views_every: int = 10
+
+
+@dataclass(slots=True)
+class WriterCounts:
+    """What the writer has put into the file so far."""
+
+    cycles: int = 0
+    missed: int = 0
+    late: int = 0
+    lost_in_ring: int = 0
+    first_cycle: int | None = None
+    last_cycle: int | None = None
+    messages: dict[str, int] = field(default_factory=dict[str, int])
+
+
+class TrialWriter:
+    """Writes `<name>.mcap.partial`; `finish` makes it `<name>.mcap`.
+
+    The partial file is created exclusively: an existing one is never touched. Used by
+    the recorder only, never by the control loop.
+
+    Raises:
+        TrialFileError: the file exists, or cannot be created or written.
+    """
+
+    def __init__(self, path: Path, header: TrialHeader, *, truth: bool = False) -> None:
+        self.path = path
+        self.partial = path.with_name(path.name + ".partial")
+        self.counts = WriterCounts()
+        self._header = header
+        if path.exists():
+            raise TrialFileError(path, "exists already and is never overwritten")
+        try:
+            self._file = self.partial.open("xb")
+            _sync_directory(path.parent)
+        except OSError as error:
+            raise TrialFileError(self.partial, _reason(error)) from error
+        self._writer = Writer(
+            self._file,
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_data_crcs=True,
+        )
+        with self._guarded():
+            self._start(truth)
+
+    def write_cycles(self, records: Record) -> None:
+        """Append records of traction_msgs/Cycle in order; stamps are set here."""
+        if not len(records):
+            return
+        records = records.copy()
+        log_times = records["host_ns"].astype(np.int64) + self._header.utc_offset_ns
+        records["sec"], records["nanosec"] = np.divmod(log_times, NS_PER_S)
+        arm_ns = records["arm_ns"].astype(np.int64)
+        published = np.where(arm_ns > 0, arm_ns + self._header.utc_offset_ns, log_times)
+        self._count_cycles(records)
+        with self._guarded():
+            size = CYCLE.size
+            data = records.tobytes()
+            numbers = records["cycle"].tolist()
+            rows = zip(numbers, log_times.tolist(), published.tolist(), strict=True)
+            for i, (number, log_time, publish_time) in enumerate(rows):
+                payload = data[i * size : (i + 1) * size]
+                self._add("/cycle", log_time, payload, publish_time, number)
+                every = self._header.views_every
+                if every and number % every == 0:
+                    self._write_views(records[i], log_time, publish_time, number)
+
+    def write_wrench_samples(self, samples: list[WrenchSample]) -> None:
+        """Append one batch of sensor samples at the sensor's own rate."""
+        if not samples:
+            return
+        log_time = samples[-1].t_ns + self._header.utc_offset_ns
+        writer = CdrWriter().header(log_time, "ft_sensor")
+        writer.sequence(np.array([s.t_ns for s in samples], np.uint64))
+        writer.sequence(np.array([s.counter & 0xFFFFFFFF for s in samples], np.uint32))
+        writer.sequence(np.array([s.status & 0xFFFF for s in samples], np.uint16))
+        writer.sequence(np.array([s.wrench for s in samples], np.float64).ravel())
+        with self._guarded():
+            self._add("/ft/raw", log_time, writer.finish())
+
+    def write_event(self, host_ns: int, level: int, name: str, text: str) -> None:
+        """Append an event of monotonic time `host_ns`; levels as in Log."""
+        t_ns = host_ns + self._header.utc_offset_ns
+        with self._guarded():
+            self._add("/events", t_ns, encode_log(t_ns, level, name, text))
+
+    def write_truth(self, records: Record) -> None:
+        """Append records of traction_msgs/Truth (truth files only)."""
+        records = records.copy()
+        log_times = records["host_ns"].astype(np.int64) + self._header.utc_offset_ns
+        records["sec"], records["nanosec"] = np.divmod(log_times, NS_PER_S)
+        size = TRUTH.size
+        data = records.tobytes()
+        with self._guarded():
+            for i, log_time in enumerate(log_times.tolist()):
+                self._add(TRUTH_TOPIC, log_time, data[i * size : (i + 1) * size])
+
+    def flush(self) -> None:
+        """Close the running chunk and force it to the disk."""
+        with self._guarded():
+            self._writer.flush()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+    def close_partial(self) -> None:
+        """Leave the `.partial` as it stands, e.g. after a write error."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+    def finish(self, stop_reason: str) -> None:
+        """Write metadata `result`, the summary and everything to the disk.
+
+        The file keeps its `.partial` name until it is verified and published.
+        """
+        counts = self.counts
+        result = {
+            "complete": "true",
+            "stop_reason": stop_reason,
+            "cycles_expected": str(counts.cycles + counts.missed),
+            "cycles_written": str(counts.cycles),
+            "cycles_missed": str(counts.missed),
+            "late_cycles": str(counts.late),
+            "lost_in_ring": str(counts.lost_in_ring),
+        }
+        with self._guarded():
+            self._writer.add_metadata("result", result)
+            self._writer.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+
+    def _start(self, truth: bool) -> None:
+        header = self._header
+        self._writer.start(profile="ros2", library="traction")
+        self._writer.add_metadata(
+            "trial", {"format_version": FORMAT_VERSION, **header.trial}
+        )
+        clock = {
+            "utc_offset_ns": str(header.utc_offset_ns),
+            "offset_uncertainty_ns": str(header.offset_uncertainty_ns),
+            "rate_hz": str(header.rate_hz),
+        }
+        self._writer.add_metadata("clock", clock)
+        digests = {
+            f"sha256:{name}": hashlib.sha256(content).hexdigest()
+            for name, content in header.attachments.items()
+        }
+        self._writer.add_metadata("provenance", {**header.provenance, **digests})
+        channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in CHANNELS}
+        self._writer.add_metadata("channels", channels)
+        for name, content in header.attachments.items():
+            self._writer.add_attachment(0, 0, name, "text/plain", content)
+        topics = {TRUTH_TOPIC: "traction_msgs/msg/Truth"} if truth else _TOPICS
+        self._channels: dict[str, int] = {}
+        for topic, type_name in topics.items():
+            schema = self._writer.register_schema(
+                type_name, "ros2msg", schema_text(type_name).encode()
+            )
+            self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
+        self._description_pending = not truth
+
+    def _count_cycles(self, records: Record) -> None:
+        counts = self.counts
+        numbers = records["cycle"].astype(np.int64)
+        if counts.first_cycle is None:
+            counts.first_cycle = int(numbers[0])
+            counts.last_cycle = int(numbers[0]) - 1
+        assert counts.last_cycle is not None
+        steps = np.diff(numbers, prepend=counts.last_cycle)
+        counts.missed += int((steps - 1).sum())
+        counts.late += int(np.count_nonzero(records["flags"] & (1 << 10)))
+        counts.cycles += len(records)
+        counts.last_cycle = int(numbers[-1])
+
+    def _write_views(
+        self, record: np.void, log_time: int, publish_time: int, number: int
+    ) -> None:
+        joints = CdrWriter().header(log_time, "wam_base").strings(JOINT_NAMES)
+        joints.sequence(record["position"]).sequence(record["velocity"])
+        joints.sequence(record["torque_command"])
+        views = {
+            "/joint_states": joints,
+            "/wrench": CdrWriter()
+            .header(log_time, "ft_sensor")
+            .array(record["wrench"]),
+            "/foot/pose": CdrWriter()
+            .header(log_time, "wam_base")
+            .array(record["foot_position"])
+            .array(record["foot_orientation"]),
+            "/foot/twist": CdrWriter()
+            .header(log_time, "wam_base")
+            .array(record["foot_velocity"]),
+        }
+        for topic, writer in views.items():
+            self._add(topic, log_time, writer.finish(), publish_time, number)
+
+    def _add(
+        self,
+        topic: str,
+        log_time: int,
+        data: bytes,
+        publish_time: int | None = None,
+        sequence: int = 0,
+    ) -> None:
+        if self._description_pending:
+            self._description_pending = False
+            description = encode_string(self._header.robot_description)
+            self._add("/robot_description", log_time, description)
+        self._writer.add_message(
+            self._channels[topic],
+            log_time,
+            data,
+            log_time if publish_time is None else publish_time,
+            sequence & 0xFFFFFFFF,
+        )
+        self.counts.messages[topic] = self.counts.messages.get(topic, 0) + 1
+
+    @contextlib.contextmanager
+    def _guarded(self):  # noqa: ANN202
+        try:
+            yield
+        except (OSError, ValueError) as error:
+            self.close_partial()
+            raise TrialFileError(
+                self.partial,
+                _reason(error),
+                hint=f"Kept as .partial: traction recover {self.partial}",
+            ) from error
+
+
+def _sync_directory(folder: Path) -> None:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def publish(writer: TrialWriter) -> None:
+    """Give a verified `.partial` its final name, read-only; never replaces a file."""
+    try:
+        os.link(writer.partial, writer.path)
+        writer.partial.unlink()
+        _sync_directory(writer.path.parent)
+        writer.path.chmod(0o444)
+    except OSError as error:
+        raise TrialFileError(writer.path, _reason(error)) from error
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return f"cannot be written ({error.strerror})"
+    return f"cannot be written ({error})"

@@ -1,0 +1,1 @@
+"""From trial files to models, figures and the report."""

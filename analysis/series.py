@@ -1,0 +1,100 @@
+"""The record of one trial as the analysis takes it: velocity and forces over time."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+MINIMUM_SAMPLES = 3
+LONGEST_NAME = 60
+_COLUMNS = ("t", "v_t", "F_n", "F_t")
+
+
+@dataclass(frozen=True, slots=True)
+class TractionSeries:
+    """One trial at the recorded rate, neither smoothed nor windowed.
+
+    Rows with a value that is not finite are dropped at construction and counted; the
+    arrays are then read-only copies, all of one shape (n,).
+
+    Attributes:
+        terrain: name of the terrain, e.g. "S10".
+        name: name of the trial in messages: a file, or a key in a file.
+        t: time [s], strictly increasing.
+        v_t: velocity of the sole along the slip direction [m/s], > 0 in slip.
+        F_n: normal force [N], > 0 in compression.
+        F_t: traction force [N], > 0 in slip.
+        dropped_rows: number of rows that were not finite.
+
+    Raises:
+        SettingsError: the arrays differ in length, too few rows are finite, time does
+            not increase, or the terrain has no usable name.
+    """
+
+    terrain: str
+    name: str
+    t: Array
+    v_t: Array
+    F_n: Array
+    F_t: Array
+    dropped_rows: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        _check_name(self.terrain, self.name)
+        columns = [np.asarray(getattr(self, key), dtype=np.float64) for key in _COLUMNS]
+        _check_shapes(columns, self.name)
+        is_finite = np.logical_and.reduce([np.isfinite(column) for column in columns])
+        if np.count_nonzero(is_finite) < MINIMUM_SAMPLES:
+            raise SettingsError(
+                f"{self.name}: {np.count_nonzero(is_finite)} finite rows of "
+                f"{is_finite.size}, at least {MINIMUM_SAMPLES} are needed.",
+                hint="Check that the file is complete.",
+            )
+        for key, column in zip(_COLUMNS, columns, strict=True):
+            kept = column[is_finite]
+            kept.setflags(write=False)
+            object.__setattr__(self, key, kept)
+        object.__setattr__(
+            self, "dropped_rows", int(is_finite.size - np.count_nonzero(is_finite))
+        )
+        _check_time(self.t, self.name)
+
+    @property
+    def rate(self) -> float:
+        """Sampling rate [Hz], from the median step of time."""
+        return float(1.0 / np.median(np.diff(self.t)))
+
+
+def _check_name(terrain: str, name: str) -> None:
+    if not 0 < len(terrain) <= LONGEST_NAME or not terrain.isprintable():
+        raise SettingsError(
+            f"{name}: {terrain[:LONGEST_NAME]!r} is no name for a terrain "
+            f"(1 to {LONGEST_NAME} printable characters).",
+            hint="Give a short name such as S0.",
+        )
+
+
+def _check_shapes(columns: list[Array], name: str) -> None:
+    shapes = [column.shape for column in columns]
+    if any(len(shape) != 1 for shape in shapes) or len(set(shapes)) != 1:
+        found = ", ".join(f"{k} {s}" for k, s in zip(_COLUMNS, shapes, strict=True))
+        raise SettingsError(
+            f"{name}: the columns differ in shape ({found}).",
+            hint="All four must be one-dimensional and equally long.",
+        )
+
+
+def _check_time(t: Array, name: str) -> None:
+    backward = np.flatnonzero(np.diff(t) <= 0)
+    if backward.size:
+        row = int(backward[0]) + 1
+        raise SettingsError(
+            f"{name}: time does not increase at row {row} "
+            f"({t[row - 1]:.6g} s, then {t[row]:.6g} s).",
+            hint="Rows must be in time order, each time once.",
+        )

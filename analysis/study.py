@@ -1,0 +1,212 @@
+"""A study: all terrains prepared, folded, fitted and compared."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.crossval import FoldResult, ModelFold, plan_folds, run_fold
+from analysis.events import Slip, find_slips
+from analysis.jobs import Progress, run_tasks
+from analysis.models import FitOptions
+from analysis.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
+from analysis.series import TractionSeries
+
+LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """Every choice of a study.
+
+    Attributes:
+        prepare: smoothing, thinning and window.
+        fit: bounds, number of points and seed.
+        n_jobs: worker processes; None = one per core. Does not change the results.
+    """
+
+    prepare: PrepareOptions = field(default_factory=PrepareOptions)
+    fit: FitOptions = field(default_factory=FitOptions)
+    n_jobs: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainResult:
+    """One terrain of a study.
+
+    Attributes:
+        terrain: its name.
+        trials: its prepared trials.
+        slips: the slips of every trial.
+        folds: its folds; a trial without kept samples has none.
+    """
+
+    terrain: str
+    trials: tuple[PreparedTrial, ...]
+    slips: tuple[tuple[Slip, ...], ...]
+    folds: tuple[FoldResult, ...]
+
+    def per_trial(
+        self, model: str, measure: Callable[[ModelFold], float]
+    ) -> list[float | None]:
+        """Return a measure of a model's fold for every trial, None where missing."""
+        values: list[float | None] = [None] * len(self.trials)
+        for fold in self.folds:
+            if model in fold.models:
+                values[fold.fold] = measure(fold.models[model])
+        return values
+
+    def maes(self, model: str) -> list[float | None]:
+        """Return the mean absolute error [N] on every trial, left out in turn."""
+        return self.per_trial(model, lambda fold: fold.score.mae)
+
+    def mae(self, model: str) -> float | None:
+        """Return the mean over folds of the mean absolute error [N]."""
+        return mean_of(self.maes(model))
+
+    @property
+    def constant_mae(self) -> float | None:
+        """Error [N] of always predicting the training rows' median F_t."""
+        return mean_of([fold.constant_mae for fold in self.folds])
+
+    @property
+    def kept(self) -> int:
+        """Number of kept samples of all trials."""
+        return sum(trial.kept for trial in self.trials)
+
+    @property
+    def lifted_share(self) -> float:
+        """Share of the kept samples with F_n <= 0: the foot off the ground."""
+        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
+        return lifted / self.kept if self.kept else 0.0
+
+    def models(self, name: str) -> list[ModelFold]:
+        """Return the folds of the model `name`."""
+        return [fold.models[name] for fold in self.folds if name in fold.models]
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """The one result object of an analysis.
+
+    Attributes:
+        simulated: the trials were simulated.
+        options: every choice that was made.
+        terrains: results by terrain, in the order given.
+        notes: what could not be done, and why.
+        warnings: what a reader should doubt.
+    """
+
+    simulated: bool
+    options: StudyOptions
+    terrains: Mapping[str, TerrainResult]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def cross(self, model: str) -> dict[str, dict[str, float | None]]:
+        """Return the mean absolute errors [N]: model's terrain -> tested terrain."""
+        return {
+            name: {
+                tested: result.mae(model)
+                if tested == name
+                else _cross_mae(result, model, tested)
+                for tested in self.terrains
+            }
+            for name, result in self.terrains.items()
+            if result.models(model)
+        }
+
+    def to_fits(self) -> dict[str, Any]:
+        """Return every number of the study as plain values with units."""
+        from analysis.fits import to_fits
+
+        return to_fits(self)
+
+
+def run_study(
+    trials: Mapping[str, Sequence[TractionSeries]],
+    options: StudyOptions,
+    simulated: bool,
+    progress: Progress | None = None,
+) -> Study:
+    """Return the analysis of all trials.
+
+    Args:
+        trials: recorded trials by terrain.
+        options: every choice.
+        simulated: the trials were simulated; marks every product.
+        progress: called with (folds done, folds in all).
+
+    Raises:
+        SettingsError: there is no trial at all.
+    """
+    if not any(trials.values()):
+        raise SettingsError("There is no trial to analyse.", hint="Record some first.")
+    prepared = {
+        terrain: tuple(prepare(series, options.prepare) for series in recorded)
+        for terrain, recorded in trials.items()
+    }
+    tasks, notes = plan_folds(prepared, options.fit)
+    folds = run_tasks(run_fold, tasks, options.n_jobs, progress)
+    notes += [note for fold in folds for note in fold.notes]
+    results = {
+        terrain: TerrainResult(
+            terrain=terrain,
+            trials=kept,
+            slips=tuple(find_slips(trial.smooth) for trial in kept),
+            folds=tuple(fold for fold in folds if fold.terrain == terrain),
+        )
+        for terrain, kept in prepared.items()
+    }
+    warnings = tuple(
+        warning
+        for result in results.values()
+        for warning in _warnings(result, options.prepare.container_travel is not None)
+    )
+    return Study(simulated, options, results, tuple(notes), warnings)
+
+
+def mean_of(values: Sequence[float | None]) -> float | None:
+    """Return the mean of the values that exist, None if none does."""
+    present = [value for value in values if value is not None]
+    return float(np.mean(present)) if present else None
+
+
+def _cross_mae(result: TerrainResult, model: str, tested: str) -> float | None:
+    errors = [e for fold in result.models(model) for e in fold.cross[tested]]
+    return mean_of(errors)
+
+
+def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
+    warnings = []
+    if result.lifted_share > LIFTED_WARNING:
+        warnings.append(
+            f"{result.terrain}: F_n <= 0 in {result.lifted_share:.1%} of the kept "
+            f"samples (limit {LIFTED_WARNING:.0%}). Suspect the tare or the plane of "
+            "the terrain."
+        )
+    short = [k + 1 for k, t in enumerate(result.trials) if not t.is_countable]
+    if short:
+        warnings.append(
+            f"{result.terrain}: too short to count - under {MINIMUM_KEPT} kept samples"
+            f"{', or the container not crossed' if has_container else ''} - in "
+            f"{len(short)} of {len(result.trials)} trials, analysed all the same "
+            f"(trial {', '.join(map(str, short))})."
+        )
+    dropped = sum(trial.dropped_rows for trial in result.trials)
+    if dropped:
+        warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
+    constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
+    if constant:
+        warnings.append(
+            f"{result.terrain}: {' and '.join(constant)} never varies, so no model "
+            "can tell what it does."
+        )
+    return warnings
+
+
+def _is_constant(trials: Sequence[PreparedTrial], column: str) -> bool:
+    values = np.concatenate([getattr(trial, column) for trial in trials])
+    return values.size > 1 and float(np.ptp(values)) == 0.0

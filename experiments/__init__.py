@@ -1,0 +1,1 @@
+"""What the operator does: commands, sessions, trials."""

@@ -1,0 +1,1 @@
+"""Shipped defaults: rig.toml and matrix.toml."""

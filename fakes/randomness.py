@@ -1,0 +1,66 @@
+"""Random processes of the simulated world, one generator per trial."""
+
+import math
+import zlib
+
+import numpy as np
+
+
+def trial_generator(seed: int, terrain: str, trial: int) -> np.random.Generator:
+    """Return the generator of one trial: same arguments, same numbers."""
+    return np.random.default_rng([seed, zlib.crc32(terrain.encode()), trial])
+
+
+class NormalStream:
+    """Standard normal numbers one by one, drawn in blocks."""
+
+    def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
+        self._generator = generator
+        self._block = block
+        self._values: list[float] = []
+
+    def next(self) -> float:
+        """Return the next number."""
+        if not self._values:
+            self._values = self._generator.standard_normal(self._block).tolist()
+            self._values.reverse()
+        return self._values.pop()
+
+
+class OrnsteinUhlenbeck:
+    """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`."""
+
+    def __init__(
+        self, sd: float, time: float, dt: float, normals: NormalStream
+    ) -> None:
+        self._keep = math.exp(-dt / time)
+        self._kick = sd * math.sqrt(1.0 - self._keep**2)
+        self._normals = normals
+        self.value = sd * normals.next()
+
+    def step(self) -> float:
+        """Advance by one time step and return the value."""
+        self.value = self._keep * self.value + self._kick * self._normals.next()
+        return self.value
+
+
+class Tremor:
+    """Unit-rms noise through a resonator at 9.5 Hz, damping ratio 0.15."""
+
+    def __init__(self, dt: float, normals: NormalStream) -> None:
+        omega, zeta = 2.0 * math.pi * 9.5, 0.15
+        self._normals = normals
+        self._dt = dt
+        self._omega2 = omega * omega
+        self._damp = 2.0 * zeta * omega
+        # white input of this intensity gives unit variance: S = 4 zeta omega^3
+        self._kick = math.sqrt(4.0 * zeta * omega**3 * dt)
+        self._x = normals.next()
+        self._v = omega * normals.next()
+
+    def step(self) -> float:
+        """Advance by one time step and return the value (semi-implicit Euler)."""
+        kick = self._kick * self._normals.next()
+        self._v += self._dt * (-self._omega2 * self._x - self._damp * self._v) + kick
+        self._x += self._dt * self._v
+        return self._x

@@ -1,0 +1,1 @@
+"""Wrist force/torque sensor: protocols and true force."""

@@ -1,0 +1,43 @@
+"""Live view of the foot: pose, wrench and traction written into the sample."""
+
+import numpy as np
+
+from acquisition.devices import ArmReading, WrenchSample
+from acquisition.sample import Sample
+from ft_sensor.payload import Payload, TerrainFrame
+from wam.model import ArmModel, quaternion
+
+
+class LiveFoot:
+    """Implements acquisition.cycle.FootObserver with model, payload and terrain."""
+
+    def __init__(
+        self, model: ArmModel, payload: Payload, terrain: TerrainFrame
+    ) -> None:
+        self._model = model
+        self.payload = payload
+        self._axes = terrain.axes()
+
+    def observe(
+        self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
+    ) -> float:
+        """Write foot pose, twist, wrench and traction; return the sole's speed [m/s].
+
+        Without a fresh wrench the last forces are repeated.
+        """
+        position, rotation, twist = self._model.sole_motion(reading.q, reading.qd)
+        sample.foot_position[:] = position
+        sample.foot_orientation[:] = quaternion(rotation)
+        sample.foot_velocity[:] = twist
+        axes = self._axes
+        if wrench is not None:
+            payload = self.payload
+            sample.wrench_raw[:] = wrench.wrench
+            contact = payload.contact(sample.wrench_raw, rotation)
+            sample.wrench[:] = contact
+            force = payload.to_base(contact, rotation)
+            sample.traction[1] = -(axes[0] @ force)
+            sample.traction[2] = axes[2] @ force
+        velocity = twist[:3]
+        sample.traction[0] = axes[0] @ velocity
+        return float(np.sqrt(velocity @ velocity))

@@ -1,0 +1,129 @@
+"""True force: from the sensor's reading to the ground's force on the foot.
+
+Pure, used live in the loop and offline by the analysis. With f the load on the sensor,
+m_b and c_b everything below the gauges and g_w = (0, 0, -g):
+
+    F_c = s (f_raw - b) - m_b R_WS^T g_w        in the sensor frame
+    n_c = s (n_raw - b_n) - c_b x m_b R_WS^T g_w
+
+Force and torque leave the sensor frame in `to_base` only.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wam.constants import GRAVITY, Array
+from wam.tool import Tool
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Payload:
+    """What the sensor carries and how it is mounted.
+
+    Attributes:
+        mass: of everything below the gauges [kg].
+        com: its centre in the sensor frame [m], shape (3,).
+        rotation: sensor frame to frame 7, shape (3, 3).
+        sign: +1 if the sensor reads the load on it, -1 if the reaction.
+        bias: reading without load [N, N m], shape (6,); set by a tare.
+    """
+
+    mass: float
+    com: Array
+    rotation: Array
+    sign: float
+    bias: Array
+
+    def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
+        """Return the payload with the bias that a reading in the air gives.
+
+        Args:
+            reading: mean raw wrench with the foot free [N, N m], shape (6,).
+            rotation_base_7: orientation of frame 7 meanwhile, shape (3, 3).
+        """
+        weight = self.weight(rotation_base_7)
+        return replace(self, bias=np.asarray(reading) - self.sign * weight)
+
+    def weight(self, rotation_base_7: Floats) -> Floats:
+        """Return force and moment of the payload's weight in the sensor frame.
+
+        Args:
+            rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
+        """
+        down = -self.mass * GRAVITY * rotation_base_7[..., 2, :]
+        force = down @ self.rotation  # rotation^T applied to row vectors
+        return np.concatenate([force, np.cross(self.com, force)], axis=-1)
+
+    def contact(self, raw: Floats, rotation_base_7: Floats) -> Floats:
+        """Return the ground's wrench on the foot in the sensor frame, shape (..., 6).
+
+        Args:
+            raw: readings [N, N m], shape (..., 6).
+            rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
+        """
+        return self.sign * (raw - self.bias) - self.weight(rotation_base_7)
+
+    def to_base(self, wrench: Floats, rotation_base_7: Floats) -> Floats:
+        """Return the force part of `wrench` (..., 6) in the base frame, (..., 3)."""
+        rotation = rotation_base_7 @ self.rotation
+        return np.matmul(rotation, wrench[..., :3, None])[..., 0]
+
+
+def payload_of(tool: Tool) -> Payload:
+    """Return the payload that `tool` describes, not tared."""
+    c, s = np.cos(tool.sensor_angle), np.sin(tool.sensor_angle)
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    origin = np.array([0.0, 0.0, tool.sensor_height])
+    com = rotation.T @ (tool.foot.com - origin)
+    return Payload(tool.foot.mass, com, rotation, tool.sensor_sign, np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainFrame:
+    """Frame of a terrain: x_T down the slope toward the base, z_T the normal.
+
+    Attributes:
+        incline: angle of the plane [rad], the far end is the high end.
+        heading: direction from the base to the container about z [rad].
+        far_end: point of the plane where trials start [m], shape (3,), base frame.
+        travel: length of a trial along x_T [m].
+    """
+
+    incline: float
+    heading: float
+    far_end: tuple[float, float, float]
+    travel: float
+
+    def axes(self) -> Array:
+        """Return the rows x_T, y_T, z_T in the base frame, shape (3, 3)."""
+        ca, sa = np.cos(self.incline), np.sin(self.incline)
+        ch, sh = np.cos(self.heading), np.sin(self.heading)
+        yaw = np.array([[ch, -sh, 0.0], [sh, ch, 0.0], [0.0, 0.0, 1.0]])
+        rows = np.array([[-ca, 0.0, -sa], [0.0, -1.0, 0.0], [-sa, 0.0, ca]])
+        return rows @ yaw.T
+
+    def displacement(self, position: Floats) -> Floats:
+        """Return the distance from the far end along x_T [m], shape (...)."""
+        return (position - np.array(self.far_end)) @ self.axes()[0]
+
+    def height(self, position: Floats) -> Floats:
+        """Return the distance above the plane [m], shape (...)."""
+        return (position - np.array(self.far_end)) @ self.axes()[2]
+
+
+def traction(axes: Array, velocity: Floats, force: Floats) -> Floats:
+    """Return (v_t, F_t, F_n): slip velocity, traction and normal force, (..., 3).
+
+    v_t = v . x_T, F_t = -F_c . x_T, F_n = F_c . z_T: all positive in ordinary slip.
+
+    Args:
+        axes: rows x_T, y_T, z_T, shape (3, 3).
+        velocity: of the sole in the base frame [m/s], shape (..., 3).
+        force: of the ground on the foot in the base frame [N], shape (..., 3).
+    """
+    v_t = velocity @ axes[0]
+    return np.stack([v_t, -(force @ axes[0]), force @ axes[2]], axis=-1)

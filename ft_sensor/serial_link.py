@@ -1,0 +1,181 @@
+"""The door to pyserial: ports that are drained, never waited on."""
+
+import termios
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import serial
+
+from acquisition.errors import LinkError
+
+_READ_LIMIT = 4096  # what the kernel keeps for a terminal
+_PORT_ERRORS = (OSError, termios.error)  # termios.error is no OSError
+
+
+class SerialPort(Protocol):
+    """The part of pyserial's port that is used here."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that can be read at once."""
+        ...
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Return at most `size` bytes."""
+        ...
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send `data`."""
+        ...
+
+    def reset_input_buffer(self) -> None:
+        """Throw away what has arrived."""
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor."""
+        ...
+
+    def close(self) -> None:
+        """Give the device back."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedPort:
+    """An open port, and what about it is not as wished (empty = nothing)."""
+
+    port: SerialPort
+    warning: str
+
+
+def open_port(path: str, baudrate: int) -> OpenedPort:
+    """Open the serial device at `path`, 8N1, for this program alone.
+
+    Raises:
+        LinkError: the device is missing, taken, or refuses.
+    """
+    try:
+        port = serial.Serial(
+            path, baudrate, timeout=0, write_timeout=0.5, exclusive=True
+        )
+    except (*_PORT_ERRORS, ValueError) as error:
+        raise LinkError(
+            f"Cannot open the serial port {path} at {baudrate} baud: {error}.",
+            hint="Is the sensor plugged in, the port its own, and no other program on "
+            "it? Reading a port may need membership of the group dialout.",
+        ) from error
+    return OpenedPort(port, _low_latency_warning(port, path))
+
+
+def _low_latency_warning(port: serial.Serial, path: str) -> str:
+    try:
+        port.set_low_latency_mode(True)
+    except (*_PORT_ERRORS, ValueError, NotImplementedError):
+        return f"{path} has no low-latency mode."
+    return latency_timer_warning(path)
+
+
+def latency_timer_warning(path: str, sysfs: Path = Path("/sys/class/tty")) -> str:
+    """Return what is wrong with the latency timer of `path`; empty if nothing.
+
+    An FTDI adapter may accept the low-latency flag and go on collecting bytes for
+    16 ms, so the timer is read back.
+    """
+    timer = sysfs / Path(path).resolve().name / "device" / "latency_timer"
+    try:
+        value_ms = int(timer.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return ""  # adapters of other makes have no such timer
+    if value_ms <= 1:
+        return ""
+    return f"{path} delivers in bursts: latency timer {value_ms} ms, wanted 1 ms."
+
+
+class SerialLink:
+    """A serial port as the drivers use it: drained, written to, closed.
+
+    Implements `acquisition.clock.Readable`.
+    """
+
+    def __init__(self, port: SerialPort) -> None:
+        self._port = port
+        self._is_open = True
+
+    def read_available(self) -> bytes:
+        """Return what has arrived, at most 4096 bytes; does not wait.
+
+        Raises:
+            LinkError: the port is closed or gone.
+        """
+        self._require_open()
+        try:
+            count = self._port.in_waiting
+            return self._port.read(min(count, _READ_LIMIT)) if count > 0 else b""
+        except _PORT_ERRORS as error:
+            raise _broken(error) from error
+
+    def write(self, data: bytes) -> None:
+        """Send `data`.
+
+        Raises:
+            LinkError: the port is closed or gone, or takes nothing for 0.5 s.
+        """
+        self._require_open()
+        try:
+            self._port.write(data)
+        except _PORT_ERRORS as error:
+            raise _broken(error) from error
+
+    def discard_input(self) -> None:
+        """Throw away what has arrived.
+
+        Raises:
+            LinkError: the port is closed or gone.
+        """
+        self._require_open()
+        try:
+            self._port.reset_input_buffer()
+        except _PORT_ERRORS as error:
+            raise _broken(error) from error
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, -1 if the port has none."""
+        try:
+            return self._port.fileno()
+        except _PORT_ERRORS:
+            return -1
+
+    def is_readable(self) -> bool:
+        """Return whether bytes have arrived.
+
+        Raises:
+            LinkError: the port is closed or gone.
+        """
+        self._require_open()
+        try:
+            return self._port.in_waiting > 0
+        except _PORT_ERRORS as error:
+            raise _broken(error) from error
+
+    def close(self) -> None:
+        """Give the port back; never raises, also when called again."""
+        if not self._is_open:
+            return
+        self._is_open = False
+        try:
+            self._port.close()
+        except _PORT_ERRORS:
+            return  # a device that is gone needs no closing
+
+    def _require_open(self) -> None:
+        if not self._is_open:
+            raise LinkError("The serial port is closed.", hint="Open the sensor again.")
+
+
+def _broken(error: Exception) -> LinkError:
+    return LinkError(
+        f"The serial port of the F/T sensor failed: {error}.",
+        hint="Unplugged? Check the cable, then open the sensor again.",
+    )

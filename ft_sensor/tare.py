@@ -1,0 +1,130 @@
+"""Tare: what the sensor shows when the foot touches nothing, or why it is refused."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.clock import NS_PER_S
+from acquisition.devices import WrenchSample
+from acquisition.errors import TractionError
+
+Wrench = tuple[float, float, float, float, float, float]
+
+SPREAD_LIMIT = 0.5  # [N]
+MIN_DURATION = 1.0  # [s]
+WINDOW = 0.2  # [s]
+_MIN_PER_WINDOW = 50  # half of what the slowest accepted sensor sends in 0.2 s
+_AGAIN = "[space] to try again."
+
+
+class TareError(TractionError):
+    """Samples that no tare can be taken from."""
+
+    exit_code = 3
+
+
+@dataclass(frozen=True, slots=True)
+class TareResult:
+    """The resting wrench.
+
+    Attributes:
+        t_ns: monotonic time of the last sample [ns].
+        wrench: mean fx fy fz tx ty tz in the sensor frame [N, N m].
+        deviation: standard deviation of each [N, N m].
+        spread: largest minus smallest 0.2 s mean of a force component, the worst of
+            the three [N].
+        samples: how many samples went in.
+    """
+
+    t_ns: int
+    wrench: Wrench
+    deviation: Wrench
+    spread: float
+    samples: int
+
+
+def tare(
+    samples: Sequence[WrenchSample], spread_limit: float = SPREAD_LIMIT
+) -> TareResult:
+    """Return the mean of at least one second of raw samples, oldest first.
+
+    White noise averages away in 0.2 s means; what still varies between them is a
+    touch or a drift. Device-side zeroing is not used: it is lost at power-off.
+
+    Raises:
+        TareError: too few samples or a gap, a flagged or non-finite sample, or a
+            spread above `spread_limit` [N].
+    """
+    _refuse_flagged(samples)
+    windows = _windows(samples)
+    wrenches = np.array([sample.wrench for sample in samples], dtype=np.float64)
+    if not np.isfinite(wrenches).all():
+        raise TareError(
+            "The F/T sensor sent non-finite values in the tare.", hint=_AGAIN
+        )
+    spread = _force_spread(wrenches, windows)
+    if spread > spread_limit:
+        raise TareError(
+            f"Force varied {spread:.1f} N during tare "
+            f"({WINDOW:g} s means, limit {spread_limit:g}).",
+            hint=f"Is the foot touching? {_AGAIN}",
+        )
+    return TareResult(
+        t_ns=samples[-1].t_ns,
+        wrench=cast("Wrench", tuple(wrenches.mean(axis=0).tolist())),
+        deviation=cast("Wrench", tuple(wrenches.std(axis=0).tolist())),
+        spread=spread,
+        samples=len(samples),
+    )
+
+
+def _refuse_flagged(samples: Sequence[WrenchSample]) -> None:
+    flagged = [s for s in samples if s.status or s.is_saturated or not s.is_valid]
+    if flagged:
+        raise TareError(
+            f"{len(flagged)} of {len(samples)} F/T samples were flagged during tare "
+            f"(first status 0x{flagged[0].status:04x}).",
+            hint=f"Is the sensor overloaded or its cable loose? {_AGAIN}",
+        )
+
+
+def _windows(samples: Sequence[WrenchSample]) -> NDArray[np.int64]:
+    """Return the number of the 0.2 s window of each sample, shape (n,).
+
+    A sample stands for one period, so n samples last n / (n - 1) times the time from
+    the first to the last. The last window includes the remainder: what goes into the
+    mean is looked at.
+    """
+    times = np.array([sample.t_ns for sample in samples], dtype=np.int64)
+    count = len(times)
+    lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 else 0.0
+    # Half a period of grace: arrival times jitter by that much.
+    grace = lasted / count / 2 if count else 0.0
+    if lasted + grace < MIN_DURATION * NS_PER_S:
+        raise TareError(
+            f"{count} F/T samples over {lasted / NS_PER_S:.2f} s are too few for a "
+            f"tare (at least {MIN_DURATION:g} s).",
+            hint=_AGAIN,
+        )
+    window_ns = WINDOW * NS_PER_S
+    windows = ((times - times[0]) / window_ns).astype(np.int64)
+    whole = int((lasted + grace) / window_ns)
+    windows = np.minimum(windows, whole - 1)
+    fewest = min(int(np.count_nonzero(windows == k)) for k in range(whole))
+    if fewest < _MIN_PER_WINDOW:
+        raise TareError(
+            f"Only {fewest} F/T samples in one {WINDOW:g} s of the tare "
+            f"(at least {_MIN_PER_WINDOW}).",
+            hint=f"Check the sensor's rate and cable. {_AGAIN}",
+        )
+    return windows
+
+
+def _force_spread(wrenches: NDArray[np.float64], windows: NDArray[np.int64]) -> float:
+    means = np.array(
+        [wrenches[windows == k, :3].mean(axis=0) for k in range(windows.max() + 1)]
+    )
+    return float(np.ptp(means, axis=0).max())

@@ -1,0 +1,66 @@
+"""Recorded slices and data shared by the tests of the analysis."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.series import TractionSeries
+from analysis.study import StudyOptions, run_study
+from analysis.tables import load_tables
+
+DATA = Path(__file__).parent.parent / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data(request):
+    folder = Path(__file__).resolve().parents[3] / "shared" / "data"
+    if not folder.is_dir():
+        reason = f"no measurements in {folder}"
+        if request.config.getoption("--require-shared-data", default=False):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def vectors():
+    return json.loads((DATA / "gp_vectors.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def slice_path():
+    return DATA / "rehearsal_slice.npz"
+
+
+@pytest.fixture(scope="session")
+def slice_trials(slice_path):
+    return load_tables([slice_path])
+
+
+@pytest.fixture(scope="session")
+def small_study(slice_trials):
+    return run_study(slice_trials, StudyOptions(n_jobs=1), simulated=True)
+
+
+@pytest.fixture(scope="session")
+def make_series():
+    """Make a trial from a velocity; forces follow a known law with a little noise."""
+
+    def make(v_t, *, terrain="S0", name="made", F_n=None, seed=0):
+        v_t = np.asarray(v_t, dtype=float)
+        rng = np.random.default_rng(seed)
+        t = 0.002 * np.arange(v_t.size)
+        if F_n is None:
+            F_n = 4.0 + 1.5 * np.sin(1.7 * t + seed)
+        F_t = 0.6 * F_n + 3.0 * np.exp(-np.abs(v_t) / 0.03) + rng.normal(0, 0.1, t.size)
+        return TractionSeries(terrain, name, t, v_t, F_n, F_t)
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def moving():
+    """Return a velocity that wanders through the window, 0.01 to 0.15 m/s."""
+    return 0.08 + 0.07 * np.sin(np.arange(3000) * 0.004)

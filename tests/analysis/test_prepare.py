@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError
+from analysis.prepare import PrepareOptions, foot_velocity, moving_average, prepare
+
+
+@given(
+    st.lists(st.floats(-100, 100), min_size=1, max_size=40),
+    st.sampled_from([1, 3, 5, 11, 25]),
+)
+def test_moving_average_is_the_mean_of_the_samples_present(values, width):
+    x, half = np.array(values), width // 2
+    expected = [x[max(0, i - half) : i + half + 1].mean() for i in range(x.size)]
+    # sums of up to 25 numbers of size 100
+    np.testing.assert_allclose(moving_average(x, width), expected, atol=1e-11)
+
+
+def test_velocity_of_a_straight_motion_is_exact_with_uneven_time():
+    t = np.array([0.0, 0.002, 0.004, 0.008, 0.010, 0.013])
+    position = np.outer(t, [1.0, -2.0, 0.5])
+    # differences of numbers near 0.01
+    np.testing.assert_allclose(
+        foot_velocity(t, position), np.tile([1.0, -2.0, 0.5], (6, 1)), atol=1e-12
+    )
+
+
+def test_velocity_is_central_not_one_sided():
+    t = np.arange(5) * 0.1
+    assert foot_velocity(t, t**2)[2] == pytest.approx(2 * t[2])
+    assert foot_velocity(t, t**2)[0] == pytest.approx(0.1)
+
+
+def test_velocity_spans_three_missing_samples():
+    t = np.delete(np.arange(20), [8, 9, 10]) * 0.002
+    assert np.all(np.isfinite(foot_velocity(t, t)))
+
+
+def test_velocity_is_missing_across_four_missing_samples():
+    t = np.delete(np.arange(20), [8, 9, 10, 11]) * 0.002
+    velocity = foot_velocity(t, np.outer(t, [1.0, 1.0]))
+    missing = np.flatnonzero(np.isnan(velocity).all(axis=1))
+    assert missing.tolist() == [7, 8]
+
+
+def test_both_ends_of_the_window_are_kept(make_series):
+    v = np.repeat([0.005, 0.0049, 0.2, 0.2001, -0.01], 4)
+    options = PrepareOptions(smoothing=1, downsample=1)
+    kept = prepare(make_series(v), options)
+    assert kept.indices.tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
+    shares = kept.shares
+    assert (shares.window, shares.sticking) == (0.4, 0.2)
+    assert (shares.backward, shares.fast) == (0.2, 0.2)
+    assert shares.window_of_moving == pytest.approx(0.5)
+
+
+def test_thinning_starts_at_the_first_sample_and_comes_after_smoothing(make_series):
+    series = make_series(np.full(53, 0.1))
+    kept = prepare(series, PrepareOptions())
+    assert kept.indices.tolist() == list(range(0, 53, 5))
+    assert kept.F_t[4] == pytest.approx(series.F_t[15:26].mean())
+
+
+def test_travel_is_the_integral_of_velocity(make_series):
+    trial = prepare(make_series(np.full(1001, 0.1)), PrepareOptions())
+    assert trial.travel == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("samples", "container", "is_countable"),
+    [(1250, None, True), (1245, None, False), (2000, 0.44, True), (2000, 0.45, False)],
+)
+def test_a_trial_counts_with_250_samples_and_nine_tenths_of_the_container(
+    make_series, samples, container, is_countable
+):
+    options = PrepareOptions(container_travel=container)
+    trial = prepare(make_series(np.full(samples, 0.1)), options)
+    assert trial.is_countable is is_countable
+
+
+@pytest.mark.parametrize(
+    "choice",
+    [
+        {"smoothing": 10},
+        {"smoothing": 0},
+        {"downsample": 0},
+        {"slowest": 0.0},
+        {"slowest": 0.3},
+        {"fastest": float("nan")},
+    ],
+)
+def test_options_that_make_no_sense_are_refused(choice):
+    with pytest.raises(SettingsError):
+        PrepareOptions(**choice)
+
+
+@pytest.mark.parametrize(
+    ("key", "kept"),
+    [
+        ("S0/02", 704),
+        ("S0/08", 552),
+        ("S0/00", 745),
+        ("B0/02", 605),
+        ("B0/04", 508),
+        ("B0/05", 806),
+        ("TF/05", 693),
+        ("TF/07", 807),
+        ("TF/08", 832),
+    ],
+)
+def test_kept_samples_agree_with_an_independent_analysis(slice_trials, key, kept):
+    (series,) = [s for s in slice_trials[key[:2]] if s.name.endswith(key)]
+    # one sample on the edge of the window may fall either way
+    assert abs(prepare(series, PrepareOptions()).kept - kept) <= 1

@@ -1,0 +1,213 @@
+import json
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.curve_figures import draw_excerpts
+from analysis.error_figures import draw_cross_map, draw_errors
+from analysis.figures import render, styled
+from analysis.files import write_atomic
+from analysis.models import FitOptions
+from analysis.report import ReportContext, ReportTable, render_page, write_report
+from analysis.report_content import choices, summary, table_one, verdicts
+from analysis.scenes import best_excerpt
+from analysis.study import StudyOptions, run_study
+
+OPTIONS = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
+HOSTILE = "<script>$x_1</b>&"
+
+
+class Page(HTMLParser):
+    """Every tag with its attributes, and the text between them."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.text = [], ""
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.text += data
+
+    def attributes(self, tag):
+        return [attrs for name, attrs in self.tags if name == tag]
+
+
+def context(**changes):
+    choices = {
+        "title": "Traction",
+        "subtitle": "three terrains",
+        "is_simulated": False,
+        "is_foreign": False,
+        "generated_utc": "2027-03-14 10:00 UTC",
+    }
+    return ReportContext(**(choices | changes))
+
+
+@pytest.fixture(scope="module")
+def written(small_study, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("out")
+    table = ReportTable("Sessions", ("session", "kept"), [["S012", "10"]], "remark")
+    path = write_report(small_study, folder, context(is_simulated=True, tables=[table]))
+    return folder, path, Page(path.read_text())
+
+
+def test_page_needs_nothing_from_outside(written):
+    _, path, page = written
+    text = path.read_text()
+    assert "http:" not in text
+    assert "https:" not in text
+    assert not page.attributes("script")
+    assert not page.attributes("link")
+    for attrs in page.attributes("img"):
+        assert attrs["src"].startswith("data:image/png;base64,")
+        assert len(attrs["alt"]) > 20
+
+
+def test_page_shows_the_papers_figures_and_table(written):
+    _, _, page = written
+    assert len(page.attributes("img")) == 6
+    for name in ("Table I", "Fig. 4", "Fig. 5", "Fig. 6", "Fig. 9", "Fig. 10"):
+        assert name in page.text
+    assert "paper, Table I" in page.text
+
+
+def test_page_says_simulated_and_carries_further_tables(written):
+    _, _, page = written
+    assert "SIMULATED" in page.text
+    assert "LIVE" not in page.text
+    assert "S012" in page.text
+    assert "remark" in page.text
+
+
+def test_every_number_and_figure_lies_beside_the_page(written, small_study):
+    folder, path, _ = written
+    assert path == folder / "report" / "index.html"
+    assert json.loads((folder / "fits.json").read_text()) == small_study.to_fits()
+    assert (folder / "fits.csv").read_text().startswith("terrain,model,fold")
+    figures = sorted(file.suffix for file in (folder / "figures").iterdir())
+    assert figures == [".pdf"] * 6 + [".png"] * 6
+    for file in (folder / "figures").iterdir():
+        start = b"%PDF" if file.suffix == ".pdf" else b"\x89PNG"
+        assert file.read_bytes().startswith(start)
+
+
+@pytest.fixture(scope="module")
+def hostile_study(make_series, moving):
+    trials = {
+        name: [make_series(moving, terrain=name, seed=k) for k in range(2)]
+        for name in (HOSTILE, "TF")
+    }
+    return run_study(trials, OPTIONS, simulated=False)
+
+
+def test_markup_in_names_stays_text(hostile_study):
+    page = Page(render_page(hostile_study, [], context(title=HOSTILE)))
+    assert not page.attributes("script")
+    assert page.text.count(HOSTILE) > 3
+    assert "LIVE" in page.text
+
+
+@pytest.mark.parametrize("draw", [draw_excerpts, draw_errors, draw_cross_map])
+def test_mathematics_in_names_stays_text(hostile_study, draw):
+    from matplotlib.text import Text
+
+    with styled():
+        figure = draw(hostile_study)
+        figure.draw_without_rendering()
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    assert any(r"<script>\$x_1</b>&" in text for text in texts)
+
+
+def test_a_study_without_models_still_has_a_report(make_series, moving, tmp_path):
+    study = run_study({"S0": [make_series(moving)]}, StudyOptions(), simulated=False)
+    page = Page(write_report(study, tmp_path, context(is_foreign=True)).read_text())
+    assert "What could not be done" in page.text
+    assert "FOREIGN" in page.text
+    assert len(page.attributes("img")) == 1  # Fig. 4 needs no model
+
+
+def test_a_study_without_kept_samples_still_has_a_report(make_series, tmp_path):
+    still = [make_series(np.zeros(500), seed=k) for k in range(2)]
+    study = run_study({"S0": still}, StudyOptions(), simulated=False)
+    page = Page(write_report(study, tmp_path, context()).read_text())
+    assert "No figure could be drawn" in page.text
+
+
+def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study):
+    with styled():
+        first, second, unmarked = (
+            render("a", draw_errors(small_study), is_simulated)
+            for is_simulated in (True, True, False)
+        )
+    assert first == second
+    assert first.png != unmarked.png
+
+
+def test_excerpt_holds_slips_where_there_are_some(small_study):
+    assert len(best_excerpt(small_study.terrains["S0"]).slips) >= 2
+    assert len(best_excerpt(small_study.terrains["TF"]).slips) == 0
+
+
+def test_summary_counts_what_was_kept(small_study):
+    row = dict(
+        zip(summary(small_study).header, summary(small_study).rows[0], strict=True)
+    )
+    assert row["terrain"] == "S0"
+    assert row["kept samples"] == str(745 + 704 + 552)
+    assert row["slips"] == "15"
+
+
+def test_the_papers_own_row_stands_beside_ours(small_study):
+    rows = {(row[0], row[1]): row for row in table_one(small_study).rows}
+    assert rows["TF", "paper, Table I"][2:7] == [
+        "0.843",
+        "0.534",
+        "0.079",
+        "420",
+        "7.49",
+    ]
+    assert ("B0", "this study") in rows
+
+
+def test_a_model_that_says_nothing_is_called_so(make_series, moving):
+    rng = np.random.default_rng(0)
+    trials = [make_series(moving, terrain="noise", seed=k) for k in range(3)]
+    for series in trials:
+        object.__setattr__(series, "F_t", rng.normal(3.0, 1.0, series.t.size))
+    study = run_study({"noise": trials}, OPTIONS, simulated=False)
+    assert "no model beats a constant" in verdicts(study)[0]
+
+
+def test_a_model_that_helps_is_called_so(small_study):
+    assert "of a constant's" in next(v for v in verdicts(small_study) if v[:2] == "TF")
+
+
+def test_foreign_tables_are_told_that_samples_are_counted_as_they_are(small_study):
+    assert "whatever their rate" in choices(small_study, is_foreign=True).note
+    assert choices(small_study, is_foreign=False).note == ""
+
+
+def test_a_folder_that_cannot_be_written_is_refused(small_study, tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("in the way")
+    with pytest.raises(SettingsError, match="cannot be written"):
+        write_report(small_study, blocked, context())
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_remains(tmp_path, monkeypatch):
+    path = tmp_path / "a.txt"
+    write_atomic(path, b"old")
+
+    def fail(_descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", fail)
+    with pytest.raises(SettingsError, match="No space left"):
+        write_atomic(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]

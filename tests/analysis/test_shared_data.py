@@ -1,0 +1,96 @@
+"""Agreement with an independent analysis, and honesty on real measurements."""
+
+import json
+
+import numpy as np
+import pytest
+
+from analysis.models import GP_SE, TUSTIN
+from analysis.prepare import PrepareOptions
+from analysis.series import TractionSeries
+from analysis.study import StudyOptions, run_study
+from analysis.tables import load_tables, parse_columns
+
+pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(300)]
+STONES = ("S0", "S10", "S15", "B0", "B10", "B15")
+PLATES = ("TF", "Tf")
+
+
+@pytest.fixture(scope="module")
+def expected(shared_data):
+    return json.loads((shared_data / "rehearsal_expected.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def fits(shared_data):
+    trials = load_tables([shared_data / "rehearsal_trials.npz"])
+    return run_study(trials, StudyOptions(), simulated=True).to_fits()
+
+
+@pytest.fixture(scope="module")
+def contour(shared_data):
+    paths = sorted((shared_data / "real" / "kuleuven_contour").glob("*.csv"))
+    columns = parse_columns("t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N")
+    return load_tables(paths, columns)["table"]
+
+
+def test_terrains_keep_their_order(fits, expected):
+    assert list(fits["terrains"]) == expected["terrains"]
+
+
+@pytest.mark.parametrize("terrain", STONES + PLATES)
+def test_kept_samples_and_slips_agree(fits, expected, terrain):
+    found = fits["terrains"][terrain]
+    difference = np.subtract(found["kept_samples"], expected["kept"][terrain])
+    assert np.abs(difference).max() <= 1
+    assert found["slips"] == expected["slips"][terrain]
+
+
+@pytest.mark.parametrize("terrain", STONES + PLATES)
+def test_tustin_fits_as_well_and_predicts_alike(fits, expected, terrain):
+    found = fits["terrains"][terrain]
+    ratio = np.divide(
+        found["train_rmse_folds"][TUSTIN], expected["tustin_train_rmse_fold"][terrain]
+    )
+    assert ratio.max() <= 1.005
+    assert found["mae"][TUSTIN] == pytest.approx(
+        expected["tustin_mae"][terrain], rel=0.03
+    )
+
+
+@pytest.mark.parametrize("terrain", STONES + PLATES)
+def test_gaussian_processes_predict_alike(fits, expected, terrain):
+    found = fits["terrains"][terrain]["mae"][GP_SE]
+    # other 300 points; on plates 0.03 N is the scatter between choices
+    allowed = {"rel": 0.06} if terrain in STONES else {"rel": 0.08, "abs": 0.03}
+    assert found == pytest.approx(expected["gp_se_mae"][terrain], **allowed)
+
+
+@pytest.mark.parametrize("model", [TUSTIN, GP_SE])
+def test_errors_across_terrains_agree(fits, expected, model):
+    table = expected["cross_rows_model_cols_test"][model]
+    for i, source in enumerate(expected["terrains"]):
+        for j, tested in enumerate(expected["terrains"]):
+            # models of stones extrapolate to plates
+            is_far = source in STONES and tested in PLATES
+            found = fits["cross"][model][source][tested]
+            assert found == pytest.approx(table[i][j], rel=0.35 if is_far else 0.12)
+
+
+def test_real_contour_trials_are_hardly_better_than_a_constant(contour):
+    study = run_study({"table": contour}, StudyOptions(), simulated=False)
+    result = study.terrains["table"]
+    assert len(result.trials) == 12
+    assert result.mae(TUSTIN) > 0.85 * result.constant_mae
+
+
+def test_real_contour_trials_have_the_error_found_before(contour):
+    pressed = [
+        TractionSeries(s.terrain, s.name, s.t[p], s.v_t[p], s.F_n[p], s.F_t[p])
+        for s in contour
+        for p in [s.F_n > 10.0]
+    ]
+    options = StudyOptions(prepare=PrepareOptions(slowest=0.02, downsample=2))
+    result = run_study({"table": pressed}, options, simulated=False).terrains["table"]
+    # one figure is given for it, 0.7 N
+    assert result.mae(TUSTIN) == pytest.approx(0.7, abs=0.1)

@@ -1,0 +1,164 @@
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError
+from analysis import tables
+from analysis.tables import load_tables, parse_columns
+
+GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
+
+
+def write(folder, text, name="trial.csv"):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def rows(n=5):
+    return np.column_stack([np.arange(n), np.ones(n), np.ones(n), np.ones(n)])
+
+
+def test_npz_gives_its_terrains_in_the_order_of_the_file(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"TF/00": rows(), "B0/00": rows(), "TF/01": rows(7)})
+    trials = load_tables([path])
+    assert list(trials) == ["TF", "B0"]
+    assert [series.t.size for series in trials["TF"]] == [5, 7]
+
+
+def test_csv_is_read_with_renamed_columns_in_any_order(tmp_path):
+    path = write(tmp_path, "Ft,x,vt,Fn,time\n9,0,0.1,3,0\n9,0,0.1,3,1\n9,0,0.1,3,2\n")
+    columns = parse_columns("t=time, v_t=vt,F_n=Fn,F_t=Ft")
+    (series,) = load_tables([path], columns, "gravel")["gravel"]
+    assert series.F_t[0] == 9.0
+    assert series.F_n[0] == 3.0
+    assert series.t[2] == 2.0
+
+
+def test_csv_without_a_terrain_is_called_table(tmp_path):
+    assert list(load_tables([write(tmp_path, GOOD)])) == ["table"]
+
+
+def test_byte_order_mark_and_quotes_do_no_harm(tmp_path):
+    text = "\ufeff" + GOOD.replace("t,v_t", '"t","v_t"')
+    assert load_tables([write(tmp_path, text)])["table"][0].t.size == 3
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "empty"),
+        ("t,v_t,F_n,F_t\n", "no rows"),
+        ("time,v\n0,1\n", r"no column t, v_t, F_n, F_t; it has time, v"),
+        (GOOD + "0.3,fast,2,1\n", "not only numbers.*fast"),
+        (GOOD + "0.3,1\n", "not only numbers"),
+        (b"\x93NUMPY\xff\xfe", "neither a text table nor an npz"),
+        (b"PK\x03\x04 and then nothing of the sort", "not a readable npz"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused_by_name(tmp_path, content, reason):
+    with pytest.raises(SettingsError, match=r"trial\.csv.*" + reason):
+        load_tables([write(tmp_path, content)])
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match=r"gone\.csv: cannot be read"):
+        load_tables([tmp_path / "gone.csv"])
+
+
+def test_a_folder_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="cannot be read"):
+        load_tables([tmp_path])
+
+
+def test_no_file_at_all_is_refused():
+    with pytest.raises(SettingsError, match="No table"):
+        load_tables([])
+
+
+def test_zip_that_is_no_npz_is_refused_with_what_it_holds(tmp_path):
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("readme.txt", "hello")
+    with pytest.raises(SettingsError, match=r"holds readme\.txt"):
+        load_tables([path])
+
+
+def test_objects_are_never_unpickled(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"S0/00": np.array([[object()] * 4], dtype=object)})
+    with pytest.raises(SettingsError, match="not a readable npz"):
+        load_tables([path])
+
+
+@pytest.mark.parametrize("array", [rows()[:, :3], rows()[0], rows().astype("U8")])
+def test_array_of_another_form_is_refused(tmp_path, array):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"S0/00": array})
+    with pytest.raises(SettingsError, match="array S0/00 has shape"):
+        load_tables([path])
+
+
+def test_truncated_npz_is_refused(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"S0/00": rows()})
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(SettingsError, match="not a readable npz"):
+        load_tables([path])
+
+
+def test_header_that_claims_a_gigantic_array_is_refused(tmp_path):
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': (10**15, 4), }"
+    header = header.replace(b"10**15", b"1000000000000000")
+    header += b" " * (118 - 1 - len(header)) + b"\n"
+    array = b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+    path = tmp_path / "a.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("S0/00.npy", array)
+    with pytest.raises(SettingsError, match="not a readable npz"):
+        load_tables([path])
+
+
+def test_npz_that_unpacks_beyond_the_limit_is_refused_unopened(tmp_path, monkeypatch):
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, **{"S0/00": np.zeros((5000, 4))})
+    monkeypatch.setattr(tables, "LARGEST_FILE", 100_000)
+    assert path.stat().st_size < 100_000
+    with pytest.raises(SettingsError, match="the limit is"):
+        load_tables([path])
+
+
+@pytest.mark.parametrize("text", ["t", "speed=v", "t=", "=x"])
+def test_columns_that_name_nothing_are_refused(text):
+    with pytest.raises(SettingsError, match="does not name a column"):
+        parse_columns(text)
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(
+    noise=st.binary(max_size=300), start=st.sampled_from([b"", b"PK\x03\x04", b"t,"])
+)
+def test_any_bytes_are_read_or_refused_but_never_crash(tmp_path, noise, start):
+    path = write(tmp_path, start + noise, "noise")
+    with pytest.raises(SettingsError):
+        load_tables([path])
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@given(place=st.integers(0, 600), value=st.integers(0, 255))
+def test_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, place, value):
+    stream = io.BytesIO()
+    np.savez(stream, **{"S0/00": rows()})
+    content = bytearray(stream.getvalue())
+    content[place % len(content)] = value
+    path = write(tmp_path, bytes(content), "flipped.npz")
+    try:
+        trials = load_tables([path])
+    except SettingsError:
+        return
+    assert all(series.t.size for found in trials.values() for series in found)

@@ -1,0 +1,88 @@
+"""A clock that is told how far to go, and motors that only remember."""
+
+from collections.abc import Sequence
+from weakref import finalize
+
+from acquisition.clock import Readable
+from fakes.can_bus import FakeCanBus
+from fakes.pucks import NetworkOptions, PuckNetwork
+from wam.can_link import CanLink
+
+
+class SteppedClock:
+    """Simulated time: waiting advances the world and takes none."""
+
+    def __init__(self) -> None:
+        self.world: FakeCanBus | None = None
+        self.t_ns = 1_000_000_000
+
+    def now_ns(self) -> int:
+        return self.t_ns
+
+    def utc_ns(self) -> int:
+        return self.t_ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        self.t_ns = max(self.t_ns, t_ns)
+        if self.world is not None:
+            self.world.advance(self.t_ns)
+
+    def wait(self, link: Readable, deadline_ns: int) -> bool:
+        while not link.is_readable():
+            if self.t_ns >= deadline_ns:
+                return False
+            next_ns = self.world.next_event_ns() if self.world else None
+            self.sleep_until(min(deadline_ns, next_ns or deadline_ns))
+        return True
+
+
+class Motors:
+    """Seven motors that stand where they are put."""
+
+    def __init__(self, counts: Sequence[int] = (0,) * 7) -> None:
+        self.position = list(counts)
+        self.units = [0] * 7
+        self.is_braked = False
+        self.is_powered = False
+        self.t_ns = 0
+
+    def advance(self, t_ns: int) -> None:
+        assert t_ns >= self.t_ns, "time runs forward"
+        self.t_ns = t_ns
+
+    def counts(self) -> Sequence[int]:
+        return self.position
+
+    def set_torques(self, units: Sequence[int]) -> None:
+        self.units = list(units)
+
+    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
+        self.is_braked, self.is_powered = is_braked, is_powered
+
+
+class Rig:
+    """Motors, network, bus, clock and link, joined."""
+
+    def __init__(
+        self,
+        options: NetworkOptions | None = None,
+        counts: Sequence[int] = (0,) * 7,
+    ) -> None:
+        self.clock = SteppedClock()
+        self.motors = Motors(counts)
+        self.network = PuckNetwork(self.motors, options, self.clock.t_ns)
+        self.bus = FakeCanBus(self.network, self.clock)
+        self.clock.world = self.bus
+        self.sent: list[tuple[int, int, bytes]] = []
+        self.link = CanLink(self.bus)
+        finalize(self, self.bus.shutdown)
+        send = self.link.send
+
+        def spy(can_id: int, data: bytes) -> None:
+            self.sent.append((self.clock.t_ns, can_id, data))
+            send(can_id, data)
+
+        self.link.send = spy
+
+    def rest(self, duration_ns: int) -> None:
+        self.clock.sleep_until(self.clock.t_ns + duration_ns)

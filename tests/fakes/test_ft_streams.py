@@ -1,0 +1,289 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from fakes.ft_streams import (
+    BotaOptions,
+    BotaStream,
+    ByteFault,
+    ErrorScale,
+    SensorErrors,
+    damage,
+)
+from ft_sensor.bota import (
+    Acknowledgement,
+    BotaParser,
+    BotaStatus,
+    find_acknowledgements,
+    find_boot_text,
+)
+
+MS = 1_000_000
+S = 1_000_000_000
+WIRE_NS = 802_951  # 37 bytes of 10 bits at 460800 baud
+FAST = BotaOptions(is_running=True, sinc=64)
+QUIET = ErrorScale(bias=0.0, drift=0.0, white=0.0, resolution=0.0)
+
+
+def ramp(t_ns: int) -> tuple[float, ...]:
+    """The load tells when it was asked for, in whole microseconds."""
+    return (t_ns / 1000, 1.0, 2.0, 3.0, 4.0, 5.0)
+
+
+def frames_of(stream: BotaStream, t_ns: int):
+    return BotaParser().feed(b"".join(data for _, data in stream.due(t_ns)))
+
+
+def text_of(stream: BotaStream, t_ns: int) -> bytes:
+    return b"".join(data for _, data in stream.due(t_ns))
+
+
+def configured(options: BotaOptions = FAST) -> BotaStream:
+    """A device in configuration mode at 100 ms, with nothing left to say."""
+    stream = BotaStream(ramp, options=options)
+    stream.receive(50 * MS, b"C")
+    stream.due(100 * MS)
+    return stream
+
+
+def test_frame_is_emitted_when_its_last_byte_has_left_the_wire():
+    stream = BotaStream(ramp, options=FAST)
+    assert stream.due(WIRE_NS - 1) == []
+    ((t_ns, data),) = stream.due(WIRE_NS)
+    assert (t_ns, len(data)) == (WIRE_NS, 37)
+
+
+def test_next_event_is_when_bytes_come():
+    stream = BotaStream(ramp, options=FAST)
+    for _ in range(5):
+        event = stream.next_event_ns()
+        assert event is not None
+        assert stream.due(event - 1) == []
+        assert len(stream.due(event)) == 1
+
+
+def test_load_is_that_of_the_sampling_instant():
+    frames = frames_of(BotaStream(ramp, options=FAST), 100 * MS)
+    assert [frame.wrench[0] for frame in frames] == [1250.0 * k for k in range(80)]
+    assert all(frame.wrench[0] == frame.device_us for frame in frames)
+
+
+@pytest.mark.parametrize("steps", [1, 3, 1000])
+def test_bytes_do_not_depend_on_how_often_they_are_fetched(steps):
+    def sent(count: int) -> bytes:
+        errors = SensorErrors(np.random.default_rng(5))
+        stream = BotaStream(ramp, errors, FAST)
+        return b"".join(text_of(stream, S // count * k) for k in range(1, count + 1))
+
+    whole = sent(1)
+    part = sent(steps)
+    # A step may end before the last frame of the whole second.
+    assert whole.startswith(part)
+    assert len(whole) - len(part) <= 37
+
+
+@pytest.mark.parametrize(("sinc", "rate"), [(51, 1003.9), (64, 800), (512, 100)])
+def test_rate_is_51200_over_the_sinc_length(sinc, rate):
+    stream = BotaStream(ramp, options=BotaOptions(is_running=True, sinc=sinc))
+    assert len(frames_of(stream, 10 * S)) == pytest.approx(10 * rate, abs=1)
+
+
+def test_shipped_device_sends_100_hz():
+    stream = BotaStream(ramp, options=BotaOptions(is_running=True))
+    assert len(stream.due(S)) == pytest.approx(100, abs=1)
+
+
+def test_fast_device_clock_shows_more_time_than_passed():
+    options = BotaOptions(is_running=True, sinc=64, clock_error_ppm=200)
+    frames = frames_of(BotaStream(ramp, options=options), 10 * S)
+    host_us = frames[-1].wrench[0]
+    # 200 ppm of 10 s are 2000 us; float32 shows ten million to one.
+    assert frames[-1].device_us - host_us == pytest.approx(2000, abs=3)
+    # The device samples by its own clock.
+    assert frames[-1].device_us == pytest.approx(1250 * (len(frames) - 1), abs=1)
+
+
+def test_device_clock_wraps_at_32_bits():
+    options = BotaOptions(is_running=True, sinc=64, clock_start_us=2**32 - 1250)
+    frames = frames_of(BotaStream(ramp, options=options), 4 * MS)
+    assert [frame.device_us for frame in frames] == [2**32 - 1250, 0, 1250]
+
+
+def test_boot_text_comes_late_and_before_the_stream():
+    stream = BotaStream(ramp)
+    assert stream.due(300 * MS) == []
+    text = find_boot_text(text_of(stream, 900 * MS))
+    assert text == BotaOptions().boot_text
+    assert frames_of(stream, 2 * S)
+
+
+def test_commands_during_the_boot_are_lost():
+    stream = BotaStream(ramp)
+    stream.receive(500 * MS, b"C")
+    data = text_of(stream, 3 * S)
+    assert find_acknowledgements(data) == []
+    assert BotaParser().feed(data)
+
+
+def test_configuration_mode_stops_the_stream_behind_the_last_frame():
+    stream = BotaStream(ramp, options=FAST)
+    stream.due(10 * MS)
+    stream.receive(10 * MS + 100_000, b"C")
+    data = text_of(stream, S)
+    assert len(BotaParser().feed(data)) == 1
+    assert data.endswith(b"r,0,C,0")
+    assert stream.next_event_ns() is None
+
+
+def test_commands_may_come_byte_by_byte():
+    stream = configured()
+    for k, byte in enumerate(b"f,64,0,0,0"):
+        stream.receive(100 * MS + k * 5 * MS, bytes((byte,)))
+    assert text_of(stream, S) == b"r,0,f,0"
+
+
+def test_filter_command_sets_the_rate():
+    stream = configured(BotaOptions(is_running=True))
+    stream.receive(100 * MS, b"f,64,0,0,0R")
+    assert len(frames_of(stream, S + 104 * MS)) == pytest.approx(800, abs=1)
+
+
+@pytest.mark.parametrize("command", [b"c,0,1,0,4", b"f,64,0,0,0", b"R"])
+def test_configuring_while_running_is_refused(command):
+    stream = BotaStream(ramp, options=FAST)
+    stream.receive(50 * MS, command)
+    answers = find_acknowledgements(text_of(stream, 100 * MS))
+    assert answers == [Acknowledgement(chr(command[0]), 1)]
+    assert frames_of(stream, S)
+
+
+@pytest.mark.parametrize(
+    "noise", [b"\x00\xff", b"xyz", b"c,0,1,x", b"f,,,,", b"c" * 99]
+)
+def test_unknown_input_does_not_hide_the_next_command(noise):
+    stream = configured()
+    stream.receive(100 * MS, noise + b"f,64,0,0,0")
+    assert find_acknowledgements(text_of(stream, S)) == [Acknowledgement("f", 0)]
+
+
+def test_refused_letters_are_answered_with_a_code():
+    stream = configured(BotaOptions(is_running=True, sinc=64, refused="R"))
+    stream.receive(100 * MS, b"R")
+    assert find_acknowledgements(text_of(stream, S)) == [Acknowledgement("R", 1)]
+
+
+def test_deaf_device_goes_on_streaming():
+    stream = BotaStream(
+        ramp, options=BotaOptions(is_running=True, sinc=64, is_deaf=True)
+    )
+    stream.receive(0, b"C")
+    assert find_acknowledgements(text_of(stream, S)) == []
+    assert frames_of(stream, 2 * S)
+
+
+def test_raw_starts_show_in_the_status_until_reset():
+    stream = BotaStream(
+        ramp, options=BotaOptions(is_running=True, sinc=64, raw_starts=1)
+    )
+    assert {f.status for f in frames_of(stream, 50 * MS)} == {BotaStatus.RAW_GAUGE}
+    stream.receive(50 * MS, b"I")
+    stream.receive(60 * MS, b"R")
+    assert frames_of(stream, 100 * MS)[-1].status == 0
+
+
+def test_hard_reset_boots_again_with_its_clock_at_zero():
+    stream = BotaStream(ramp, options=FAST)
+    stream.due(S)
+    stream.receive(S, b"#")
+    data = text_of(stream, 3 * S)
+    assert find_boot_text(data).is_complete
+    (first, *_) = BotaParser().feed(data)
+    assert first.device_us == 1_000_000  # from reset to the first sample
+
+
+def test_silent_device_says_nothing_until_it_speaks():
+    stream = BotaStream(ramp, options=FAST)
+    stream.go_silent()
+    assert stream.due(S) == []
+    assert stream.next_event_ns() is None
+    stream.speak()
+    assert stream.due(2 * S)
+
+
+def test_paused_device_loses_samples_but_no_time():
+    stream = BotaStream(ramp, options=FAST)
+    stream.pause(50 * MS)
+    assert frames_of(stream, 60 * MS)[0].device_us == 50_000
+
+
+def test_line_too_slow_skips_and_says_so():
+    options = BotaOptions(is_running=True, sinc=64, baudrate=115200)
+    frames = frames_of(BotaStream(ramp, options=options), S)
+    assert len(frames) <= 311  # what 115200 baud can carry
+    assert any(frame.status & BotaStatus.SKIPPED for frame in frames)
+
+
+@pytest.mark.parametrize("fault", list(ByteFault))
+def test_damage_hits_one_frame(fault):
+    stream = BotaStream(ramp, options=FAST)
+    stream.due(10 * MS)  # the sample of 10 ms is on the wire
+    stream.damage_next(fault, 12)
+    frames = frames_of(stream, 60 * MS)
+    steps = [b.device_us - a.device_us for a, b in pairwise(frames)]
+    assert steps == [2500] + [1250] * (len(frames) - 2)
+
+
+def test_damage_does_what_it_says():
+    assert damage(b"abc", ByteFault.FLIP, 1) == b"acc"
+    assert damage(b"abc", ByteFault.DROP, 1) == b"ac"
+    assert damage(b"abc", ByteFault.DOUBLE, 1) == b"abbc"
+
+
+def errors_of(count: int, seed: int = 0, **scale) -> np.ndarray:
+    """What is shown under no load, 800 Hz, shape (count, 6)."""
+    force = ErrorScale(**({"bias": 0, "drift": 0, "white": 0, "resolution": 0} | scale))
+    errors = SensorErrors(np.random.default_rng(seed), force, QUIET)
+    return np.array([errors.apply(k * 1_250_000, (0.0,) * 6) for k in range(count)])
+
+
+def test_white_noise_has_its_deviation():
+    shown = errors_of(4000, white=0.3)
+    # 12,000 values: 0.3 N to within 3 sigma = 3 * 0.3 / sqrt(24,000).
+    assert shown[:, :3].std() == pytest.approx(0.3, abs=0.006)
+    assert not shown[:, 3:].any()
+
+
+def test_resolution_rounds_to_steps():
+    shown = errors_of(500, white=0.3, resolution=0.02)[:, :3]
+    steps = shown / 0.02
+    assert np.abs(steps - np.round(steps)).max() < 1e-9
+
+
+def test_drift_has_its_deviation_and_its_time():
+    shown = np.hstack([errors_of(400, seed, drift=0.22)[:, :3] for seed in range(150)])
+    # 450 paths: the deviation is known to 0.22 / sqrt(900) = 0.007 N.
+    assert shown[0].std() == pytest.approx(0.22, abs=0.025)
+    assert shown[-1].std() == pytest.approx(0.22, abs=0.025)
+    passed = 399 * 1.25e-3
+    correlation = np.corrcoef(shown[0], shown[-1])[0, 1]
+    assert correlation == pytest.approx(np.exp(-passed / 3.0), abs=0.05)
+
+
+def test_bias_is_constant_in_a_trial_and_new_in_the_next():
+    force = ErrorScale(bias=0.24, drift=0.0, white=0.0, resolution=0.0)
+    errors = SensorErrors(np.random.default_rng(0), force, force)
+    first = errors.apply(0, (0.0,) * 6)
+    assert errors.apply(MS, (0.0,) * 6) == first
+    errors.new_trial(np.random.default_rng(1))
+    assert errors.apply(2 * MS, (0.0,) * 6) != first
+
+
+def test_a_trial_is_reproducible_from_its_generator():
+    errors = SensorErrors(np.random.default_rng(0))
+
+    def trial() -> list[tuple[float, ...]]:
+        errors.new_trial(np.random.default_rng(7))
+        return [errors.apply(k * MS, (1.0,) * 6) for k in range(20)]
+
+    assert trial() == trial()

@@ -1,0 +1,407 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.devices import WrenchSample
+from acquisition.errors import (
+    DeviceFaultError,
+    LinkError,
+    LinkTimeoutError,
+    SettingsError,
+)
+from fakes.ft_streams import BotaOptions, BotaStream, ByteFault, SensorErrors
+from fakes.serial_port import FakeSerialPort
+from ft_sensor.bota import BotaFrame, BotaStatus, unwrap_us
+from ft_sensor.sensor import BotaSensor, FrameDating, SensorSettings
+from ft_sensor.serial_link import SerialLink
+
+MS = 1_000_000
+LOAD = (1.0, -2.0, 30.0, 0.1, 0.2, -0.3)
+
+
+class SteppedTime:
+    """A clock that jumps: to the next byte when waiting, to the end when sleeping."""
+
+    def __init__(self) -> None:
+        self.now = 10_000_000_000
+        self.world: FakeSerialPort
+
+    def now_ns(self) -> int:
+        return self.now
+
+    def utc_ns(self) -> int:
+        return self.now
+
+    def sleep_until(self, t_ns: int) -> None:
+        self.now = max(self.now, t_ns)
+
+    def wait(self, link, deadline_ns: int) -> bool:
+        while not link.is_readable():
+            event = self.world.next_event_ns()
+            if event is None or event > deadline_ns:
+                self.sleep_until(deadline_ns)
+                return link.is_readable()
+            self.sleep_until(event)
+        return True
+
+
+class Bench:
+    """A sensor on a simulated device, both in one hand."""
+
+    def __init__(self, options=BotaOptions(), line_xor=0, load=LOAD, **settings):  # noqa: B008
+        self.clock = SteppedTime()
+        errors = SensorErrors(np.random.default_rng(1))
+        start = self.clock.now_ns()
+        self.device = BotaStream(lambda t_ns: load, errors, options, start)
+        self.port = FakeSerialPort(self.device, self.clock, line_xor)
+        self.clock.world = self.port
+        values = {"port": "/dev/sensor", "rate_check": 0.25} | settings
+        self.sensor = BotaSensor(
+            SerialLink(self.port), self.clock, SensorSettings(**values)
+        )
+
+    def opened(self) -> "Bench":
+        self.sensor.open()
+        return self
+
+    def run(self, duration_ns: int, period_ns: int = 2 * MS) -> list[WrenchSample]:
+        """Poll every `period_ns`."""
+        found: list[WrenchSample] = []
+        for _ in range(duration_ns // period_ns):
+            self.clock.sleep_until(self.clock.now_ns() + period_ns)
+            found += self.sensor.poll(self.clock.now_ns())
+        return found
+
+
+class RecordingPort(FakeSerialPort):
+    """Remembers what was written to it."""
+
+    def __init__(self, stream, clock) -> None:
+        super().__init__(stream, clock)
+        self.written = b""
+
+    def write(self, data, /):
+        self.written += data
+        return super().write(data)
+
+
+class ForgetfulPort(FakeSerialPort):
+    """Loses the first byte written to it."""
+
+    forgotten = False
+
+    def write(self, data, /):
+        if self.forgotten:
+            return super().write(data)
+        self.forgotten = True
+        return len(data)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        BotaOptions(),
+        BotaOptions(is_running=True),
+        BotaOptions(is_running=True, resets_on_open=True),
+    ],
+    ids=["boot text", "running stream", "reset by opening"],
+)
+def test_sensor_opens_from(options):
+    found = Bench(options).opened().run(1000 * MS)
+    # 800 Hz, less one or two still on the wire.
+    assert len(found) == pytest.approx(800, abs=2)
+    mean = np.mean([sample.wrench for sample in found], axis=0)
+    # Bias and drift add up to 0.33 N rms; three times that.
+    assert np.abs(mean[:3] - LOAD[:3]).max() < 1.0
+    assert all(sample.is_valid and not sample.is_saturated for sample in found)
+
+
+def test_opening_sends_the_documented_commands_only():
+    bench = Bench(BotaOptions(is_running=True))
+    port = RecordingPort(bench.device, bench.clock)
+    bench.clock.world = port
+    settings = SensorSettings("/dev/sensor", rate_check=0.25)
+    BotaSensor(SerialLink(port), bench.clock, settings).open()
+    assert port.written == b"Cc,0,1,0,4f,64,0,0,0R"
+
+
+def test_sensor_left_in_configuration_mode_opens_again():
+    bench = Bench(BotaOptions(is_running=True)).opened()
+    bench.sensor.close()
+    assert bench.device.next_event_ns() is not None  # the answer to the stop
+    port = FakeSerialPort(bench.device, bench.clock)
+    bench.clock.world = port
+    settings = SensorSettings("/dev/sensor", rate_check=0.25)
+    bench.sensor = BotaSensor(SerialLink(port), bench.clock, settings)
+    assert bench.opened().run(100 * MS)
+
+
+def test_silence_names_power_and_cable():
+    bench = Bench()
+    bench.device.go_silent()
+    with pytest.raises(LinkTimeoutError) as error:
+        bench.sensor.open()
+    assert str(error.value) == (
+        "No F/T data for 100 ms (port open, 0 bytes). Check power and cable."
+    )
+
+
+def test_garbage_is_suspected_of_a_wrong_speed():
+    bench = Bench(BotaOptions(is_running=True), line_xor=0x5A)
+    with pytest.raises(LinkError, match=r"Wrong speed \(now 460800 baud\)") as error:
+        bench.sensor.open()
+    assert "no valid frame" in error.value.message
+
+
+@pytest.mark.parametrize(("letter", "text"), [("c", "c,0,1,0,4"), ("f", "f,64,0,0,0")])
+def test_refused_command_is_named(letter, text):
+    bench = Bench(BotaOptions(refused=letter))
+    with pytest.raises(DeviceFaultError, match=f"refused '{text}' with code 1"):
+        bench.sensor.open()
+
+
+def test_deaf_sensor_did_not_answer():
+    bench = Bench(BotaOptions(is_running=True, is_deaf=True))
+    with pytest.raises(LinkTimeoutError, match="did not answer 'c,0,1,0,4'"):
+        bench.sensor.open()
+
+
+def test_inactive_matrix_is_started_again():
+    bench = Bench(BotaOptions(raw_starts=2)).opened()
+    assert not any(s.status & BotaStatus.RAW_GAUGE for s in bench.run(100 * MS))
+
+
+def test_matrix_that_stays_inactive_is_refused():
+    bench = Bench(BotaOptions(raw_starts=100))
+    with pytest.raises(DeviceFaultError, match="raw gauge data"):
+        bench.sensor.open()
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_absurd_numbers_without_a_flag_are_refused(axis):
+    load = tuple(600.0 if k == axis else 0.0 for k in range(6))
+    with pytest.raises(DeviceFaultError, match="absurd forces"):
+        Bench(load=load).sensor.open()
+
+
+def test_standing_device_clock_is_refused_at_the_start():
+    bench = Bench()
+    bench.device.is_clock_frozen = True
+    with pytest.raises(DeviceFaultError, match="stands still"):
+        bench.sensor.open()
+
+
+def test_a_command_that_got_lost_is_repeated():
+    bench = Bench(BotaOptions(is_running=True))
+    port = ForgetfulPort(bench.device, bench.clock)
+    bench.clock.world = port
+    settings = SensorSettings("/dev/sensor", rate_check=0.25)
+    bench.sensor = BotaSensor(SerialLink(port), bench.clock, settings)
+    assert bench.opened().run(100 * MS)
+
+
+def test_rate_below_495_hz_is_refused():
+    bench = Bench(BotaOptions(sinc=104))
+    with pytest.raises(DeviceFaultError, match=r"sends 49[12]\.\d Hz, at least 495"):
+        bench.sensor.open()
+
+
+def test_rate_is_not_taken_on_the_word_of_a_slow_device_clock():
+    # It counts 800 Hz with seconds that last 1.67.
+    bench = Bench(BotaOptions(clock_error_ppm=-400_000))
+    with pytest.raises(DeviceFaultError, match=r"sends 4[78]\d\.\d Hz"):
+        bench.sensor.open()
+
+
+def test_rate_of_502_hz_is_accepted():
+    Bench(BotaOptions(sinc=102)).opened()
+
+
+def test_description_tells_who_and_how_fast():
+    told = Bench(BotaOptions(clock_error_ppm=50)).opened().sensor.describe()
+    assert told["serial_number"] == "20001"
+    assert told["name"] == "Fake F/T sensor"
+    assert told["filter"] == "sinc 64, FIR on"
+    # One frame more or less in a quarter of a second is 4 Hz.
+    assert float(told["measured_rate"].split()[0]) == pytest.approx(800, abs=4)
+
+
+def test_description_of_a_running_stream_has_no_serial_number():
+    told = Bench(BotaOptions(is_running=True)).opened().sensor.describe()
+    assert told["serial_number"].startswith("unknown")
+
+
+@pytest.mark.parametrize("period_ns", [2 * MS, 500_000, 23 * MS])
+def test_sample_times_rise_and_differ_like_the_device_clock(period_ns):
+    bench = Bench(BotaOptions(clock_error_ppm=80)).opened()
+    period = None
+    for _ in range(20):
+        batch = bench.run(period_ns, period_ns)
+        for before, after in pairwise(batch):
+            period = after.t_ns - before.t_ns
+            assert period == (after.counter - before.counter) * 1000
+    assert period is not None or period_ns < 1_250_000
+    times = [sample.t_ns for sample in bench.run(400 * MS, period_ns)]
+    assert all(before < after for before, after in pairwise(times))
+
+
+def test_newest_sample_is_one_wire_time_before_its_arrival():
+    bench = Bench().opened()
+    newest = bench.run(20 * MS)[-1]
+    assert newest.t_ns == bench.clock.now_ns() - 802_951
+
+
+def test_true_sampling_time_is_within_one_period_before_the_date():
+    bench = Bench().opened()
+    start = bench.device._clock_zero_ns
+    for sample in bench.run(100 * MS):
+        late = sample.t_ns - (start + sample.counter * 1000)
+        assert -1000 <= late <= 1_250_000  # the counter shows whole microseconds
+
+
+@pytest.mark.parametrize(
+    ("status", "is_valid", "is_saturated"),
+    [
+        (BotaStatus.SKIPPED, True, False),
+        (BotaStatus.OVER_RANGE, True, True),
+        (BotaStatus.INVALID, False, False),
+        (BotaStatus.RAW_GAUGE, False, False),
+    ],
+)
+def test_status_bits_reach_the_sample(status, is_valid, is_saturated):
+    bench = Bench().opened()
+    bench.device.status = int(status)
+    last = bench.run(50 * MS)[-1]
+    assert (last.is_valid, last.is_saturated) == (is_valid, is_saturated)
+    assert last.status == status
+
+
+@pytest.mark.parametrize("fault", [ByteFault.FLIP, ByteFault.DROP])
+def test_damaged_frame_is_counted_by_checksum_and_by_device_time(fault):
+    bench = Bench().opened()
+    bench.run(20 * MS)
+    bench.device.damage_next(fault, 10)
+    bench.run(50 * MS)
+    counters = bench.sensor.counters
+    assert counters.crc_errors >= 1
+    assert (counters.lost, counters.resyncs) == (1, 1)
+
+
+def test_paused_stream_counts_what_it_lost():
+    bench = Bench().opened()
+    bench.run(20 * MS)
+    bench.device.pause(bench.clock.now_ns() + 50 * MS)
+    bench.run(100 * MS)
+    assert bench.sensor.counters.lost == pytest.approx(40, abs=1)
+
+
+def test_clean_stream_counts_frames_only():
+    bench = Bench().opened()
+    count = len(bench.run(200 * MS))
+    counters = bench.sensor.counters
+    assert counters.lost == counters.crc_errors == counters.frozen == 0
+    # The one or two frames on the wire at the end of opening.
+    assert counters.frames == count
+
+
+def test_silent_stream_gives_nothing():
+    bench = Bench().opened()
+    bench.run(20 * MS)
+    bench.device.go_silent()
+    assert bench.run(20 * MS) == []
+
+
+def test_standing_device_clock_makes_samples_invalid():
+    bench = Bench().opened()
+    bench.run(20 * MS)
+    bench.device.is_clock_frozen = True
+    found = bench.run(20 * MS)
+    assert not any(sample.is_valid for sample in found[4:])
+    assert bench.sensor.counters.frozen > 0
+
+
+def test_numbers_that_repeat_for_50_ms_are_invalid():
+    bench = Bench().opened()
+    bench.device.errors = None
+    found = bench.run(100 * MS)
+    valid = [sample for sample in found[2:] if sample.is_valid]
+    # 40 periods of 1.25 ms, two of which were read already.
+    assert len(valid) == pytest.approx(38, abs=2)
+    assert not found[-1].is_valid
+
+
+def test_non_finite_numbers_are_invalid():
+    dating = FrameDating(SensorSettings("/dev/sensor"))
+    frame = BotaFrame(0, (0.0, float("nan"), 0.0, 0.0, 0.0, 0.0), 5, 25.0)
+    (sample,) = dating.date([frame], 10 * MS)
+    assert not sample.is_valid
+
+
+def test_dates_rise_when_a_late_batch_reaches_back():
+    dating = FrameDating(SensorSettings("/dev/sensor"))
+    frames = [
+        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), 1250 * k, 25.0) for k in range(4)
+    ]
+    found = dating.date(frames[:1], 100 * MS)
+    found += dating.date(frames[1:], 101 * MS)
+    assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
+
+
+def test_a_jump_of_the_device_clock_does_not_move_the_dates():
+    dating = FrameDating(SensorSettings("/dev/sensor"))
+    frames = [
+        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), t_us, 25.0)
+        for k, t_us in enumerate([1000, 2250, 2_000_000_000, 2_000_001_250])
+    ]
+    found = dating.date(frames, 100 * MS)
+    assert found[-1].t_ns - found[0].t_ns == 2 * 1_250_000
+
+
+def test_device_time_passes_the_end_of_32_bits():
+    bench = Bench(BotaOptions(clock_start_us=2**32 - 1_600_000)).opened()
+    found = bench.run(300 * MS)
+    counters = [sample.counter for sample in found]
+    total = unwrap_us(counters[-1], counters[0]) - counters[0]
+    assert counters[0] > counters[-1]
+    assert total == (len(found) - 1) * 1250
+    assert bench.sensor.counters.lost == 0
+
+
+def test_wrap_inside_a_run_loses_nothing():
+    dating = FrameDating(SensorSettings("/dev/sensor"))
+    frames = [
+        BotaFrame(
+            0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), (2**32 - 2500 + 1250 * k) % 2**32, 25.0
+        )
+        for k in range(5)
+    ]
+    found = dating.date(frames, 100 * MS)
+    assert all(sample.is_valid for sample in found)
+    assert dating.lost == 0
+    assert found[-1].t_ns - found[0].t_ns == 4 * 1_250_000
+
+
+def test_closing_stops_the_stream_and_may_be_repeated():
+    bench = Bench().opened()
+    bench.sensor.close()
+    bench.sensor.close()
+    bench.device.due(bench.clock.now_ns() + 100 * MS)
+    assert bench.device.next_event_ns() is None
+
+
+def test_closing_an_unplugged_sensor_does_not_raise():
+    bench = Bench().opened()
+    bench.port.unplug()
+    with pytest.raises(LinkError, match="Unplugged"):
+        bench.sensor.poll(bench.clock.now_ns())
+    bench.sensor.close()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"baudrate": 12345}, {"baudrate": 115200}, {"sinc": 0}, {"rate_check": 0.0}],
+)
+def test_settings_no_sensor_can_do_are_refused(wrong):
+    with pytest.raises(SettingsError):
+        SensorSettings("/dev/sensor", **wrong)

@@ -1,0 +1,441 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import (
+    DeviceFaultError,
+    LinkError,
+    LinkTimeoutError,
+    PreflightError,
+)
+from fakes.pucks import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.arm import ArmSettings, WamArm
+from wam.frames import decode_torques
+
+HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+TAU = np.array([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])
+ZERO = np.zeros(7)
+CYCLE_NS = 2_000_000
+GET_P = (0x404, b"\x30")
+SAFETY_TO_IDLE = (0x00A, bytes.fromhex("88 00 01 00 00 00"))
+
+
+def started(options=None, counts=HOME_COUNTS, **settings):
+    rig = Rig(options, counts)
+    arm = WamArm(rig.link, rig.clock, ArmSettings(**settings))
+    arm.start()
+    rig.sent.clear()
+    return rig, arm
+
+
+def cycle(rig, arm, tau=None):
+    reading = arm.read(rig.clock.t_ns)
+    if tau is not None:
+        arm.send(tau, ZERO)
+    rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+    return reading
+
+
+def frames(rig):
+    return [(can_id, data) for _, can_id, data in rig.sent]
+
+
+def test_an_arm_that_was_used_before_starts_without_waking():
+    rig = Rig(counts=HOME_COUNTS)
+    arm = WamArm(rig.link, rig.clock)
+    info = arm.start()
+    assert info.nodes == (1, 2, 3, 4, 5, 6, 7, 10)
+    assert info.is_zeroed
+    assert info.safety_mode is SafetyMode.IDLE
+    assert [p.ipnm for p in info.pucks] == [2700] * 4 + [6500] * 2 + [17474]
+    assert not any(p.was_asleep for p in info.pucks)
+    assert (1, bytes.fromhex("85 00 02 00 00 00")) not in frames(rig)
+    assert arm.safety_mode() is SafetyMode.IDLE
+
+
+def test_sleeping_pucks_are_woken_in_turn_and_left_alone_while_they_boot():
+    rig = Rig(NetworkOptions(are_asleep=True))
+    info = WamArm(rig.link, rig.clock).start()
+    wakes = [
+        (t, i)
+        for t, i, data in rig.sent
+        if data == b"\x85\0\2\0\0\0" and i in range(1, 8)
+    ]
+    assert [node for _, node in wakes] == [1, 2, 3, 4, 5, 6, 7]
+    assert {b - a for (a, _), (b, _) in pairwise(wakes)} == {10_000_000}
+    after = min(t for t, _, _ in rig.sent if t > wakes[-1][0])
+    assert after - wakes[-1][0] >= 1_000_000_000
+    assert [p.vers for p in info.pucks] == [200] * 7
+    assert not info.is_zeroed
+
+
+def test_a_missing_puck_is_named_with_those_that_answer():
+    rig = Rig()
+    rig.network.silence(5)
+    with pytest.raises(PreflightError) as caught:
+        WamArm(rig.link, rig.clock).start()
+    assert caught.value.message == "Puck 5 does not answer (1,2,3,4,6,7 do)."
+    assert caught.value.hint == "Check its cable or a puck in reset."
+
+
+def test_two_missing_pucks_are_named_in_the_plural():
+    rig = Rig()
+    rig.network.silence(1)
+    rig.network.silence(5)
+    with pytest.raises(PreflightError, match=r"Pucks 1,5 do not answer \(2,3,4,6,7"):
+        WamArm(rig.link, rig.clock).start()
+
+
+def test_a_stopped_arm_asks_for_its_release():
+    rig = Rig(NetworkOptions(safety_mode=SafetyMode.E_STOP))
+    with pytest.raises(PreflightError, match="E-stop") as caught:
+        WamArm(rig.link, rig.clock).start()
+    assert "Shift-idle" in caught.value.hint
+
+
+def test_a_missing_safety_module_is_an_error_of_its_own():
+    rig = Rig()
+    rig.network.silence(10)
+    with pytest.raises(PreflightError, match="safety module does not answer"):
+        WamArm(rig.link, rig.clock).start()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (NetworkOptions(poles=(12, 12, 12, 12, 8, 8, 8)), "8 poles: gimbals"),
+        (NetworkOptions(vers=(200,) * 6 + (60,)), "disagree on the number of P"),
+        (NetworkOptions(are_asleep=True, boot_ns=2_000_000_000), "not wake up"),
+    ],
+)
+def test_an_arm_of_another_kind_is_refused(options, words):
+    rig = Rig(options)
+    with pytest.raises(PreflightError, match=words):
+        WamArm(rig.link, rig.clock).start()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        NetworkOptions(ipnm=(2700, 0, 2700, 2700, 6500, 6500, 17474)),
+        NetworkOptions(cts=(4096, -1, 4096, 4096, 4096, 4096, 4096)),
+    ],
+)
+def test_a_puck_without_constants_is_refused(options):
+    rig = Rig(options)
+    with pytest.raises(DeviceFaultError, match="Puck 2 reports"):
+        WamArm(rig.link, rig.clock).start()
+
+
+@pytest.mark.parametrize(("is_active", "expected"), [(False, 1), (True, 0)])
+def test_pucks_are_idled_at_start_unless_the_arm_is_active(is_active, expected):
+    # A heartbeat longer than the start-up, which reads no position.
+    rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000))
+    if is_active:
+        rig.network.pendant("activate")
+    WamArm(rig.link, rig.clock).start()
+    idle = (0x404, bytes.fromhex("88 00 00 00 00 00"))
+    assert frames(rig).count(idle) == expected
+
+
+def test_reading_before_start_is_refused():
+    rig = Rig()
+    with pytest.raises(DeviceFaultError, match="not started"):
+        WamArm(rig.link, rig.clock).read(rig.clock.t_ns)
+
+
+def test_a_reading_has_seven_joints_within_its_cycle():
+    rig, arm = started()
+    reading = cycle(rig, arm)
+    assert reading.is_complete
+    assert reading.fresh == 0b1111111
+    assert tuple(reading.counts) == HOME_COUNTS
+    # One count of floor in each of two motors.
+    assert reading.q == pytest.approx(HOME, abs=1.2e-4)
+    assert 0 < reading.arm_ns - reading.host_ns <= 1_500_000
+    assert frames(rig)[0] == GET_P
+
+
+def test_a_joint_at_rest_has_no_velocity():
+    rig, arm = started()
+    reading = cycle(rig, arm)
+    assert not reading.qd.any()
+    assert reading.qd7_raw == 0.0
+
+
+def test_velocity_passes_the_first_order_filter():
+    rig, arm = started()
+    cycle(rig, arm)
+    rig.motors.position[6] += 100
+    reading = cycle(rig, arm)
+    raw = -100 * 2 * np.pi / 4096 / 14.93 / 0.002
+    assert reading.qd7_raw == pytest.approx(raw, rel=1e-9)
+    # 180 rad/s at 2 ms: 0.36 / 1.36 = 0.265 of the step.
+    assert reading.qd[6] == pytest.approx(raw * 0.36 / 1.36, rel=1e-9)
+    assert cycle(rig, arm).qd[6] == pytest.approx(raw * 0.36 / 1.36**2, rel=1e-9)
+
+
+def test_velocity_uses_the_measured_time():
+    rig, arm = started()
+    cycle(rig, arm)
+    rig.rest(2_000_000)
+    rig.motors.position[6] += 100
+    reading = cycle(rig, arm)
+    raw = -100 * 2 * np.pi / 4096 / 14.93 / 0.004
+    assert reading.qd7_raw == pytest.approx(raw, rel=1e-9)
+
+
+def moving(rig, arm, cycles):
+    """Turn motor 7 by 100 counts per cycle; return the last reading."""
+    for _ in range(cycles):
+        rig.motors.position[6] += 100
+        reading = cycle(rig, arm)
+    return reading
+
+
+def test_a_dropped_reply_is_extrapolated_and_marked():
+    rig, arm = started()
+    before = moving(rig, arm, 60)
+    rig.network.silence(7)
+    rig.motors.position[6] += 100
+    reading = cycle(rig, arm)
+    assert reading.fresh == 0b0111111
+    assert not reading.is_complete
+    assert reading.missing_cycles == 1
+    assert reading.counts[6] == before.counts[6]
+    step = -100 * 2 * np.pi / 4096 / 14.93
+    # The filter has settled to 1e-8 after 60 cycles.
+    assert reading.q[6] - before.q[6] == pytest.approx(step, rel=1e-6)
+    assert reading.qd[6] == pytest.approx(before.qd[6], rel=1e-6)
+
+
+def test_missing_cycles_count_until_all_are_back():
+    rig, arm = started()
+    rig.network.silence(3)
+    assert [cycle(rig, arm).missing_cycles for _ in range(3)] == [1, 2, 3]
+    rig.network.silence(3, is_mute=False)
+    assert cycle(rig, arm).missing_cycles == 0
+
+
+def test_a_joint_that_returns_has_its_mean_velocity():
+    rig, arm = started()
+    moving(rig, arm, 60)
+    rig.network.silence(7)
+    moving(rig, arm, 3)
+    rig.network.silence(7, is_mute=False)
+    reading = moving(rig, arm, 1)
+    step = -100 * 2 * np.pi / 4096 / 14.93
+    assert reading.qd[6] == pytest.approx(step / 0.002, rel=1e-6)
+
+
+def test_a_joint_silent_for_long_is_taken_to_stand():
+    rig, arm = started()
+    moving(rig, arm, 60)
+    rig.network.silence(7)
+    readings = [cycle(rig, arm) for _ in range(40)]
+    assert readings[30].q[6] == readings[39].q[6]
+    assert readings[10].q[6] != readings[20].q[6]
+
+
+def test_waiting_for_a_missing_reply_ends_at_the_deadline():
+    rig, arm = started()
+    rig.network.silence(7)
+    begin_ns = rig.clock.t_ns
+    arm.read(begin_ns)
+    assert rig.clock.t_ns - begin_ns == 1_500_000
+
+
+@pytest.mark.parametrize(("jump", "is_fresh"), [(900, True), (1100, False)])
+def test_a_jump_of_more_than_a_thousand_counts_is_rejected(jump, is_fresh):
+    rig, arm = started()
+    cycle(rig, arm)
+    rig.motors.position[2] += jump
+    reading = cycle(rig, arm)
+    assert bool(reading.fresh & 0b100) is is_fresh
+    assert arm.counters.rejected == (0 if is_fresh else 1)
+    moved = HOME_COUNTS[2] + jump if is_fresh else HOME_COUNTS[2]
+    assert reading.counts[2] == moved
+
+
+def test_positions_after_a_pause_are_taken_as_they_are():
+    rig, arm = started()
+    cycle(rig, arm)
+    rig.motors.position[2] += 5000
+    rig.rest(500_000_000)
+    assert cycle(rig, arm).is_complete
+
+
+def test_stale_replies_are_drained_and_counted():
+    rig, arm = started()
+    cycle(rig, arm)
+    rig.link.send(*GET_P)
+    rig.rest(1_000_000)
+    rig.motors.position[0] += 10
+    reading = cycle(rig, arm)
+    assert arm.counters.stale == 7
+    assert reading.counts[0] == HOME_COUNTS[0] + 10
+
+
+def test_a_malformed_reply_is_a_missing_one(monkeypatch):
+    rig, arm = started()
+    receive = rig.link.receive
+
+    def garble():
+        return [
+            frame._replace(data=b"\xff\xff\xff") if frame.can_id == 0x463 else frame
+            for frame in receive()
+        ]
+
+    monkeypatch.setattr(rig.link, "receive", garble)
+    assert cycle(rig, arm).fresh == 0b1111011
+    assert arm.counters.malformed == 1
+
+
+def broken(*_):
+    raise LinkError("gone")
+
+
+def test_a_dead_bus_is_missing_replies_to_the_reader():
+    rig, arm = started()
+    rig.link.send = broken
+    reading = arm.read(rig.clock.t_ns)
+    assert (reading.fresh, reading.arm_ns) == (0, 0)
+    assert arm.counters.link_errors > 0
+
+
+def test_torques_go_to_both_groups_rounded():
+    rig, arm = started()
+    sent = arm.send(TAU, ZERO)
+    by_id = dict(frames(rig))
+    assert decode_torques(by_id[0x401]) == (-64, -878 + 1, 556, -750)
+    assert decode_torques(by_id[0x402]) == (168, 34, -59, 0)
+    units = [-64, -877, 556, -750, 168, 34, -59]
+    assert sent == pytest.approx(arm.transmission.tau(units), abs=1e-12)
+
+
+def test_torques_the_bus_refused_are_not_reported_as_sent():
+    rig, arm = started()
+    first = arm.send(TAU, ZERO)
+    rig.link.send = broken
+    assert arm.send(2 * TAU, ZERO) == pytest.approx(first, abs=1e-12)
+
+
+def test_safety_mode_is_asked_once_in_25_cycles():
+    rig, arm = started()
+    for _ in range(100):
+        cycle(rig, arm, ZERO)
+    assert frames(rig).count((0x00A, b"\x08")) == 4
+    assert arm.safety_mode() is SafetyMode.IDLE
+
+
+def test_activation_is_noticed_within_two_cycles():
+    rig, arm = started()
+    for _ in range(5):
+        cycle(rig, arm, ZERO)
+    rig.network.pendant("activate")
+    for _ in range(3):
+        cycle(rig, arm, ZERO)
+    assert arm.safety_mode() is SafetyMode.ACTIVE
+
+
+def test_an_e_stop_is_noticed_though_no_torque_is_sent():
+    rig, arm = started()
+    cycle(rig, arm, ZERO)
+    rig.network.pendant("estop")
+    for _ in range(30):
+        cycle(rig, arm)
+    assert arm.safety_mode() is SafetyMode.E_STOP
+
+
+def test_a_safety_module_that_falls_silent_becomes_unknown():
+    rig, arm = started()
+    rig.network.silence(10)
+    for _ in range(150):
+        cycle(rig, arm, ZERO)
+    assert arm.safety_mode() is SafetyMode.UNKNOWN
+
+
+def test_idle_is_confirmed_before_zero_torque_is_sent():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    cycle(rig, arm, TAU)
+    rig.sent.clear()
+    assert arm.idle()
+    order = frames(rig)
+    zeros = [i for i, (can_id, _) in enumerate(order) if can_id in (0x401, 0x402)]
+    assert order[:2] == [SAFETY_TO_IDLE, (0x00A, b"\x08")]
+    assert zeros == [2, 3]
+    assert decode_torques(order[2][1]) == (0, 0, 0, 0)
+    assert rig.network.safety_mode is SafetyMode.IDLE
+
+
+def test_without_confirmation_no_zero_torque_is_sent():
+    rig, arm = started()
+    rig.network.silence(10)
+    assert not arm.idle()
+    assert not any(can_id in (0x401, 0x402) for can_id, _ in frames(rig))
+    assert arm.safety_mode() is SafetyMode.UNKNOWN
+
+
+def test_idle_and_close_may_be_called_again():
+    _, arm = started()
+    assert arm.idle()
+    assert arm.idle()
+    arm.close()
+    arm.close()
+    assert arm.idle()
+
+
+def test_idle_on_a_dead_bus_says_no_and_does_not_raise():
+    rig, arm = started()
+    rig.link.send = broken
+    assert not arm.idle()
+    assert not arm.idle()
+
+
+def test_positions_are_defined_while_speed_faults_are_ignored():
+    rig, arm = started(NetworkOptions(is_zeroed=False), counts=(500,) * 7)
+    arm.define_position(HOME)
+    told = [f for f in frames(rig) if len(f[1]) == 6]
+    assert [f"{i:03x} {d.hex(' ')}" for i, d in told] == [
+        "00a b7 00 05 00 00 00",
+        "001 b0 00 00 00 00 00",
+        "002 b0 00 1f 70 ff ff",
+        "003 b0 00 e0 8f 00 00",
+        "004 b0 00 88 70 ff ff",
+        "005 b0 00 00 00 00 00",
+        "006 b0 00 00 00 00 00",
+        "007 b0 00 00 00 00 00",
+        "00a aa 00 01 00 00 00",
+    ]
+    reading = cycle(rig, arm)
+    assert reading.is_complete
+    assert reading.q == pytest.approx(HOME, abs=1.2e-4)  # one count of floor
+
+
+def test_positions_are_not_defined_while_active():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    with pytest.raises(PreflightError, match="ACTIVE"):
+        arm.define_position(HOME)
+    assert not any(data[0] == 0xB0 for _, data in frames(rig))
+
+
+def test_a_puck_that_keeps_its_positions_to_itself_fails_the_start():
+    rig = Rig()
+    arm = WamArm(rig.link, rig.clock)
+    send = rig.link.send
+    rig.link.send = lambda i, d: None if (i, d) == GET_P else send(i, d)
+    with pytest.raises(LinkTimeoutError, match="Pucks 1,2,3,4,5,6,7 do not report"):
+        arm.start()
+
+
+def test_a_dead_bus_fails_the_start_as_a_link_error():
+    rig = Rig()
+    rig.link.send = broken
+    with pytest.raises(LinkError):
+        WamArm(rig.link, rig.clock).start()

@@ -1,0 +1,204 @@
+import errno
+
+import can
+import pytest
+
+from acquisition.clock import Readable
+from acquisition.errors import LinkError, LinkTimeoutError
+from tests.fakes.stepped import Rig
+from wam import can_link
+from wam.can_link import CanLink, Dialogue, open_bus
+from wam.frames import Group
+
+
+class ScriptedBus(can.BusABC):
+    """Gives out what it was given; raises where told to."""
+
+    def __init__(self, messages=(), error=None):
+        self.messages = list(messages)
+        self.error = error
+        self.channel_info = "can0"
+        self.shutdowns = 0
+        super().__init__(channel="can0")
+
+    def send(self, msg, timeout=None):
+        if self.error:
+            raise self.error
+
+    def _recv_internal(self, timeout):
+        if self.error:
+            raise self.error
+        return (self.messages.pop(0) if self.messages else None), True
+
+    def fileno(self):
+        return 7
+
+    def shutdown(self):
+        self.shutdowns += 1
+        super().shutdown()
+
+
+def message(can_id, data=b"\x85\x00\x02\x00", **flags):
+    flags.setdefault("is_extended_id", False)
+    return can.Message(arbitration_id=can_id, data=data, **flags)
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    def make(bus):
+        def factory(**_):
+            if isinstance(bus, Exception):
+                raise bus
+            return bus
+
+        monkeypatch.setattr(can_link.can, "Bus", factory)
+        return lambda: open_bus("socketcan", "can0", 1_000_000)
+
+    return make
+
+
+def test_an_interface_that_is_down_says_how_to_raise_it(opened):
+    down = can.CanOperationError("Network is down", errno.ENETDOWN)
+    bus = ScriptedBus(error=down)
+    with pytest.raises(LinkError) as caught:
+        opened(bus)()
+    assert caught.value.message == "can0 is down."
+    assert "ip link set can0 up type can bitrate 1000000" in caught.value.hint
+    assert bus.shutdowns == 1
+
+
+def test_an_interface_that_is_missing_is_named(opened):
+    with pytest.raises(LinkError, match="can0 does not exist"):
+        opened(OSError(errno.ENODEV, "No such device"))()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        can.CanInitializationError("no adapter"),
+        can.CanInterfaceNotImplementedError("unknown"),
+        ValueError("bad channel"),
+    ],
+)
+def test_every_way_not_to_open_is_a_link_error(opened, error):
+    with pytest.raises(LinkError, match="cannot be opened"):
+        opened(error)()
+
+
+def test_a_bus_that_opens_is_handed_over(opened):
+    bus = ScriptedBus()
+    assert opened(bus)() is bus
+    bus.shutdown()
+
+
+def test_only_data_frames_of_devices_come_through():
+    bus = ScriptedBus(
+        [
+            message(0x001),
+            message(0x404, b"\x30"),
+            message(0x426),
+            message(0x546, is_remote_frame=True, data=None),
+            message(0x546, is_extended_id=True),
+            message(0x020, is_error_frame=True),
+            message(0x546),
+        ]
+    )
+    link = CanLink(bus)
+    assert [frame.can_id for frame in link.receive()] == [0x426, 0x546]
+    assert link.error_frames == 1
+    link.close()
+
+
+def test_the_broadcast_of_the_safety_module_is_a_hint_only():
+    link = CanLink(ScriptedBus([message(0x540)]))
+    assert link.receive() == []
+    assert link.mode_hints == 1
+    link.close()
+
+
+def test_looking_keeps_what_arrived_for_the_reader():
+    link = CanLink(ScriptedBus([message(0x426)]))
+    assert link.is_readable()
+    assert len(link.receive()) == 1
+    assert not link.is_readable()
+    link.close()
+
+
+def test_a_flood_does_not_hold_the_reader():
+    link = CanLink(ScriptedBus([message(0x426)] * 2000))
+    assert 0 < len(link.receive()) < 1000
+    link.close()
+
+
+def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
+    bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
+    link = CanLink(bus)
+    assert not link.is_readable()
+    with pytest.raises(LinkError, match="broke"):
+        link.receive()
+    with pytest.raises(LinkError, match="broke"):
+        link.send(1, b"\x05")
+    link.close()
+
+
+def test_a_full_buffer_says_what_it_means():
+    link = CanLink(ScriptedBus(error=can.CanOperationError("Transmit buffer full")))
+    with pytest.raises(LinkError, match="send buffer is full"):
+        link.send(1, b"\x05")
+    link.close()
+
+
+def test_closing_twice_shuts_the_bus_down_once():
+    bus = ScriptedBus()
+    link = CanLink(bus)
+    link.close()
+    link.close()
+    assert bus.shutdowns == 1
+    assert link.fileno() == -1
+    assert link.receive() == []
+    with pytest.raises(LinkError, match="closed"):
+        link.send(1, b"\x05")
+
+
+def test_a_link_has_the_descriptor_of_its_bus():
+    link = CanLink(ScriptedBus())
+    assert link.fileno() == 7
+    assert isinstance(link, Readable)
+    assert Rig().link.fileno() == -1
+    link.close()
+
+
+def test_a_question_is_answered_with_its_value():
+    rig = Rig()
+    assert Dialogue(rig.link, rig.clock).ask(7, 90) == 6
+    assert rig.sent[-1][1:] == (0x007, b"\x5a")
+
+
+def test_an_answer_to_another_question_is_not_taken():
+    rig = Rig()
+    dialogue = Dialogue(rig.link, rig.clock)
+    rig.link.send(1, b"\x56")  # IPNM of puck 1
+    rig.link.send(2, b"\x44")  # CTS of puck 2
+    assert dialogue.ask(1, 68) == 4096
+    rig.rest(1_000_000)
+    dialogue.drain()
+    assert dialogue.late_replies == 2
+
+
+def test_silence_is_no_value_after_the_time_given():
+    rig = Rig()
+    begin_ns = rig.clock.t_ns
+    assert Dialogue(rig.link, rig.clock).ask(20, 5, 1_000_000) is None
+    assert rig.clock.t_ns - begin_ns == 1_000_000
+
+
+def test_silence_where_an_answer_is_needed_names_node_and_property():
+    rig = Rig()
+    with pytest.raises(LinkTimeoutError, match=r"Node 9 .* GET CTS \(68\)"):
+        Dialogue(rig.link, rig.clock).require(9, 68, "CTS")
+
+
+def test_telling_a_group_uses_its_identifier():
+    rig = Rig()
+    Dialogue(rig.link, rig.clock).tell_group(Group.ARM, 8, 0)
+    assert rig.sent[-1][1:] == (0x404, bytes.fromhex("88 00 00 00 00 00"))

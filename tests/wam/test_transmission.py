@@ -1,0 +1,152 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import DeviceFaultError, SettingsError
+from wam.transmission import Transmission, coupled_ratios, keep_gravity
+
+VECTORS = json.loads(
+    (Path(__file__).parents[1] / "data" / "wam7_vectors.json").read_text()
+)["vectors"]
+CTS = (4096,) * 7
+IPNM = (2700, 2700, 2700, 2700, 6500, 6500, 17474)
+LIMITS = (4257, 4257, 4257, 4257, 3900, 3900, 1600)
+TAU = np.array([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])
+ZERO = np.zeros(7)
+
+J2MP = np.array(
+    [
+        [-42.0, 0, 0, 0, 0, 0, 0],
+        [0, 28.25, -16.8155, 0, 0, 0, 0],
+        [0, -28.25, -16.8155, 0, 0, 0, 0],
+        [0, 0, 0, -18.0, 0, 0, 0],
+        [0, 0, 0, 0, 9.7, -9.7, 0],
+        [0, 0, 0, 0, 9.7, 9.7, 0],
+        [0, 0, 0, 0, 0, 0, -14.93],
+    ]
+)
+
+
+@pytest.fixture(scope="module")
+def wam():
+    return Transmission(J2MP, CTS, IPNM)
+
+
+def by_name(vector):
+    return vector["name"]
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=by_name)
+def test_counts_agree_with_the_vectors(wam, vector):
+    counts = wam.counts(np.array(vector["q"]))
+    for found, expected in zip(counts, vector["motor_counts_floor"], strict=True):
+        assert expected is None or found == expected
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=by_name)
+def test_joints_come_back_from_exact_counts(wam, vector):
+    q = wam.joints(vector["motor_counts"])
+    # Far below the 27 microrad of one count.
+    assert q == pytest.approx(vector["q"], abs=1e-9)
+
+
+@pytest.mark.parametrize("vector", VECTORS, ids=by_name)
+def test_gravity_in_puck_units_agrees_with_the_vectors(wam, vector):
+    units = wam.exact_units(np.array(vector["gravity"]))
+    assert units == pytest.approx(vector["gravity_puck_units"], abs=1e-9)
+
+
+def test_one_count_of_floor_stays_below_a_count_in_the_joints(wam):
+    pose_a = next(v for v in VECTORS if v["name"] == "generic_a")
+    q = wam.joints(wam.counts(np.array(pose_a["q"])))
+    assert abs(q - np.array(pose_a["q"])).max() < 1.2e-4
+
+
+def test_golden_torque_floors_to_the_known_units(wam):
+    units = np.floor(wam.exact_units(TAU)).astype(int).tolist()
+    assert units == [-65, -878, 556, -750, 167, 33, -59]
+    back = wam.tau(units)
+    assert back == pytest.approx(
+        (1.011, -15.004, 2.005, 5.000, 0.298, -0.200, 0.0504), abs=6e-4
+    )  # printed digits
+
+
+def test_torques_are_rounded_to_the_nearest_unit(wam):
+    command = wam.command(TAU, ZERO)
+    error = np.array(command.units) - wam.exact_units(TAU)
+    assert abs(error).max() <= 0.5
+    assert command.units[0] == -64  # -64.28, which the wire would floor to -65
+    assert not command.is_clipped
+
+
+def test_command_returns_the_torque_of_whole_units(wam):
+    command = wam.command(TAU, ZERO)
+    assert command.tau == pytest.approx(wam.tau(command.units), abs=1e-15)
+    assert not np.array_equal(command.tau, TAU)
+
+
+def test_clipping_keeps_gravity_and_scales_the_rest(wam):
+    gravity = np.array([0.0, -14.0, 3.0, 5.0, 0.2, -0.1, 0.0])
+    wanted = gravity + np.array([0.0, 200.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    command = wam.command(wanted, gravity)
+    assert command.is_clipped
+    assert max(abs(u) for u in command.units) in LIMITS
+    # Half a unit of every motor, seen at the joints.
+    unit = np.abs(wam.j2mp.T / np.array(IPNM)).sum(axis=1)
+    beyond = np.abs(command.tau - gravity) > unit / 2
+    assert beyond.tolist() == [False, True, False, False, False, False, False]
+
+
+def test_puck_7_is_cut_at_its_own_limit(wam):
+    command = wam.command(np.array([0, 0, 0, 0, 0, 0, -5.0]), ZERO)
+    assert command.units == [0, 0, 0, 0, 0, 0, 1600]
+
+
+def test_gravity_beyond_a_limit_leaves_nothing_for_the_rest():
+    assert keep_gravity([12.0, 3.0], [11.0, 1.0], [10.0, 10.0]) == [10.0, 1.0]
+
+
+def test_what_fits_is_not_touched():
+    assert keep_gravity([5.0, -3.0], [4.0, 1.0], [10.0, 10.0]) == [5.0, -3.0]
+
+
+@given(
+    st.lists(st.floats(-300, 300), min_size=7, max_size=7),
+    st.lists(st.floats(-20, 20), min_size=7, max_size=7),
+)
+def test_no_command_exceeds_a_limit(tau, gravity):
+    wam = Transmission(J2MP, CTS, IPNM)
+    units = wam.command(np.array(tau), np.array(gravity)).units
+    assert all(abs(u) <= limit for u, limit in zip(units, LIMITS, strict=True))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_torque_that_is_no_number_is_refused(wam, bad):
+    with pytest.raises(DeviceFaultError, match="not numbers"):
+        wam.command(np.full(7, bad), ZERO)
+
+
+def test_power_is_the_same_on_both_sides(wam):
+    qd = np.array([0.3, -0.2, 0.5, 0.1, -0.4, 0.2, 0.7])
+    motor_rates = wam.j2mp @ qd
+    motor_torques = wam.exact_units(TAU) / np.array(IPNM)
+    assert motor_rates @ motor_torques == pytest.approx(qd @ TAU, rel=1e-12)
+
+
+def test_ratios_make_the_known_matrix():
+    ratios = (42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93)
+    # The table prints 16.8155 for 28.25 / 1.68.
+    assert coupled_ratios(ratios) == pytest.approx(J2MP, abs=5e-5)
+
+
+@pytest.mark.parametrize(
+    ("j2mp", "cts"),
+    [(np.eye(6), CTS), (np.zeros((7, 7)), CTS), (J2MP, CTS[:6]), (J2MP, (0,) * 7)],
+)
+def test_constants_that_make_no_transmission_are_refused(j2mp, cts):
+    with pytest.raises(SettingsError):
+        Transmission(j2mp, cts, IPNM)

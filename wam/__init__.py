@@ -1,0 +1,1 @@
+"""Barrett WAM on CAN: codec, driver, model, control law."""

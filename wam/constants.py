@@ -1,0 +1,174 @@
+"""The arm's constants, read from TOML and checked."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from acquisition.errors import SettingsError
+
+GRAVITY = 9.81  # m/s^2
+Array = NDArray[np.float64]
+
+_Vector3 = tuple[float, float, float]
+_Vector7 = tuple[float, float, float, float, float, float, float]
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Kinematics(_Model):
+    alpha_over_pi: _Vector7
+    a: _Vector7
+    d: _Vector7
+
+
+class _Limits(_Model):
+    lower: _Vector7
+    upper: _Vector7
+
+
+class _Home(_Model):
+    position: _Vector7
+
+
+class _Transmission(_Model):
+    j2mp: tuple[_Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7]
+
+
+class _Pucks(_Model):
+    cts: tuple[int, int, int, int, int, int, int]
+    ipnm: tuple[int, int, int, int, int, int, int]
+    poles: tuple[int, int, int, int, int, int, int]
+    mt: tuple[int, int, int, int, int, int, int]
+
+
+class _Motors(_Model):
+    drive_inertia: _Vector7
+
+
+class _Link(_Model):
+    mass: float = Field(gt=0)
+    com: _Vector3
+    inertia: tuple[_Vector3, _Vector3, _Vector3]
+
+
+class _Friction(_Model):
+    coulomb: _Vector7
+    viscous: _Vector7
+
+
+class _Control(_Model):
+    kp: _Vector7
+    kd: _Vector7
+
+
+class _File(_Model):
+    kinematics: _Kinematics
+    joint_limits: _Limits
+    home: _Home
+    transmission: _Transmission
+    pucks: _Pucks
+    motors: _Motors
+    links: tuple[_Link, ...] = Field(min_length=7, max_length=7)
+    friction: _Friction
+    control: _Control
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A rigid body: mass [kg], centre [m] shape (3,), inertia about it (3, 3)."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ArmConstants:
+    """What is fixed about the arm; SI, seven joints or motors per array.
+
+    Attributes:
+        alpha: Denavit-Hartenberg twists [rad].
+        a: Denavit-Hartenberg offsets along x [m].
+        d: Denavit-Hartenberg offsets along z [m].
+        q_lower: lower joint stops [rad].
+        q_upper: upper joint stops [rad].
+        home: joint positions of the home pose [rad].
+        j2mp: motor angle = j2mp @ joint angle, shape (7, 7).
+        cts: encoder counts per motor turn (factory).
+        ipnm: torque units per N m at the motor (factory).
+        poles: motor poles; puck 7 tells wrist from gimbals.
+        mt: torque clamp of each puck [puck units].
+        drive_inertia: at the rotors [kg m^2].
+        links: the seven links in their own distal frames.
+        coulomb: Coulomb friction of another arm [N m].
+        viscous: viscous friction of another arm [N m s/rad].
+        kp: joint position gains [N m/rad].
+        kd: joint damping gains [N m s/rad].
+        text: the TOML they came from, for the recording.
+    """
+
+    alpha: Array
+    a: Array
+    d: Array
+    q_lower: Array
+    q_upper: Array
+    home: Array
+    j2mp: Array
+    cts: tuple[int, ...]
+    ipnm: tuple[int, ...]
+    poles: tuple[int, ...]
+    mt: tuple[int, ...]
+    drive_inertia: Array
+    links: tuple[Body, ...]
+    coulomb: Array
+    viscous: Array
+    kp: Array
+    kd: Array
+    text: str
+
+
+def load_constants(text: str | None = None) -> ArmConstants:
+    """Return the constants in `text` (TOML), by default those shipped.
+
+    Raises:
+        SettingsError: `text` is no TOML or not of this form.
+    """
+    if text is None:
+        text = (resources.files("wam.data") / "wam7.toml").read_text()
+    try:
+        file = _File.model_validate(tomllib.loads(text))
+    except (tomllib.TOMLDecodeError, ValidationError) as error:
+        raise SettingsError(
+            f"The arm model cannot be read: {error}.",
+            hint="Use the model shipped with Traction as a pattern.",
+        ) from error
+    links = tuple(
+        Body(link.mass, np.array(link.com), np.array(link.inertia))
+        for link in file.links
+    )
+    return ArmConstants(
+        alpha=np.pi * np.array(file.kinematics.alpha_over_pi),
+        a=np.array(file.kinematics.a),
+        d=np.array(file.kinematics.d),
+        q_lower=np.array(file.joint_limits.lower),
+        q_upper=np.array(file.joint_limits.upper),
+        home=np.array(file.home.position),
+        j2mp=np.array(file.transmission.j2mp),
+        cts=file.pucks.cts,
+        ipnm=file.pucks.ipnm,
+        poles=file.pucks.poles,
+        mt=file.pucks.mt,
+        drive_inertia=np.array(file.motors.drive_inertia),
+        links=links,
+        coulomb=np.array(file.friction.coulomb),
+        viscous=np.array(file.friction.viscous),
+        kp=np.array(file.control.kp),
+        kd=np.array(file.control.kd),
+        text=text,
+    )

@@ -1,0 +1,49 @@
+"""Gravity compensation and the weight of a virtual mass at the foot."""
+
+from wam.constants import Array
+from wam.model import ArmModel
+
+RAMP = 2.0  # the virtual mass comes and goes within this time [s]
+MAX_VIRTUAL_MASS = 2.0  # kg
+
+
+class VirtualMass:
+    """A mass that is ramped to its target within two seconds.
+
+    Its weight, not its inertia, is added at the foot's centre of mass: `augmented
+    gravity compensation`.
+    """
+
+    def __init__(self) -> None:
+        self._from = 0.0
+        self._to = 0.0
+        self._since_ns = 0
+
+    def aim(self, mass: float, now_ns: int) -> None:
+        """Ramp to `mass` [kg] from where it is now.
+
+        Raises:
+            ValueError: `mass` is outside 0..2 kg.
+        """
+        if not 0.0 <= mass <= MAX_VIRTUAL_MASS:
+            raise ValueError(f"virtual mass {mass} kg is outside 0..{MAX_VIRTUAL_MASS}")
+        self._from = self.at(now_ns)
+        self._to = mass
+        self._since_ns = now_ns
+
+    def at(self, now_ns: int) -> float:
+        """Return the mass [kg] in force at `now_ns`."""
+        share = (now_ns - self._since_ns) * 1e-9 / RAMP
+        return self._from + (self._to - self._from) * min(max(share, 0.0), 1.0)
+
+
+def compensation(model: ArmModel, q: Array, virtual_mass: float) -> Array:
+    """Return g(q) of arm, sensor and foot plus J_c^T (0, 0, -m_v g) [N m], (7,).
+
+    The first term floats everything; the second presses the foot down with the weight
+    of `virtual_mass` [kg], so in equilibrium the ground carries just that.
+    """
+    tau = model.gravity(q)
+    if virtual_mass:
+        tau += model.weight_torque(q, virtual_mass)
+    return tau

@@ -1,0 +1,179 @@
+"""Between motor and joint, encoder counts and radians, joint torque and puck units.
+
+The cables couple motors 2 and 3, and 5 and 6: `motor = j2mp @ joint`. Power is kept, so
+`tau_motor = inverse(j2mp).T @ tau_joint`. Counts per turn and puck units per N m are
+properties of each puck and must be read from it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import floor, inf, isfinite, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.devices import Vector
+from acquisition.errors import DeviceFaultError, SettingsError
+
+MOTORS = 7
+# The smaller of the cable's limit (MT) and nine tenths of the safety module's warning.
+HOST_TORQUE_LIMITS = (4257, 4257, 4257, 4257, 3900, 3900, 1600)
+
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueCommand:
+    """What the pucks are told.
+
+    Attributes:
+        units: torque of each motor [puck units], whole numbers.
+        tau: joint torques those units make [N m], shape (7,).
+        is_clipped: a motor's limit cut the command.
+    """
+
+    units: list[int]
+    tau: Vector
+    is_clipped: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transmission:
+    """Cable ratios with the constants of one arm's pucks.
+
+    Attributes:
+        j2mp: motor angles from joint angles, shape (7, 7).
+        cts: encoder counts per motor turn (CTS), seven of them.
+        ipnm: puck torque units per N m at the motor (IPNM), seven of them.
+        torque_limits: largest torque the host sends to each motor [puck units].
+
+    Raises:
+        SettingsError: the matrix is not an invertible (7, 7), or a constant is missing
+            or not positive.
+    """
+
+    j2mp: Matrix
+    cts: tuple[int, ...]
+    ipnm: tuple[int, ...]
+    torque_limits: tuple[int, ...] = HOST_TORQUE_LIMITS
+    _joints_of_counts: Matrix = field(init=False, repr=False)
+    _counts_of_joints: Matrix = field(init=False, repr=False)
+    _units_of_tau: Matrix = field(init=False, repr=False)
+    _tau_of_units: Matrix = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        j2mp = np.array(self.j2mp, dtype=np.float64)
+        _check(j2mp, (self.cts, self.ipnm, self.torque_limits))
+        m2jp = np.linalg.inv(j2mp)
+        per_rad = np.array(self.cts) / (2 * pi)
+        ipnm = np.array(self.ipnm, dtype=np.float64)
+        object.__setattr__(self, "j2mp", j2mp)
+        object.__setattr__(self, "_joints_of_counts", m2jp / per_rad)
+        object.__setattr__(self, "_counts_of_joints", per_rad[:, None] * j2mp)
+        object.__setattr__(self, "_units_of_tau", ipnm[:, None] * m2jp.T)
+        object.__setattr__(self, "_tau_of_units", j2mp.T / ipnm)
+
+    def joints(self, counts: Sequence[float]) -> Vector:
+        """Return joint positions [rad], shape (7,), of motor positions [counts].
+
+        The same line turns count rates [1/s] into joint velocities [rad/s].
+        """
+        return self._joints_of_counts @ np.array(counts, dtype=np.float64)
+
+    def exact_counts(self, q: Vector) -> Vector:
+        """Return motor positions [counts, not whole], shape (7,), of joints [rad]."""
+        return self._counts_of_joints @ q
+
+    def counts(self, q: Vector) -> list[int]:
+        """Return motor positions [counts] of joint positions [rad], floored."""
+        return [floor(c) for c in self.exact_counts(q).tolist()]
+
+    def exact_units(self, tau: Vector) -> Vector:
+        """Return motor torques [puck units, not whole] of joint torques [N m]."""
+        return self._units_of_tau @ tau
+
+    def tau(self, units: Sequence[float]) -> Vector:
+        """Return joint torques [N m], shape (7,), of motor torques [puck units]."""
+        return self._tau_of_units @ np.array(units, dtype=np.float64)
+
+    def command(self, tau: Vector, tau_gravity: Vector) -> TorqueCommand:
+        """Return the torques to send for `tau`, within the limits of every motor.
+
+        Where a limit would cut, gravity stays whole and everything else is scaled by
+        one factor, so that the arm neither drops nor pulls aside. Rounding comes
+        before the wire's floor, which alone would pull the arm down.
+
+        Args:
+            tau: joint torques wanted, gravity included [N m], shape (7,).
+            tau_gravity: their gravity part [N m], shape (7,).
+
+        Raises:
+            DeviceFaultError: a torque is not a number.
+        """
+        if not isfinite(sum(tau.tolist()) + sum(tau_gravity.tolist())):
+            raise DeviceFaultError(
+                f"Joint torques are not numbers: {tau.tolist()}.",
+                hint="This is an error of the program; nothing was sent.",
+            )
+        wanted: list[float] = self.exact_units(tau).tolist()
+        is_clipped = any(
+            abs(unit) > limit
+            for unit, limit in zip(wanted, self.torque_limits, strict=True)
+        )
+        if is_clipped:
+            gravity: list[float] = self.exact_units(tau_gravity).tolist()
+            wanted = keep_gravity(wanted, gravity, self.torque_limits)
+        units = [round(unit) for unit in wanted]
+        return TorqueCommand(units, self.tau(units), is_clipped)
+
+
+def keep_gravity(
+    wanted: Sequence[float], gravity: Sequence[float], limits: Sequence[float]
+) -> list[float]:
+    """Return `wanted` cut to ±`limits`, with `gravity` kept and the rest scaled.
+
+    If gravity alone exceeds a limit, that motor gets its limit and nothing else is
+    added anywhere. All arguments are in the same unit, one value per motor.
+    """
+    held = [
+        min(max(g, -limit), limit) for g, limit in zip(gravity, limits, strict=True)
+    ]
+    rest = [unit - g for unit, g in zip(wanted, gravity, strict=True)]
+    share = min(
+        (
+            _room(h, r, limit) / abs(r) if r else inf
+            for h, r, limit in zip(held, rest, limits, strict=True)
+        ),
+    )
+    share = min(share, 1.0)
+    return [h + share * r for h, r in zip(held, rest, strict=True)]
+
+
+def coupled_ratios(
+    ratios: Sequence[float], n3: float = 1.68, n6: float = 1.0
+) -> Matrix:
+    """Return j2mp, shape (7, 7), of the seven drive ratios.
+
+    Joints 2 and 3 share motors 2 and 3, joints 5 and 6 share 5 and 6; `n3` and `n6`
+    are the ratios of those differentials (libbarrett, `wam7w.conf`).
+    """
+    n1, n2, _, n4, n5, _, n7 = ratios
+    j2mp = np.diag([-n1, n2, -n2 / n3, -n4, n5, n5 / n6, -n7])
+    j2mp[1, 2], j2mp[2, 1] = -n2 / n3, -n2
+    j2mp[4, 5], j2mp[5, 4] = -n5 / n6, n5
+    return j2mp
+
+
+def _room(held: float, rest: float, limit: float) -> float:
+    """Return how far a motor may still go in the direction of `rest`."""
+    return max(limit - held if rest > 0 else limit + held, 0.0)
+
+
+def _check(j2mp: Matrix, constants: tuple[tuple[int, ...], ...]) -> None:
+    if j2mp.shape != (MOTORS, MOTORS) or not np.isfinite(j2mp).all():
+        raise SettingsError(f"The transmission matrix is {j2mp.shape}, not (7, 7).")
+    if abs(np.linalg.det(j2mp)) < 1.0:
+        raise SettingsError("The transmission matrix cannot be inverted.")
+    for values in constants:
+        if len(values) != MOTORS or min(values) <= 0:
+            raise SettingsError(f"Seven positive numbers are needed, not {values}.")
