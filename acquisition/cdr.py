@@ -24,8 +24,11 @@ class CdrWriter:
         return self
 
     def string(self, text: str) -> "CdrWriter":
-        """Append a string: length with its NUL, bytes, NUL."""
-        encoded = text.encode() + b"\0"
+        """Append a string: length with its NUL, bytes, NUL.
+
+        What UTF-8 cannot say becomes "?": a strange note must not end a recording.
+        """
+        encoded = text.encode(errors="replace") + b"\0"
         self.scalar("I", len(encoded))
         self._data += encoded
         return self

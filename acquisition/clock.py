@@ -1,6 +1,7 @@
 """Time: the one place that reads it and the one place that waits."""
 
 import ctypes
+import errno
 import select
 import time
 from typing import Protocol, runtime_checkable
@@ -43,7 +44,7 @@ class Clock(Protocol):
 
 
 class _Timespec(ctypes.Structure):
-    _fields_ = [("sec", ctypes.c_long), ("nsec", ctypes.c_long)]  # noqa: RUF012
+    _fields_ = [("sec", ctypes.c_long), ("nsec", ctypes.c_long)]
 
 
 _CLOCK_MONOTONIC = 1
@@ -57,6 +58,8 @@ class SystemClock:
         libc = ctypes.CDLL(None, use_errno=True)
         self._nanosleep = libc.clock_nanosleep
         self._deadline = _Timespec()
+        deadline = ctypes.byref(self._deadline)
+        self._until = (_CLOCK_MONOTONIC, _TIMER_ABSTIME, deadline, None)
 
     def now_ns(self) -> int:
         """Return CLOCK_MONOTONIC [ns]."""
@@ -67,11 +70,13 @@ class SystemClock:
         return time.time_ns()
 
     def sleep_until(self, t_ns: int) -> None:
-        """Sleep with clock_nanosleep to the absolute time `t_ns`."""
+        """Sleep with clock_nanosleep to the absolute time `t_ns`.
+
+        A signal does not shorten it; its Python handler runs in between.
+        """
         self._deadline.sec, self._deadline.nsec = divmod(t_ns, NS_PER_S)
-        self._nanosleep(
-            _CLOCK_MONOTONIC, _TIMER_ABSTIME, ctypes.byref(self._deadline), None
-        )
+        while self._nanosleep(*self._until) == errno.EINTR:
+            pass
 
     def wait(self, link: Readable, deadline_ns: int) -> bool:
         """Wait for `link`, with select where it has a descriptor."""

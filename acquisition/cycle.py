@@ -20,6 +20,7 @@ from acquisition.loop import Tick
 from acquisition.sample import MOTOR_FRESH_SHIFT, Flag, Sample
 
 _ZERO = np.zeros(7)
+CLIPPED = 0.05  # sent differs from wanted by more than rounding [N m]
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 
 
@@ -61,7 +62,14 @@ class FootObserver(Protocol):
 
 @dataclass(slots=True)
 class ControlStatus:
-    """What the console sees of the loop."""
+    """What the console sees of the loop.
+
+    Attributes:
+        state: what the arm is doing.
+        safety: what the safety circuit says.
+        verdict: the worst the guard has said since the last request; None = nothing.
+        ft_age_ns: age of the force sample [ns].
+    """
 
     state: ArmState = ArmState.IDLE
     safety: SafetyMode = SafetyMode.UNKNOWN
@@ -99,11 +107,16 @@ class Cycle:
         self._wrench: WrenchSample | None = None
         self._wrench_ns = 0
         self._requested: ArmState | None = None
+        self._was_active = False
         self.is_recording = False
         self.status = ControlStatus()
 
     def request(self, state: ArmState) -> None:
-        """Ask for a state; it is entered at the next complete reading."""
+        """Ask for a state; it is entered at the next complete reading, IDLE at once.
+
+        A state asked for while the arm is still idle sends its torques at once: they
+        are there when the pendant activates the arm, or it would fall for a moment.
+        """
         self._requested = state
         self.status.verdict = None
 
@@ -124,7 +137,7 @@ class Cycle:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0:
+        if reading.missing_cycles == 0 and status.state is not ArmState.UNKNOWN:
             sent = self._arm.send(tau, tau_gravity)
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._sink(sample.payload())
@@ -134,10 +147,11 @@ class Cycle:
         samples = self._sensor.poll(now_ns)
         if samples:
             self._on_wrench(samples)
-            newest = samples[-1]
-            if newest.is_valid:
-                self._wrench = newest
-                self._wrench_ns = newest.t_ns
+            for newest in reversed(samples):
+                if newest.is_valid:
+                    self._wrench = newest
+                    self._wrench_ns = newest.t_ns
+                    break
         if self._wrench_ns == 0:
             self._wrench_ns = now_ns
         age = now_ns - self._wrench_ns
@@ -146,17 +160,24 @@ class Cycle:
 
     def _enter_requested(self, reading: ArmReading) -> None:
         state = self._requested
-        if state is None or reading.missing_cycles:
+        if state is None or (reading.missing_cycles and state is not ArmState.IDLE):
             return
         self._requested = None
         if state is ArmState.IDLE:
-            self._arm.idle()
-        elif self.status.safety is not SafetyMode.ACTIVE:
-            return
-        self._enter(state, reading)
+            self._idle(reading)
+        else:
+            self._enter(state, reading)
+
+    def _idle(self, reading: ArmReading) -> None:
+        """Brake the arm. Unless that is confirmed no zero torque follows: free fall."""
+        is_confirmed = self._arm.idle()
+        if is_confirmed:
+            self._sample.torque_command[:] = 0.0
+        self._enter(ArmState.IDLE if is_confirmed else ArmState.UNKNOWN, reading)
 
     def _enter(self, state: ArmState, reading: ArmReading) -> None:
         self.status.state = state
+        self._was_active = self.status.safety is SafetyMode.ACTIVE
         self._law.enter(state, reading)
 
     def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -168,6 +189,8 @@ class Cycle:
         self, tick: Tick, reading: ArmReading, speed: float, tau: Vector
     ) -> Verdict:
         status = self.status
+        self._was_active |= status.safety is SafetyMode.ACTIVE
+        is_commanded = status.state not in {ArmState.IDLE, ArmState.UNKNOWN}
         seen = Observation(
             reading=reading,
             safety=status.safety,
@@ -176,7 +199,7 @@ class Cycle:
             ft_age_ns=status.ft_age_ns,
             tau=tau,
             is_recording=self.is_recording,
-            is_powered=status.state not in {ArmState.IDLE, ArmState.UNKNOWN},
+            is_powered=is_commanded and self._was_active,
             is_late=tick.is_late,
         )
         self._guard, verdict = check(self._limits, self._guard, seen)
@@ -186,17 +209,17 @@ class Cycle:
         """Enter the state the guard asks for; a fault is never made milder."""
         state = self.status.state
         if verdict.action is Action.IDLE:
-            confirmed = self._arm.idle()
-            self._enter(ArmState.IDLE if confirmed else ArmState.UNKNOWN, reading)
-        elif verdict.action is Action.DAMP:
+            self._idle(reading)
+        elif verdict.action is Action.DAMP and state is not ArmState.DAMP:
             self._enter(ArmState.DAMP, reading)
-        elif state is ArmState.FLOAT:
+        elif verdict.action is Action.HOLD and state is ArmState.FLOAT:
             self._enter(ArmState.HOLD, reading)
-        if self.status.verdict is None or verdict.action is Action.IDLE:
+        told = self.status.verdict
+        if told is None or verdict.severity > told.severity:
             self.status.verdict = verdict
         self.is_recording = False
 
-    def _fill(  # noqa: PLR0913, PLR0917
+    def _fill(
         self,
         tick: Tick,
         reading: ArmReading,
@@ -221,7 +244,7 @@ class Cycle:
             flags |= Flag.DEADLINE_MISSED
         if self.status.state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
             flags |= Flag.JOINT7_LOCKED
-        if abs(float((sent - tau).sum())) > 0.05:
+        if reading.is_complete and np.abs(sent - tau).max() > CLIPPED:
             flags |= Flag.TORQUE_CLIPPED
         if sample.traction[2] > CONTACT_FORCE:
             flags |= Flag.CONTACT

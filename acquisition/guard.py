@@ -20,6 +20,9 @@ class Action(Enum):
     IDLE = "idle"
 
 
+_SEVERITY = {Action.NONE: 0, Action.HOLD: 1, Action.DAMP: 2, Action.IDLE: 3}
+
+
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """The guard's decision.
@@ -33,6 +36,11 @@ class Verdict:
     action: Action
     reason: str = ""
     facts: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def severity(self) -> int:
+        """How much is taken from the arm: 0 nothing, 1 hold, 2 damp, 3 idle."""
+        return _SEVERITY[self.action]
 
 
 OK = Verdict(Action.NONE)
@@ -117,14 +125,14 @@ def check(
 ) -> tuple[GuardState, Verdict]:
     """Return the next state and the most severe verdict of this cycle.
 
-    Order: what takes the arm away (safety circuit, silence), then motion, then what
-    only ends the trial (sensor, cadence).
+    Among equally severe ones: what takes the arm away (safety circuit, silence), then
+    motion, then what only ends the trial (sensor, cadence).
     """
     now = seen.reading.host_ns
     state = _remember(limits, state, seen, now)
     if not seen.is_powered:
         return state, OK
-    for verdict in (
+    verdicts = (
         _check_safety(seen),
         _check_silence(limits, seen),
         _check_numbers(seen),
@@ -133,10 +141,12 @@ def check(
         _check_torque(limits, seen),
         _check_trial(limits, seen),
         _check_cadence(limits, state, now),
-    ):
-        if verdict.action is not Action.NONE:
-            return state, verdict
-    return state, OK
+    )
+    return state, max(verdicts, key=_severity)  # of equals, max takes the first
+
+
+def _severity(verdict: Verdict) -> int:
+    return _SEVERITY[verdict.action]
 
 
 def _remember(
@@ -179,7 +189,9 @@ def _check_silence(limits: Limits, seen: Observation) -> Verdict:
 
 
 def _check_numbers(seen: Observation) -> Verdict:
-    total = float(seen.reading.q.sum() + seen.reading.qd.sum() + seen.tau.sum())
+    reading = seen.reading
+    total = float(reading.q.sum() + reading.qd.sum() + seen.tau.sum())
+    total += seen.foot_speed + seen.joint7_offset
     if total - total != 0.0:  # NaN or infinite
         return Verdict(Action.IDLE, "not-a-number")
     return OK

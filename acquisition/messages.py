@@ -152,7 +152,9 @@ class Layout:
     Attributes:
         type_name: ROS 2 name of the message.
         dtype: packed numpy dtype of the whole payload, encapsulation header included;
-            header fields are called `sec`, `nanosec`, `frame_id`.
+            header fields are called `sec`, `nanosec`, `frame_id`. Alignment gaps are
+            fields too (`padding_28` ends at byte 28), or a copy would fill them with
+            whatever is in memory and two equal runs would differ.
         template: a payload with header and frame_id set and zeros elsewhere.
     """
 
@@ -176,18 +178,17 @@ def fixed_layout(type_name: str, frame_id: str) -> Layout:
     names = ["encapsulation", "sec", "nanosec", "frame_id_length", "frame_id"]
     frame = frame_id.encode() + b"\0"
     formats: list[object] = ["S4", "<i4", "<u4", "<u4", f"S{len(frame)}"]
-    offsets = [0, 4, 8, 12, 16]
     end = 16 + len(frame)
     for type_code, count, name in _fields(_TEXTS[type_name])[1:]:
         code, size = _SCALARS[type_code]
-        end += -(end - 4) % size
+        gap = -(end - 4) % size
+        if gap:
+            names.append(f"padding_{end + gap}")
+            formats.append(f"V{gap}")
         names.append(name)
         formats.append((code, (count,)) if count > 1 else code)
-        offsets.append(end)
-        end += size * count
-    dtype = np.dtype(
-        {"names": names, "formats": formats, "offsets": offsets, "itemsize": end}
-    )
+        end += gap + size * count
+    dtype = np.dtype({"names": names, "formats": formats})
     record = np.zeros(1, dtype)
     template = bytearray(record.tobytes())
     template[0:4] = ENCAPSULATION

@@ -69,29 +69,43 @@ class Recorder:
         if self._writer is not None:
             self._writer.write_event(self._clock.now_ns(), level, name, text)
 
-    def stop(self, stop_reason: str) -> Verified:
-        """End, verify and publish the file.
+    def detach(self) -> TrialWriter:
+        """Write the last samples and give the writer away, to be sealed elsewhere.
 
         Raises:
-            TrialFileError: it could not be written or verified; it keeps `.partial`.
+            TrialFileError: they could not be written; the file stays as `.partial`.
         """
         writer = self._writer
         if writer is None:
             raise RuntimeError("no trial is being recorded")
         try:
             self.drain()
-            writer.finish(stop_reason)
-            verified = verify(writer.partial, writer.counts)
-            publish(writer)
-        except TrialFileError:
-            writer.close_partial()
-            raise
         finally:
             self._writer = None
-        return verified
+        return writer
+
+    def stop(self, stop_reason: str) -> Verified:
+        """End, verify and publish the file; see `seal`."""
+        return seal(self.detach(), stop_reason)
 
     def abandon(self) -> None:
         """Let go of a file that can no longer be written; it stays as `.partial`."""
         if self._writer is not None:
             self._writer.close_partial()
             self._writer = None
+
+
+def seal(writer: TrialWriter, stop_reason: str) -> Verified:
+    """End a file, read it back, and give it its final name.
+
+    Raises:
+        TrialFileError: it could not be written or verified; it keeps `.partial`.
+    """
+    try:
+        writer.finish(stop_reason)
+        verified = verify(writer.partial, writer.counts)
+        publish(writer)
+    except TrialFileError:
+        writer.close_partial()
+        raise
+    return verified

@@ -16,7 +16,7 @@ class SampleRing:
     """
 
     def __init__(self, slots: int = SLOTS) -> None:
-        self._slots = slots
+        self.slots = slots
         self._records = np.zeros(slots, CYCLE.dtype)
         size = CYCLE.size
         self._raw = self._records.view(np.uint8).reshape(slots, size)
@@ -24,7 +24,7 @@ class SampleRing:
 
     def write(self, payload: memoryview) -> None:
         """Append one record (bytes of traction_msgs/Cycle)."""
-        self._raw[self.written % self._slots] = payload
+        self._raw[self.written % self.slots] = payload
         self.written += 1
 
     def reader(self) -> "RingReader":
@@ -34,8 +34,8 @@ class SampleRing:
     def since(self, position: int) -> tuple[Record, int]:
         """Return (records from `position` on, number lost because overwritten)."""
         end = self.written
-        start = max(position, end - self._slots)
-        indices = np.arange(start, end) % self._slots
+        start = max(position, end - self.slots)
+        indices = np.arange(start, end) % self.slots
         return self._records[indices], start - position
 
     def latest(self) -> Record:
@@ -53,7 +53,7 @@ class RingReader:
 
     def rewind(self, records: int) -> None:
         """Go back so that the next read begins `records` records earlier."""
-        oldest = max(0, self._ring.written - SLOTS)
+        oldest = max(0, self._ring.written - self._ring.slots)
         self._position = max(oldest, self._position - records)
 
     def read(self) -> Record:

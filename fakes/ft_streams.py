@@ -1,20 +1,17 @@
 """The bytes a wrist sensor sends, as a function of simulated time and of nothing else.
 
-`BotaStream` is the device behind the wire; `SensorErrors` is what its gauges add to
-the true load. Both are told the time; neither waits.
+`BotaStream` is the device behind the wire. It is told the time and never waits.
 """
 
-import math
 import re
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 
-import numpy as np
-
+from fakes.sensor_errors import SensorErrors
 from ft_sensor import bota
-from ft_sensor.bota import Acknowledgement, BootText, BotaFrame, Wrench
+from ft_sensor.bota import Acknowledgement, BootText, BotaFrame
 
 Source = Callable[[int], Sequence[float]]
 
@@ -27,86 +24,6 @@ _TEMPERATURE = 25.0  # [degrees Celsius]
 _BOOT_TEXT = BootText(True, "Fake F/T sensor", "20001", "fake 1.0")
 _COMMAND = re.compile(rb"[CRI#]|c,\d,\d,\d,\d|f,(\d{1,4}),\d,\d,\d")
 _COMMAND_BEGIN = re.compile(rb"c(,(\d(,(\d(,(\d(,)?)?)?)?)?)?)?|f(,[\d,]{0,10})?")
-
-
-@dataclass(frozen=True, slots=True)
-class ErrorScale:
-    """How far the readings of one kind of axis are off, in the axis' own unit.
-
-    Attributes:
-        bias: standard deviation over trials of a constant offset.
-        drift: standard deviation of an Ornstein-Uhlenbeck process.
-        white: standard deviation of the noise of each sample.
-        resolution: step of the output.
-        drift_time: correlation time of the drift [s].
-    """
-
-    bias: float
-    drift: float
-    white: float
-    resolution: float
-    drift_time: float = 3.0
-
-
-FORCE_ERRORS = ErrorScale(bias=0.24, drift=0.22, white=0.30, resolution=0.02)
-TORQUE_ERRORS = ErrorScale(bias=0.01, drift=0.01, white=0.01, resolution=0.001)
-
-
-class SensorErrors:
-    """What the sensor adds to the truth: bias, drift, noise and steps.
-
-    Low-frequency error dominates on purpose: white noise alone averages away. Bias and
-    drift are drawn anew for each trial, all from the one generator given.
-    """
-
-    def __init__(
-        self,
-        rng: np.random.Generator,
-        force: ErrorScale = FORCE_ERRORS,
-        torque: ErrorScale = TORQUE_ERRORS,
-    ) -> None:
-        self._scales = (force,) * 3 + (torque,) * 3
-        self._step_ns = -1
-        self._steps: list[tuple[float, float]] = []
-        self.new_trial(rng)
-
-    def new_trial(self, rng: np.random.Generator) -> None:
-        """Draw bias and drift from `rng`, and everything after from it too."""
-        self._rng = rng
-        normals = rng.standard_normal(12).tolist()
-        self._bias = [s.bias * n for s, n in zip(self._scales, normals, strict=False)]
-        # The drift begins anywhere in its stationary distribution.
-        self._drift = [
-            s.drift * n for s, n in zip(self._scales, normals[6:], strict=True)
-        ]
-        self._t_ns: int | None = None
-
-    def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
-        """Return what the sensor shows at `t_ns` under `wrench` [N, N m], shape (6,).
-
-        The drift steps exactly: x <- a x + s sqrt(1 - a^2) n with a = exp(-dt / T).
-        """
-        step_ns = 0 if self._t_ns is None else t_ns - self._t_ns
-        self._t_ns = t_ns
-        if step_ns != self._step_ns:
-            self._step_ns = step_ns
-            self._steps = [_drift_step(scale, step_ns) for scale in self._scales]
-        normals = self._rng.standard_normal(12).tolist()
-        shown: list[float] = []
-        for i, scale in enumerate(self._scales):
-            decay, kick = self._steps[i]
-            drift = self._drift[i] = decay * self._drift[i] + kick * normals[i]
-            value = wrench[i] + self._bias[i] + drift + scale.white * normals[i + 6]
-            step = scale.resolution
-            shown.append(round(value / step) * step if step else value)
-        fx, fy, fz, tx, ty, tz = shown
-        return fx, fy, fz, tx, ty, tz
-
-
-def _drift_step(scale: ErrorScale, step_ns: int) -> tuple[float, float]:
-    """Return (decay, kick) of the drift over `step_ns`."""
-    decay = math.exp(-max(step_ns, 0) / (scale.drift_time * 1e9))
-    return decay, scale.drift * math.sqrt(1.0 - decay * decay)
 
 
 class Mode(Enum):

@@ -28,15 +28,25 @@ class NormalStream:
 
 
 class OrnsteinUhlenbeck:
-    """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`."""
+    """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`.
+
+    It begins anywhere in its stationary distribution and steps exactly:
+    x <- a x + sd sqrt(1 - a^2) n with a = exp(-dt / time).
+    """
 
     def __init__(
         self, sd: float, time: float, dt: float, normals: NormalStream
     ) -> None:
-        self._keep = math.exp(-dt / time)
-        self._kick = sd * math.sqrt(1.0 - self._keep**2)
+        self._sd = sd
+        self._time = time
         self._normals = normals
         self.value = sd * normals.next()
+        self.set_dt(dt)
+
+    def set_dt(self, dt: float) -> None:
+        """Let every step from now on be `dt` [s] long."""
+        self._keep = math.exp(-dt / self._time)
+        self._kick = self._sd * math.sqrt(1.0 - self._keep**2)
 
     def step(self) -> float:
         """Advance by one time step and return the value."""

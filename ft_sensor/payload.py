@@ -20,6 +20,12 @@ from wam.tool import Tool
 Floats = NDArray[np.float64]
 
 
+def cross_matrix(a: Array) -> Array:
+    """Return the matrix X with X b = a x b, shape (3, 3)."""
+    x, y, z = a.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
 @dataclass(frozen=True, slots=True)
 class Payload:
     """What the sensor carries and how it is mounted.
@@ -56,7 +62,7 @@ class Payload:
         """
         down = -self.mass * GRAVITY * rotation_base_7[..., 2, :]
         force = down @ self.rotation  # rotation^T applied to row vectors
-        return np.concatenate([force, np.cross(self.com, force)], axis=-1)
+        return np.concatenate([force, force @ cross_matrix(self.com).T], axis=-1)
 
     def contact(self, raw: Floats, rotation_base_7: Floats) -> Floats:
         """Return the ground's wrench on the foot in the sensor frame, shape (..., 6).

@@ -18,7 +18,7 @@ _Vector7 = tuple[float, float, float, float, float, float, float]
 
 
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class _Kinematics(_Model):

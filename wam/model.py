@@ -1,4 +1,4 @@
-# pyright: basic
+# pyright: basic, reportMissingImports=false
 """The arm as a Pinocchio model: pose, Jacobian, gravity, mass matrix.
 
 Standard (distal) Denavit-Hartenberg: T_i = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i). The

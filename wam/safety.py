@@ -9,7 +9,7 @@ from enum import IntEnum
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError
-from wam.can_link import Dialogue
+from wam.dialogue import Dialogue
 from wam.frames import SAFETY_NODE
 from wam.pucks import Device, property_number
 

@@ -1,8 +1,8 @@
-"""TrialReader: whole chunks of a trial file into numpy arrays, hostile files refused."""
+"""TrialReader: whole chunks into numpy arrays, damaged and hostile files refused."""
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,11 +18,13 @@ from mcap.summary import Summary
 from acquisition.errors import TrialFileError
 from acquisition.messages import CYCLE, TRUTH, Layout
 from acquisition.sample import Record
+from acquisition.trial_file.checksums import MAGIC, check_checksums
 
-MAGIC = b"\x89MCAP0\r\n"
 RECORD_LIMIT = 16 * 1024 * 1024
 MAX_CHUNKS = 100_000
+MAX_NAMED = 1_000  # metadata records and attachments
 MAX_ROWS = 10_000_000
+MAX_BYTES = 4 * 2**30  # of all chunks, unpacked
 _HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log, publish
 _CHUNK_HEAD = struct.Struct("<BQQQQI")  # opcode, length, start, end, size, crc
 _MESSAGE = 5
@@ -43,7 +45,8 @@ _ERRORS = (
 
 
 @contextmanager
-def _as_trial_file_error(path: Path) -> Iterator[None]:
+def as_trial_file_error(path: Path) -> Generator[None]:
+    """Turn whatever a damaged file can raise into a TrialFileError."""
     try:
         yield
     except TrialFileError:
@@ -79,7 +82,7 @@ class TrialReader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with _as_trial_file_error(path), path.open("rb") as file:
+        with as_trial_file_error(path), path.open("rb") as file:
             self.size = path.stat().st_size
             self._check_magic(file)
             reader = SeekingReader(
@@ -88,6 +91,7 @@ class TrialReader:
             header = reader.get_header()
             if header.profile != "ros2":
                 raise TrialFileError(path, f"has profile {header.profile!r}, not ros2")
+            check_checksums(file, self.size, path)
             summary = reader.get_summary()
             if summary is None or summary.statistics is None:
                 raise TrialFileError(path, "has no summary: was it closed properly?")
@@ -123,7 +127,7 @@ class TrialReader:
         return {c.topic: counts.get(i, 0) for i, c in self.summary.channels.items()}
 
     def _rows(self, topic: str, layout: Layout) -> Rows:
-        with _as_trial_file_error(self.path):
+        with as_trial_file_error(self.path):
             channel = self._channel(topic, layout.type_name)
             count = self.topic_counts()[topic]
             row_bytes = _HEAD.size + layout.size
@@ -156,8 +160,9 @@ class TrialReader:
         good = (rows["op"] == _MESSAGE) & (rows["length"] == length)
         if not bool((good & (rows["channel"] == channel)).all()):
             raise TrialFileError(self.path, "has an index that points at no message")
-        frame = layout.dtype["frame_id"].itemsize
-        if len(rows) and not bool((rows["data"]["frame_id_length"] == frame).all()):
+        wanted = np.frombuffer(layout.template, layout.dtype)
+        names = ("encapsulation", "frame_id_length", "frame_id")
+        if not all(bool((rows["data"][n] == wanted[n]).all()) for n in names):
             raise TrialFileError(self.path, "has messages of an unknown layout")
         return Rows(
             data=np.ascontiguousarray(rows["data"]),
@@ -194,9 +199,14 @@ class TrialReader:
             )
         file.seek(index.chunk_start_offset)
         head = file.read(_CHUNK_HEAD.size)
-        opcode, _, _, _, size, crc = _CHUNK_HEAD.unpack(head)
+        opcode, length, _, _, size, crc = _CHUNK_HEAD.unpack(head)
         name_length = struct.unpack("<I", file.read(4))[0]
-        if opcode != _CHUNK or size != index.uncompressed_size or name_length > 16:
+        if (opcode, length + 9, size, name_length) != (
+            _CHUNK,
+            index.chunk_length,
+            index.uncompressed_size,
+            len(index.compression),
+        ):
             raise TrialFileError(self.path, "has a chunk that its index does not match")
         file.seek(name_length, 1)
         stored = struct.unpack("<Q", file.read(8))[0]
@@ -241,8 +251,14 @@ class TrialReader:
 
     def _check_offsets(self) -> None:
         chunks = self.summary.chunk_indexes
-        if len(chunks) > MAX_CHUNKS:
-            raise TrialFileError(self.path, f"states {len(chunks)} chunks")
+        total = sum(chunk.uncompressed_size for chunk in chunks)
+        if len(chunks) > MAX_CHUNKS or total > MAX_BYTES:
+            raise TrialFileError(
+                self.path, f"states {len(chunks)} chunks of {total} bytes"
+            )
+        indexes = (self.summary.metadata_indexes, self.summary.attachment_indexes)
+        if max(len(found) for found in indexes) > MAX_NAMED:
+            raise TrialFileError(self.path, f"states over {MAX_NAMED} attachments")
         for chunk in chunks:
             if chunk.chunk_start_offset + chunk.chunk_length > self.size:
                 raise TrialFileError(self.path, "has a chunk beyond its end")

@@ -3,7 +3,7 @@
 import contextlib
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,25 +13,26 @@ from mcap.writer import CompressionType, Writer
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
+from acquisition.flight import RawFrame, encode_can_batch
 from acquisition.messages import CYCLE, TRUTH, schema_text
-from acquisition.sample import CHANNELS, Record
+from acquisition.sample import CHANNELS, Flag, Record
+from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 
 CHUNK_BYTES = 262_144
 FORMAT_VERSION = "1"
-JOINT_NAMES = [f"wam_j{joint}" for joint in range(1, 8)]
 NS_PER_S = 1_000_000_000
 
-_TOPICS = {
+TRIAL_TOPICS = {
     "/robot_description": "std_msgs/msg/String",
     "/cycle": "traction_msgs/msg/Cycle",
-    "/joint_states": "sensor_msgs/msg/JointState",
-    "/wrench": "geometry_msgs/msg/WrenchStamped",
-    "/foot/pose": "geometry_msgs/msg/PoseStamped",
-    "/foot/twist": "geometry_msgs/msg/TwistStamped",
+    **VIEW_TOPICS,
     "/events": "rcl_interfaces/msg/Log",
     "/ft/raw": "traction_msgs/msg/WrenchBatch",
 }
 TRUTH_TOPIC = "/truth"
+CAN_TOPIC = "/can/raw"
+TRUTH_TOPICS = {TRUTH_TOPIC: "traction_msgs/msg/Truth"}
+FLIGHT_TOPICS = {**TRIAL_TOPICS, CAN_TOPIC: "traction_msgs/msg/CanBatch"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ class WriterCounts:
 
 
 class TrialWriter:
-    """Writes `<name>.mcap.partial`; `finish` makes it `<name>.mcap`.
+    """Writes `<name>.mcap.partial`; `publish` makes it `<name>.mcap`.
 
     The partial file is created exclusively: an existing one is never touched. Used by
     the recorder only, never by the control loop.
@@ -82,7 +83,12 @@ class TrialWriter:
         TrialFileError: the file exists, or cannot be created or written.
     """
 
-    def __init__(self, path: Path, header: TrialHeader, *, truth: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        header: TrialHeader,
+        topics: Mapping[str, str] = TRIAL_TOPICS,
+    ) -> None:
         self.path = path
         self.partial = path.with_name(path.name + ".partial")
         self.counts = WriterCounts()
@@ -91,7 +97,6 @@ class TrialWriter:
             raise TrialFileError(path, "exists already and is never overwritten")
         try:
             self._file = self.partial.open("xb")
-            _sync_directory(path.parent)
         except OSError as error:
             raise TrialFileError(self.partial, _reason(error)) from error
         self._writer = Writer(
@@ -101,7 +106,8 @@ class TrialWriter:
             enable_data_crcs=True,
         )
         with self._guarded():
-            self._start(truth)
+            _sync_directory(path.parent)
+            self._start(topics)
 
     def write_cycles(self, records: Record) -> None:
         """Append records of traction_msgs/Cycle in order; stamps are set here."""
@@ -123,7 +129,8 @@ class TrialWriter:
                 self._add("/cycle", log_time, payload, publish_time, number)
                 every = self._header.views_every
                 if every and number % every == 0:
-                    self._write_views(records[i], log_time, publish_time, number)
+                    for topic, view in encode_views(records[i], log_time).items():
+                        self._add(topic, log_time, view, publish_time, number)
 
     def write_wrench_samples(self, samples: list[WrenchSample]) -> None:
         """Append one batch of sensor samples at the sensor's own rate."""
@@ -155,6 +162,14 @@ class TrialWriter:
             for i, log_time in enumerate(log_times.tolist()):
                 self._add(TRUTH_TOPIC, log_time, data[i * size : (i + 1) * size])
 
+    def write_can(self, frames: list[RawFrame]) -> None:
+        """Append raw CAN frames as one batch (flight records)."""
+        if not frames:
+            return
+        log_time = frames[-1].t_ns + self._header.utc_offset_ns
+        with self._guarded():
+            self._add(CAN_TOPIC, log_time, encode_can_batch(log_time, frames))
+
     def flush(self) -> None:
         """Close the running chunk and force it to the disk."""
         with self._guarded():
@@ -183,13 +198,14 @@ class TrialWriter:
             "lost_in_ring": str(counts.lost_in_ring),
         }
         with self._guarded():
+            self._writer.flush()  # or `result` would stand before the last messages
             self._writer.add_metadata("result", result)
             self._writer.finish()
             self._file.flush()
             os.fsync(self._file.fileno())
             self._file.close()
 
-    def _start(self, truth: bool) -> None:
+    def _start(self, topics: Mapping[str, str]) -> None:
         header = self._header
         self._writer.start(profile="ros2", library="traction")
         self._writer.add_metadata(
@@ -210,14 +226,13 @@ class TrialWriter:
         self._writer.add_metadata("channels", channels)
         for name, content in header.attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)
-        topics = {TRUTH_TOPIC: "traction_msgs/msg/Truth"} if truth else _TOPICS
         self._channels: dict[str, int] = {}
         for topic, type_name in topics.items():
             schema = self._writer.register_schema(
                 type_name, "ros2msg", schema_text(type_name).encode()
             )
             self._channels[topic] = self._writer.register_channel(topic, "cdr", schema)
-        self._description_pending = not truth
+        self._description_pending = "/robot_description" in topics
 
     def _count_cycles(self, records: Record) -> None:
         counts = self.counts
@@ -228,31 +243,9 @@ class TrialWriter:
         assert counts.last_cycle is not None
         steps = np.diff(numbers, prepend=counts.last_cycle)
         counts.missed += int((steps - 1).sum())
-        counts.late += int(np.count_nonzero(records["flags"] & (1 << 10)))
+        counts.late += int(np.count_nonzero(records["flags"] & Flag.DEADLINE_MISSED))
         counts.cycles += len(records)
         counts.last_cycle = int(numbers[-1])
-
-    def _write_views(
-        self, record: np.void, log_time: int, publish_time: int, number: int
-    ) -> None:
-        joints = CdrWriter().header(log_time, "wam_base").strings(JOINT_NAMES)
-        joints.sequence(record["position"]).sequence(record["velocity"])
-        joints.sequence(record["torque_command"])
-        views = {
-            "/joint_states": joints,
-            "/wrench": CdrWriter()
-            .header(log_time, "ft_sensor")
-            .array(record["wrench"]),
-            "/foot/pose": CdrWriter()
-            .header(log_time, "wam_base")
-            .array(record["foot_position"])
-            .array(record["foot_orientation"]),
-            "/foot/twist": CdrWriter()
-            .header(log_time, "wam_base")
-            .array(record["foot_velocity"]),
-        }
-        for topic, writer in views.items():
-            self._add(topic, log_time, writer.finish(), publish_time, number)
 
     def _add(
         self,
@@ -276,7 +269,7 @@ class TrialWriter:
         self.counts.messages[topic] = self.counts.messages.get(topic, 0) + 1
 
     @contextlib.contextmanager
-    def _guarded(self):  # noqa: ANN202
+    def _guarded(self) -> Generator[None]:
         try:
             yield
         except (OSError, ValueError) as error:

@@ -5,7 +5,8 @@ from weakref import finalize
 
 from acquisition.clock import Readable
 from fakes.can_bus import FakeCanBus
-from fakes.pucks import NetworkOptions, PuckNetwork
+from fakes.network_options import NetworkOptions
+from fakes.pucks import PuckNetwork
 from wam.can_link import CanLink
 
 

@@ -3,7 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.devices import SafetyMode
-from fakes.pucks import NetworkOptions, PuckNetwork
+from fakes.network_options import NetworkOptions
+from fakes.pucks import PuckNetwork
 from tests.fakes.stepped import Motors
 from wam.frames import encode_set, encode_torques
 from wam.safety import Level, decode_pendant

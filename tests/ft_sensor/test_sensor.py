@@ -10,10 +10,12 @@ from acquisition.errors import (
     LinkTimeoutError,
     SettingsError,
 )
-from fakes.ft_streams import BotaOptions, BotaStream, ByteFault, SensorErrors
+from fakes.ft_streams import BotaOptions, BotaStream, ByteFault
+from fakes.sensor_errors import SensorErrors
 from fakes.serial_port import FakeSerialPort
-from ft_sensor.bota import BotaFrame, BotaStatus, unwrap_us
-from ft_sensor.sensor import BotaSensor, FrameDating, SensorSettings
+from ft_sensor.bota import BotaStatus, unwrap_us
+from ft_sensor.sensor import BotaSensor
+from ft_sensor.sensor_settings import SensorSettings
 from ft_sensor.serial_link import SerialLink
 
 MS = 1_000_000
@@ -331,33 +333,6 @@ def test_numbers_that_repeat_for_50_ms_are_invalid():
     assert not found[-1].is_valid
 
 
-def test_non_finite_numbers_are_invalid():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frame = BotaFrame(0, (0.0, float("nan"), 0.0, 0.0, 0.0, 0.0), 5, 25.0)
-    (sample,) = dating.date([frame], 10 * MS)
-    assert not sample.is_valid
-
-
-def test_dates_rise_when_a_late_batch_reaches_back():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frames = [
-        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), 1250 * k, 25.0) for k in range(4)
-    ]
-    found = dating.date(frames[:1], 100 * MS)
-    found += dating.date(frames[1:], 101 * MS)
-    assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
-
-
-def test_a_jump_of_the_device_clock_does_not_move_the_dates():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frames = [
-        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), t_us, 25.0)
-        for k, t_us in enumerate([1000, 2250, 2_000_000_000, 2_000_001_250])
-    ]
-    found = dating.date(frames, 100 * MS)
-    assert found[-1].t_ns - found[0].t_ns == 2 * 1_250_000
-
-
 def test_device_time_passes_the_end_of_32_bits():
     bench = Bench(BotaOptions(clock_start_us=2**32 - 1_600_000)).opened()
     found = bench.run(300 * MS)
@@ -366,20 +341,6 @@ def test_device_time_passes_the_end_of_32_bits():
     assert counters[0] > counters[-1]
     assert total == (len(found) - 1) * 1250
     assert bench.sensor.counters.lost == 0
-
-
-def test_wrap_inside_a_run_loses_nothing():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frames = [
-        BotaFrame(
-            0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), (2**32 - 2500 + 1250 * k) % 2**32, 25.0
-        )
-        for k in range(5)
-    ]
-    found = dating.date(frames, 100 * MS)
-    assert all(sample.is_valid for sample in found)
-    assert dating.lost == 0
-    assert found[-1].t_ns - found[0].t_ns == 4 * 1_250_000
 
 
 def test_closing_stops_the_stream_and_may_be_repeated():

@@ -10,9 +10,10 @@ from acquisition.errors import (
     LinkTimeoutError,
     PreflightError,
 )
-from fakes.pucks import NetworkOptions
+from fakes.network_options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import ArmSettings, WamArm
+from wam.arm import WamArm
+from wam.arm_settings import ArmSettings
 from wam.frames import decode_torques
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
@@ -21,6 +22,7 @@ TAU = np.array([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000
 GET_P = (0x404, b"\x30")
+GET_MODE = (0x00A, b"\x08")
 SAFETY_TO_IDLE = (0x00A, bytes.fromhex("88 00 01 00 00 00"))
 
 
@@ -158,6 +160,43 @@ def test_a_reading_has_seven_joints_within_its_cycle():
     assert reading.q == pytest.approx(HOME, abs=1.2e-4)
     assert 0 < reading.arm_ns - reading.host_ns <= 1_500_000
     assert frames(rig)[0] == GET_P
+
+
+@pytest.mark.parametrize("silent", range(8))
+def test_a_reading_tells_which_motors_answered_and_when(silent):
+    rig, arm = started()
+    first = cycle(rig, arm)
+    rig.network.silence(silent or 10)
+    reading = cycle(rig, arm)
+    is_complete = silent == 0
+    assert reading.host_ns == first.host_ns + CYCLE_NS
+    # Seven replies take 0.7 ms of wire; six of them arrive all the same.
+    assert 500_000 < reading.arm_ns - reading.host_ns <= 1_500_000
+    assert reading.fresh == 0b1111111 & ~(1 << silent >> 1)
+    assert reading.is_complete is is_complete
+    assert reading.missing_cycles == 1 - is_complete
+    assert tuple(reading.counts) == HOME_COUNTS
+    assert reading.q == pytest.approx(first.q, abs=0.0)
+    assert not reading.qd.any()
+
+
+def test_replies_before_the_bus_broke_keep_their_time():
+    rig, arm = started()
+    receive = rig.link.receive
+    calls = []
+
+    def breaking():
+        calls.append(rig.clock.t_ns)
+        if len(calls) == 3:  # drained, looked at, and now gone
+            raise LinkError("gone")
+        return receive()
+
+    rig.network.silence(7)
+    rig.link.receive = breaking
+    rig.link.is_readable = lambda: True
+    reading = cycle(rig, arm)
+    assert reading.fresh
+    assert reading.arm_ns == calls[1]
 
 
 def test_a_joint_at_rest_has_no_velocity():
@@ -328,7 +367,7 @@ def test_safety_mode_is_asked_once_in_25_cycles():
     rig, arm = started()
     for _ in range(100):
         cycle(rig, arm, ZERO)
-    assert frames(rig).count((0x00A, b"\x08")) == 4
+    assert frames(rig).count(GET_MODE) == 4
     assert arm.safety_mode() is SafetyMode.IDLE
 
 
@@ -351,6 +390,68 @@ def test_an_e_stop_is_noticed_though_no_torque_is_sent():
     assert arm.safety_mode() is SafetyMode.E_STOP
 
 
+def without_broadcast(rig):
+    """Let the safety module change its mode without a word."""
+    due = rig.network.due
+    rig.network.due = lambda t_ns: [f for f in due(t_ns) if f[1] != 0x540]
+
+
+def lose_questions(rig, count):
+    """Let the wire swallow the next questions for the safety mode."""
+    receive = rig.network.receive
+    left = [count]
+
+    def deaf(t_ns, can_id, data):
+        if (can_id, bytes(data)) == GET_MODE and left[0]:
+            left[0] -= 1
+        else:
+            receive(t_ns, can_id, data)
+
+    rig.network.receive = deaf
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+@pytest.mark.parametrize("phase", [1, 2, 13, 24, 25, 26])
+def test_an_e_stop_is_known_within_four_incomplete_cycles(phase, lost):
+    rig, arm = started()
+    rig.network.pendant("activate")
+    for _ in range(phase):
+        cycle(rig, arm, ZERO)
+    without_broadcast(rig)
+    lose_questions(rig, lost)
+    rig.network.pendant("estop")
+    while (reading := arm.read(rig.clock.t_ns)).missing_cycles < 4:
+        rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+        if arm.safety_mode() is SafetyMode.E_STOP:
+            break
+    assert reading.missing_cycles == min(2 + lost, 4)
+    assert arm.safety_mode() is SafetyMode.E_STOP
+
+
+def test_a_lasting_gap_does_not_flood_the_safety_module():
+    rig, arm = started()
+    cycle(rig, arm, ZERO)
+    rig.network.silence(3)
+    rig.sent.clear()
+    for _ in range(50):
+        cycle(rig, arm)
+    # Three at once, then in time: every 25 cycles.
+    assert frames(rig).count(GET_MODE) == 5
+
+
+def test_a_bus_that_falls_silent_keeps_its_mode_until_the_guard_has_acted():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    for _ in range(3):
+        cycle(rig, arm, ZERO)
+    for node in (*range(1, 8), 10):
+        rig.network.silence(node)
+    # The guard goes to idle after 25 incomplete cycles of a powered arm.
+    modes = [(cycle(rig, arm), arm.safety_mode())[1] for _ in range(150)]
+    assert set(modes[:30]) == {SafetyMode.ACTIVE}
+    assert modes[-1] is SafetyMode.UNKNOWN
+
+
 def test_a_safety_module_that_falls_silent_becomes_unknown():
     rig, arm = started()
     rig.network.silence(10)
@@ -367,7 +468,7 @@ def test_idle_is_confirmed_before_zero_torque_is_sent():
     assert arm.idle()
     order = frames(rig)
     zeros = [i for i, (can_id, _) in enumerate(order) if can_id in (0x401, 0x402)]
-    assert order[:2] == [SAFETY_TO_IDLE, (0x00A, b"\x08")]
+    assert order[:2] == [SAFETY_TO_IDLE, GET_MODE]
     assert zeros == [2, 3]
     assert decode_torques(order[2][1]) == (0, 0, 0, 0)
     assert rig.network.safety_mode is SafetyMode.IDLE

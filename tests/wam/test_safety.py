@@ -2,9 +2,9 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
-from fakes.pucks import NetworkOptions
+from fakes.network_options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.can_link import Dialogue
+from wam.dialogue import Dialogue
 from wam.safety import (
     Button,
     Level,

@@ -1,0 +1,135 @@
+"""From a trial file to arrays: joint positions and raw wrench, and what follows.
+
+The analysis starts again from joint positions and raw wrench with the calibration that
+the file carries, so a better calibration can be applied years later.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError, TrialFileError
+from acquisition.sample import Record
+from acquisition.trial_file.reader import TrialReader
+from analysis.prepare import foot_velocity
+from analysis.series import TractionSeries
+from ft_sensor.calibration_file import payload_from_toml, terrain_from_toml
+from ft_sensor.payload import Payload, TerrainFrame, traction
+from wam.constants import Body, load_constants
+from wam.model import ArmModel
+from wam.tool import Tool
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTrial:
+    """One recorded trial, checked and in arrays.
+
+    Attributes:
+        path: the file.
+        metadata: metadata by name, e.g. `metadata["trial"]["operator"]`.
+        terrain: name of the terrain.
+        cycles: records of traction_msgs/Cycle, shape (n,).
+        t: time since the first cycle [s], shape (n,).
+        sole: centre of the sole in the base frame [m], shape (n, 3).
+        velocity: its velocity in the base frame [m/s], shape (n, 3); NaN beside gaps.
+        force: of the ground on the foot in the base frame [N], shape (n, 3).
+        traction: v_t [m/s], F_t [N], F_n [N] in the terrain frame, shape (n, 3).
+        lateral: force along y_T [N], shape (n,).
+        frame: where the container stood.
+        payload: calibration and tare that were applied.
+    """
+
+    path: Path
+    metadata: dict[str, dict[str, str]]
+    terrain: str
+    cycles: Record
+    t: Array
+    sole: Array
+    velocity: Array
+    force: Array
+    traction: Array
+    lateral: Array
+    frame: TerrainFrame
+    payload: Payload
+
+    @property
+    def name(self) -> str:
+        """Session and trial, e.g. S012/T04."""
+        trial = self.metadata["trial"]
+        return f"{trial.get('session', '?')}/{trial.get('trial', '?')}"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the trial came from simulated devices."""
+        return self.metadata["trial"].get("simulated") == "true"
+
+    @property
+    def displacement(self) -> Array:
+        """Distance of the sole from the far end along x_T [m], shape (n,)."""
+        return self.frame.displacement(self.sole)
+
+    def series(self) -> TractionSeries:
+        """Return the trial as the models want it."""
+        return TractionSeries(
+            self.terrain,
+            self.name,
+            self.t,
+            self.traction[:, 0],
+            self.traction[:, 2],
+            self.traction[:, 1],
+        )
+
+
+def load_trial(path: Path) -> RecordedTrial:
+    """Read a trial file and derive sole, force and traction.
+
+    Raises:
+        TrialFileError: the file is not a sound trial, or lacks its calibration.
+    """
+    reader = TrialReader(path)
+    cycles = reader.cycles().data
+    if len(cycles) < 3:
+        raise TrialFileError(path, f"holds only {len(cycles)} cycles")
+    try:
+        payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
+        terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
+        constants = load_constants(_text(reader, "arm_model.toml"))
+    except SettingsError as error:
+        raise TrialFileError(path, error.message.rstrip(".")) from error
+    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    model = ArmModel(constants, Tool(nothing, nothing, sole_point))
+    t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
+    path_of_sole = model.sole_path(np.ascontiguousarray(cycles["position"]))
+    velocity = foot_velocity(t, path_of_sole.position)
+    raw = np.ascontiguousarray(cycles["wrench_raw"])
+    contact = payload.contact(raw, path_of_sole.rotation)
+    force = payload.to_base(contact, path_of_sole.rotation)
+    axes = frame.axes()
+    return RecordedTrial(
+        path=path,
+        metadata=reader.metadata,
+        terrain=terrain,
+        cycles=cycles,
+        t=t,
+        sole=path_of_sole.position,
+        velocity=velocity,
+        force=force,
+        traction=traction(axes, velocity, force),
+        lateral=force @ axes[1],
+        frame=frame,
+        payload=payload,
+    )
+
+
+def _text(reader: TrialReader, name: str) -> str:
+    content = reader.attachments.get(name)
+    if content is None:
+        raise TrialFileError(reader.path, f"lacks the attachment {name}")
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        raise TrialFileError(reader.path, f"{name} is no text") from error

@@ -1,0 +1,92 @@
+# PYTHON_ARGCOMPLETE_OK
+"""The command line: parse, run one command, turn errors into messages and codes."""
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition.errors import TractionError
+
+COMMANDS = {
+    "check": "is the rig fit to run? one graded page",
+    "run": "record a session of trials on one terrain",
+    "status": "the matrix board, counted from verified files",
+    "report": "fit and compare models of recorded sessions, write the report",
+    "fit": "the same for tables that Traction did not record",
+}
+EXIT_CODES = """\
+exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
+4 device fault, 5 session left unfinished on purpose, 6 data failed verification,
+130 interrupted outside a session"""
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Keeps the examples as they are written."""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands; imports no slow library."""
+    common = argparse.ArgumentParser(add_help=False)
+    group = common.add_argument_group("global options")
+    group.add_argument("--config", type=Path, metavar="FILE", help="a rig.toml")
+    group.add_argument(
+        "--data", type=Path, default=Path("data"), metavar="DIR", help="data folder"
+    )
+    group.add_argument("-v", "--verbose", action="store_true", help="say more")
+    group.add_argument("--no-color", action="store_true", help="plain text")
+    parser = argparse.ArgumentParser(
+        prog="traction",
+        description="Measures how a robotic foot grips loose stones.",
+        epilog="rehearse without hardware: traction run S0 --fake --fast\n\n"
+        + EXIT_CODES,
+        formatter_class=_Formatter,
+    )
+    parser.add_argument("--version", action="version", version=f"traction {_version()}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, help_text in COMMANDS.items():
+        module = importlib.import_module(f"experiments.commands.{name}")
+        child = commands.add_parser(
+            name,
+            help=help_text,
+            description=help_text[0].upper() + help_text[1:] + ".",
+            epilog=f"examples:\n{module.EXAMPLES}\n\n{EXIT_CODES}",
+            formatter_class=_Formatter,
+            parents=[common],
+        )
+        module.add_arguments(child)
+        child.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    parser = build_parser()
+    try:
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
+    except ImportError:
+        pass
+    args = parser.parse_args(arguments)
+    try:
+        code = args.run(args)
+    except TractionError as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("Interrupted. Nothing that was recorded is lost.", file=sys.stderr)  # noqa: T201
+        return 130
+    except BrokenPipeError:
+        return 0
+    return int(code)
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("traction")
+    except metadata.PackageNotFoundError:
+        return "unknown"

@@ -1,0 +1,73 @@
+"""traction check: is the rig fit to run?"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.console import Console
+
+EXAMPLES = """\
+  traction check --fake                     the page with simulated devices
+  traction check --explain estop            more about a message"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `check`."""
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    parser.add_argument("--terrain", metavar="NAME", help="row of the matrix (first)")
+    parser.add_argument(
+        "--config-only", action="store_true", help="check the settings, no device"
+    )
+    parser.add_argument("--explain", metavar="NAME", help="more about a message")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print the page and return the exit code."""
+    from experiments.console import GOOD, Console
+    from experiments.preflight import connect_rig, run_preflight
+    from experiments.rigs import FakeOptions
+    from experiments.settings import load_settings
+
+    console = Console(color=not args.no_color)
+    if args.explain:
+        return _explain(args.explain, console)
+    settings = load_settings(args.config)
+    if args.config_only:
+        console.check(GOOD, "config", f"{settings.origin}")
+        for key, value in settings.rig.model_dump().items():
+            console.say(f"   {key} = {value}")
+        return 0
+    first = settings.matrix.terrains[0].name
+    row = settings.row(args.terrain or first)
+    fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
+    rig = connect_rig(settings, row, fake)
+    console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
+    try:
+        page = run_preflight(rig, Path(args.data), console)
+        page.sensor.close()
+    finally:
+        rig.arm.close()
+    console.say("Fit to run.")
+    return 0
+
+
+def _explain(name: str, console: Console) -> int:
+    from acquisition.errors import SettingsError
+    from experiments.messages import CATALOGUE
+
+    message = CATALOGUE.get(name)
+    if message is None:
+        raise SettingsError(
+            f"There is no message called {name!r}.",
+            hint=f"Known: {', '.join(sorted(CATALOGUE))}.",
+        )
+    console.say(f"{name}: {message.what}")
+    if message.arm:
+        console.say(f"ARM: {message.arm}.")
+    console.say(message.do)
+    console.say(message.more)
+    console.say(f"exit code {message.exit_code}")
+    return 0

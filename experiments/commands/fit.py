@@ -1,0 +1,57 @@
+"""traction fit: the analysis and the report for tables from elsewhere."""
+
+import argparse
+from pathlib import Path
+
+EXAMPLES = """\
+  traction fit trials.npz --out fit
+  traction fit a.csv b.csv --out fit --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `fit`."""
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="npz, or CSV per trial"
+    )
+    parser.add_argument(
+        "--out", type=Path, required=True, metavar="DIR", help="folder of the report"
+    )
+    parser.add_argument(
+        "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
+    )
+    parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the choice of points (0)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit tables and write the report."""
+    from acquisition.clock import SystemClock
+    from analysis.models import FitOptions
+    from analysis.prepare import PrepareOptions
+    from analysis.report import ReportContext, write_report
+    from analysis.study import StudyOptions, run_study
+    from analysis.tables import load_tables, parse_columns
+    from experiments.console import Console
+    from experiments.store import iso_utc
+
+    console = Console(color=not args.no_color)
+    columns = parse_columns(args.columns) if args.columns else None
+    trials = load_tables(args.files, columns, args.terrain)
+    count = sum(len(series) for series in trials.values())
+    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    options = StudyOptions(prepare=PrepareOptions(), fit=FitOptions(seed=args.seed))
+    study = run_study(trials, options, simulated=False)
+    context = ReportContext(
+        title="Traction of foreign tables",
+        subtitle=f"{count} trials from {len(args.files)} files",
+        is_simulated=False,
+        is_foreign=True,
+        generated_utc=iso_utc(SystemClock().utc_ns()),
+    )
+    page = write_report(study, args.out, context)
+    for warning in study.warnings:
+        console.say(f"▲ {warning}")
+    console.say(str(page))
+    return 0

@@ -1,0 +1,32 @@
+"""traction report: fit, compare and report recorded sessions."""
+
+import argparse
+from pathlib import Path
+
+EXAMPLES = """\
+  traction report S012                      one session, into its own folder
+  traction report --all                     the study of all sessions"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `report`."""
+    parser.add_argument(
+        "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
+    )
+    parser.add_argument("--all", action="store_true", help="every session with trials")
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="N", help="of the choice of points (0)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the report of one session or of a study."""
+    from experiments.console import Console
+    from experiments.reporting import choose_sessions, report_sessions
+
+    console = Console(color=not args.no_color)
+    data = Path(args.data)
+    sessions = choose_sessions(data, args.sessions, every=args.all)
+    page = report_sessions(sessions, data, args.seed, console)
+    console.say(str(page))
+    return 0

@@ -1,0 +1,183 @@
+"""The message catalogue: what happened, what the arm does, what to do."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One row of the catalogue; the parts are format strings.
+
+    Attributes:
+        what: what happened, with numbers and limits.
+        arm: what the arm is doing now; empty where no arm is involved.
+        do: what to do.
+        exit_code: of the command, when it ends with this message.
+        more: explanation for `traction check --explain`.
+    """
+
+    what: str
+    arm: str
+    do: str
+    exit_code: int
+    more: str
+
+    def text(self, facts: Mapping[str, object], saved: str = "") -> str:
+        """Return the message in one line."""
+        arm = f"ARM: {self.arm}." if self.arm else ""
+        parts = (self.what.format_map(facts), arm, self.do.format_map(facts), saved)
+        return " ".join(part for part in parts if part)
+
+
+CATALOGUE: dict[str, Message] = {
+    "can-down": Message(
+        "The CAN interface cannot be used: {detail}",
+        "not touched",
+        "Fix: ip link set can0 up type can bitrate 1000000.",
+        3,
+        "The adapter is missing, its interface is down or another bit rate is set.",
+    ),
+    "puck-missing": Message(
+        "{detail}",
+        "not touched",
+        "Check its cable or a puck in reset.",
+        3,
+        "Every motor controller answers within a millisecond; one that is silent is "
+        "unplugged, without power or in reset.",
+    ),
+    "not-zeroed": Message(
+        "The arm is not zeroed.",
+        "idle",
+        "Move it to the home position, press Shift-idle, then run: traction zero",
+        3,
+        "After power-up the motor controllers do not know where the joints are.",
+    ),
+    "not-active": Message(
+        "The arm was not activated within {seconds:.0f} s.",
+        "idle",
+        "Press Shift-activate on the pendant when asked to.",
+        3,
+        "Only the pendant can activate the arm; the program waits for it.",
+    ),
+    "ft-silent": Message(
+        "{detail}",
+        "idle",
+        "Check power and cable.",
+        3,
+        "The serial port opens, but the force/torque sensor sends nothing.",
+    ),
+    "ft-stale": Message(
+        "{trial} stopped at {seconds:.1f} s: F/T sample {ms:.0f} ms old "
+        "(limit {limit:.0f}).",
+        "holding",
+        "[r]edo when the sensor is back.",
+        4,
+        "A trial without force samples is worth nothing, so it is stopped at once.",
+    ),
+    "loop-late": Message(
+        "{late:.0f} late cycles in 1 s (limit {limit:.0f}). Likely: governor "
+        "powersave, or another process on the core.",
+        "holding",
+        "Close other programs, then [r]edo.",
+        4,
+        "The loop has 2 ms per cycle; a machine that is busy elsewhere takes them.",
+    ),
+    "overspeed": Message(
+        "Joint {joint:.0f} {value:.2f} rad/s > {limit:.2f}.",
+        "damping, then holding",
+        "Push more slowly, then [r]edo.",
+        4,
+        "Speed limits keep people safe; slips on stones stay far below them.",
+    ),
+    "foot-speed": Message(
+        "The foot moved at {value:.2f} m/s > {limit:.2f}.",
+        "damping, then holding",
+        "Push more slowly, then [r]edo.",
+        4,
+        "Slips on stones reach 0.4 m/s; more than the limit is no slip.",
+    ),
+    "joint-limit": Message(
+        "Joint {joint:.0f} at {value:.2f} rad is beyond {limit:.2f}.",
+        "damping, then holding",
+        "Move it back inside by hand, then [r]edo.",
+        4,
+        "The limit is armed once the joint has been 0.1 rad inside it.",
+    ),
+    "torque-limit": Message(
+        "Joint {joint:.0f} was asked for {value:.1f} N m > {limit:.1f}.",
+        "damping, then holding",
+        "Check the foot's mass in rig.toml and the pose, then [r]edo.",
+        4,
+        "Normal trials stay below half of the torque limits.",
+    ),
+    "joint7-slip": Message(
+        "Joint 7 moved {mrad:.0f} mrad (limit {limit:.0f}).",
+        "holding",
+        "Check the foot's mount, then [r]edo.",
+        4,
+        "Joint 7 is locked so that the foot does not turn below the sensor.",
+    ),
+    "can-silence": Message(
+        "No reply from the arm for {ms:.0f} ms.",
+        "UNKNOWN - support it, press Shift-idle",
+        "Check the CAN cable, then: traction check.",
+        4,
+        "Without positions there is no gravity compensation to trust.",
+    ),
+    "not-a-number": Message(
+        "A position or torque was not a number.",
+        "idle",
+        "Keep the flight record and report it.",
+        4,
+        "Nothing that is not finite is ever sent to a motor.",
+    ),
+    "estop": Message(
+        "Stop pressed at {seconds:.2f} s.",
+        "stopped by its hardware",
+        "Release it, press Shift-idle, zero the arm, then: traction run again.",
+        4,
+        "The hardware stop takes the power away; positions have to be defined anew.",
+    ),
+    "pendant-idle": Message(
+        "The pendant or the safety module put the arm to idle at {seconds:.2f} s.",
+        "idle, braked",
+        "Look at the pendant's lamps, then: traction run again.",
+        4,
+        "Shift-idle was pressed or a safety limit was exceeded.",
+    ),
+    "tare-moved": Message(
+        "Force varied {spread:.1f} N during tare (0.2 s means, limit {limit:.1f}).",
+        "holding",
+        "Is the foot touching? Lift it clear and keep it still.",
+        3,
+        "A tare taken while the foot moves would shift every force of the trial.",
+    ),
+    "disk-full": Message(
+        "{free:.1f} GB free, a session needs {need:.1f} GB, minimum {limit:.0f} GB.",
+        "not touched",
+        "Make room, or name another folder with --data.",
+        3,
+        "A full disk would end a trial in the middle.",
+    ),
+    "write-failed": Message(
+        "{trial} could not be verified: {detail}",
+        "holding",
+        "Kept as .partial: traction recover {path}",
+        6,
+        "Every file is read back before it counts.",
+    ),
+    "locked": Message(
+        "{session} is open in process {pid}.",
+        "",
+        "To watch: traction status",
+        2,
+        "One session at a time writes into a data folder.",
+    ),
+    "interrupted": Message(
+        "Interrupted.",
+        "holding, then idle",
+        "Nothing that was recorded is lost.",
+        5,
+        "Ctrl-C ends a session on purpose, after closing the running trial.",
+    ),
+}

@@ -1,0 +1,177 @@
+"""Who answers the prompts: a person at the keyboard, a script, or nobody (auto)."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Protocol
+
+from acquisition.errors import SettingsError
+from experiments.rigs import Rehearsing
+
+REJECT_REASONS = {
+    "1": "foot left the bed",
+    "2": "too fast",
+    "3": "touched the frame",
+    "4": "sensor",
+    "5": "other",
+}
+
+
+class Prompt(Enum):
+    """What the person is asked for."""
+
+    SUPPORT = "support"
+    LIFT = "lift"
+    READY = "ready"
+    RECORDING = "recording"
+    REVIEW = "review"
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """A prompt with what it is about.
+
+    Attributes:
+        prompt: what is asked for.
+        trial: number of the trial.
+        attempt: which attempt at it, from 1.
+        is_complete: REVIEW only: the trial ended by itself.
+        since: how long it has been asked [s].
+    """
+
+    prompt: Prompt
+    trial: int
+    attempt: int
+    is_complete: bool
+    since: float
+
+
+class Keys(Protocol):
+    """Answers prompts with keys: space, k, r and a digit, q."""
+
+    def answer(self, asked: Asked) -> str:
+        """Return the keys pressed since the last call, "" for none."""
+        ...
+
+
+class AutoKeys:
+    """Presses the obvious key: space when ready, keep what is complete."""
+
+    def answer(self, asked: Asked) -> str:
+        """Return a key as soon as it makes sense."""
+        if asked.prompt is Prompt.SUPPORT:
+            return " "
+        if asked.prompt is Prompt.READY:
+            return " " if asked.since > 2.2 else ""
+        if asked.prompt is Prompt.REVIEW:
+            return "k" if asked.is_complete else "r5"
+        return ""
+
+
+class ScriptKeys:
+    """Answers the reviews from a file, one per line; the rest like AutoKeys.
+
+    Lines: `keep`, `redo REASON` (1-5), `quit`; `#` begins a comment. After the last
+    line everything that is complete is kept.
+
+    Raises:
+        SettingsError: the file cannot be read or a line is none of these.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._auto = AutoKeys()
+        try:
+            lines = path.read_text().splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise SettingsError(
+                f"The operator script {path} cannot be read.",
+                hint="Name a text file or auto. Nothing was started.",
+            ) from error
+        self._keys = [
+            _script_key(path, number, line.split("#")[0].split())
+            for number, line in enumerate(lines, 1)
+            if line.split("#")[0].strip()
+        ]
+
+    def answer(self, asked: Asked) -> str:
+        """Return the next line's keys at a review."""
+        if asked.prompt is Prompt.REVIEW and self._keys:
+            return self._keys.pop(0)
+        return self._auto.answer(asked)
+
+
+def _script_key(path: Path, number: int, words: list[str]) -> str:
+    if words == ["keep"]:
+        return "k"
+    if words == ["quit"]:
+        return "q"
+    if len(words) == 2 and words[0] == "redo" and words[1] in REJECT_REASONS:
+        return "r" + words[1]
+    raise SettingsError(
+        f"{path}, line {number}: {' '.join(words)!r} - expected keep, redo 1..5 or "
+        "quit.",
+        hint="Nothing was started.",
+    )
+
+
+class LineKeys:
+    """Reads what a person types, line by line, without waiting."""
+
+    def answer(self, asked: Asked) -> str:
+        """Return the typed line; an empty line counts as space."""
+        del asked
+        descriptor = sys.stdin.fileno()
+        if not select.select([descriptor], [], [], 0)[0]:
+            return ""
+        typed = os.read(descriptor, 256).decode(errors="ignore")
+        if not typed:
+            return "q"
+        return typed.strip().lower() or " "
+
+
+class RehearsedHand:
+    """Moves the simulated hand and pendant as the prompts ask."""
+
+    def __init__(self, rehearsal: Rehearsing) -> None:
+        self._rehearsal = rehearsal
+        self._seen: tuple[Prompt, int, int] | None = None
+
+    def follow(self, asked: Asked) -> None:
+        """Do what a person would do at this prompt; once per prompt."""
+        key = (asked.prompt, asked.trial, asked.attempt)
+        if key == self._seen:
+            return
+        self._seen = key
+        if asked.prompt is Prompt.SUPPORT:
+            self._rehearsal.lift()
+            self._rehearsal.pendant("activate")
+        elif asked.prompt is Prompt.LIFT:
+            self._rehearsal.lift()
+        elif asked.prompt is Prompt.READY:
+            self._rehearsal.prepare(asked.trial + 1000 * (asked.attempt - 1))
+            self._rehearsal.put_down()
+        elif asked.prompt is Prompt.RECORDING:
+            self._rehearsal.push()
+
+
+def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
+    """Return who answers: a script, `auto`, or the keyboard.
+
+    Raises:
+        SettingsError: a real session without a terminal, or a bad script.
+    """
+    if script == "auto" or (script is None and is_fake and not sys.stdin.isatty()):
+        return AutoKeys()
+    if script is not None:
+        return ScriptKeys(Path(script))
+    if not sys.stdin.isatty():
+        raise SettingsError(
+            "A real session needs a person at a terminal, and there is none.",
+            hint="Run it in a terminal, or add --fake. Nothing was started.",
+        )
+    return LineKeys()

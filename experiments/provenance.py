@@ -1,0 +1,54 @@
+"""Where a recording comes from: code, packages, machine."""
+
+import platform
+import shutil
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+PACKAGES = ("traction", "numpy", "pin", "python-can", "pyserial", "mcap", "scipy")
+
+
+def collect() -> dict[str, str]:
+    """Return software version, commit, dirty state, packages and kernel as strings."""
+    commit, diff = _git()
+    facts = {
+        "software": f"traction {_version('traction')}",
+        "commit": commit,
+        "dirty": "true" if diff else "false",
+        "python": platform.python_version(),
+        "kernel": f"{platform.system()} {platform.release()}",
+        "machine": platform.machine(),
+    }
+    facts.update({f"package:{name}": _version(name) for name in PACKAGES})
+    return facts
+
+
+def diff_patch() -> str:
+    """Return the uncommitted changes of the code, empty when there are none."""
+    return _git()[1]
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
+
+def _git() -> tuple[str, str]:
+    folder = Path(__file__).resolve().parent.parent
+    git = shutil.which("git")
+    if git is None or not (folder / ".git").exists():
+        return "unknown", ""
+
+    def ask(*words: str) -> str:
+        done = subprocess.run(
+            [git, "-C", str(folder), *words],
+            capture_output=True,
+            check=False,
+            timeout=10,
+        )
+        return done.stdout.decode(errors="replace") if done.returncode == 0 else ""
+
+    return ask("rev-parse", "HEAD").strip() or "unknown", ask("diff", "HEAD")

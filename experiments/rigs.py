@@ -1,0 +1,292 @@
+"""The composition root: settings and a row of the matrix in, a rig out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from acquisition.clock import Clock, SystemClock
+from acquisition.control import InlineControl
+from acquisition.cycle import Cycle
+from acquisition.devices import WrenchSample
+from acquisition.flight import FrameTape
+from acquisition.guard import Limits
+from acquisition.loop import Loop
+from acquisition.recorder import Recorder
+from acquisition.sample import Flag, Record
+from acquisition.shared import SampleRing
+from experiments.settings import FootSection, RigSettings, Settings, TerrainRow
+from ft_sensor.observer import LiveFoot
+from ft_sensor.payload import Payload, TerrainFrame, payload_of
+from ft_sensor.sensor import BotaSensor
+from ft_sensor.sensor_settings import SensorSettings
+from ft_sensor.serial_link import SerialLink, SerialPort, open_port
+from wam.arm import WamArm
+from wam.arm_settings import ArmSettings
+from wam.can_link import CanLink, open_bus
+from wam.constants import ArmConstants, Body, load_constants
+from wam.controller import FootController
+from wam.joint_lock import LockGains
+from wam.model import ArmModel
+from wam.tapped_link import TappedLink
+from wam.tool import Tool, sensor_body
+
+if TYPE_CHECKING:
+    from fakes.rig import FakeRig
+
+MS = 1_000_000
+
+
+class Rehearsing(Protocol):
+    """What only a simulated rig can be asked; see fakes.rig.Rehearsal."""
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """Names that `inject` knows."""
+        ...
+
+    def prepare(self, trial: int) -> None:
+        """Rake the bed for `trial`."""
+        ...
+
+    def lift(self) -> None:
+        """Let the hand lift the foot above the far end."""
+        ...
+
+    def put_down(self) -> None:
+        """Let the hand put the foot down there."""
+        ...
+
+    def push(self) -> None:
+        """Let the hand push the foot across; the truth is written from here on."""
+        ...
+
+    def pendant(self, button: Literal["activate", "idle", "estop"]) -> None:
+        """Press the pendant."""
+        ...
+
+    def inject(self, fault: str) -> None:
+        """Let a device fail."""
+        ...
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        ...
+
+    def take_truth(self) -> Record:
+        """Return traction_msgs/Truth records since the push began."""
+        ...
+
+    def parameters(self) -> dict[str, str]:
+        """Return the true parameters of the ground."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FakeOptions:
+    """How a simulated session runs: stepped time or the wall clock, and the seed."""
+
+    is_fast: bool
+    seed: int
+
+
+@dataclass(slots=True)
+class Rig:
+    """Everything a session needs, real or simulated, already connected.
+
+    Attributes:
+        clock: the time of loop and devices.
+        arm: driver of the arm, not started.
+        open_sensor_port: opens the serial port of the wrist sensor.
+        foot: live view of the foot; its payload is replaced by each tare.
+        payload: what the sensor carries, not tared.
+        model: the arm with its tool.
+        tape: the last two seconds of frames.
+        wrenches: the sensor's samples since the list was last cleared.
+        frame: where the container stands.
+        row: row of the matrix.
+        settings: all settings.
+        rehearsal: handle of the simulation; None on the real rig.
+        is_stepped: time passes only while the loop runs.
+    """
+
+    clock: Clock
+    arm: WamArm
+    open_sensor_port: Callable[[], SerialPort]
+    foot: LiveFoot
+    payload: Payload
+    model: ArmModel
+    tape: FrameTape
+    wrenches: list[WrenchSample]
+    frame: TerrainFrame
+    row: TerrainRow
+    settings: Settings
+    rehearsal: Rehearsing | None
+    is_stepped: bool
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the devices are simulated."""
+        return self.rehearsal is not None
+
+    def open_sensor(self) -> BotaSensor:
+        """Open the wrist sensor's port and start its stream.
+
+        Raises:
+            LinkError: the port cannot be opened, or the sensor is silent.
+            DeviceFaultError: the sensor refuses its settings.
+        """
+        section = self.settings.rig.ft_sensor
+        settings = SensorSettings(
+            "simulated" if self.is_simulated else section.port,
+            baudrate=section.baudrate,
+            sinc=section.sinc,
+            rate_check=0.5 if self.is_simulated else 2.0,
+        )
+        sensor = BotaSensor(SerialLink(self.open_sensor_port()), self.clock, settings)
+        sensor.open()
+        return sensor
+
+    def connect(self, sensor: BotaSensor) -> InlineControl:
+        """Join arm, sensor, law and guard into a loop that is ready to run."""
+        ring = SampleRing()
+        recorder = Recorder(ring, self.clock)
+
+        def on_wrench(samples: list[WrenchSample]) -> None:
+            recorder.add_wrenches(samples)
+            self.wrenches.extend(samples)
+
+        control = self.settings.rig.control
+        gains = LockGains(kp=control.lock_kp, kd=control.lock_kd)
+        cycle = Cycle(
+            self.arm,
+            sensor,
+            FootController(self.model, control.virtual_mass, gains),
+            self.foot,
+            build_limits(self.settings.rig, self.model.constants),
+            ring.write,
+            on_wrench,
+            extra_flags=Flag.SIMULATED if self.is_simulated else 0,
+        )
+        return InlineControl(Loop(cycle, self.clock), cycle, recorder, ring)
+
+
+def terrain_frame(row: TerrainRow) -> TerrainFrame:
+    """Return the frame of a row of the matrix."""
+    return TerrainFrame(
+        incline=float(np.radians(row.incline_deg)),
+        heading=float(np.radians(row.heading_deg)),
+        far_end=row.far_end,
+        travel=row.travel,
+    )
+
+
+def build_tool(rig: RigSettings, foot: str) -> Tool:
+    """Return sensor and foot as rig.toml describes them."""
+    section: FootSection = rig.feet.tread if foot == "tread" else rig.feet.bare
+    sensor = rig.ft_sensor
+    body = sensor_body()
+    return Tool(
+        sensor=Body(sensor.mass, body.com, body.inertia),
+        foot=Body(
+            section.mass, np.array(section.com), np.diag(np.array(section.inertia))
+        ),
+        sole=np.array(section.sole),
+        sensor_height=sensor.height,
+        sensor_angle=float(np.radians(sensor.angle_deg)),
+        sensor_sign=float(sensor.sign),
+    )
+
+
+def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
+    """Return the guard's limits of rig.toml."""
+    limits = rig.limits
+    return Limits(
+        q_lower=constants.q_lower,
+        q_upper=constants.q_upper,
+        qd=np.array(limits.speed),
+        tau=np.array(limits.torque),
+        foot_speed=limits.foot_speed,
+        joint7=limits.joint7_mrad * 1e-3,
+        ft_stale_ns=round(limits.ft_stale_ms * MS),
+        ft_stop_ns=round(limits.ft_stop_ms * MS),
+    )
+
+
+def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
+    """Return the rig for one session.
+
+    Raises:
+        LinkError: the CAN interface cannot be opened (real rig).
+    """
+    constants = load_constants()
+    tool = build_tool(settings.rig, row.foot)
+    frame = terrain_frame(row)
+    sensor = settings.rig.ft_sensor
+    rehearsal: Rehearsing | None = None
+    if fake is None:
+        clock: Clock = SystemClock()
+        can = settings.rig.can
+        bus = open_bus(can.interface, can.channel, can.bitrate)
+
+        def open_sensor_port() -> SerialPort:
+            return open_port(sensor.port, sensor.baudrate).port
+
+    else:
+        clock, simulation, rehearsal = _simulate(row, fake, constants, tool, frame)
+        bus = simulation.bus
+        open_sensor_port = simulation.open_port
+    tape = FrameTape()
+    model = ArmModel(constants, tool)
+    payload = payload_of(tool)
+    return Rig(
+        clock=clock,
+        arm=WamArm(
+            TappedLink(CanLink(bus), tape, clock),
+            clock,
+            ArmSettings(j2mp=constants.j2mp),
+        ),
+        open_sensor_port=open_sensor_port,
+        foot=LiveFoot(model, payload, frame),
+        payload=payload,
+        model=model,
+        tape=tape,
+        wrenches=[],
+        frame=frame,
+        row=row,
+        settings=settings,
+        rehearsal=rehearsal,
+        is_stepped=fake is not None and fake.is_fast,
+    )
+
+
+def _simulate(
+    row: TerrainRow,
+    fake: FakeOptions,
+    constants: ArmConstants,
+    tool: Tool,
+    frame: TerrainFrame,
+) -> tuple[Clock, FakeRig, Rehearsing]:
+    """Return (clock, simulated rig, its handle); only here are the fakes imported."""
+    from fakes.clock import SteppedClock
+    from fakes.rig import FakeRig, Rehearsal, Scene
+
+    scene = Scene(
+        terrain=row.name,
+        stones=row.stones,
+        foot=row.foot,
+        frame=frame,
+        start_q=np.array(row.start_q),
+        seed=fake.seed,
+    )
+    if not fake.is_fast:
+        clock = SystemClock()
+        rig = FakeRig(scene, constants, tool, clock)
+        return clock, rig, Rehearsal(rig)
+    stepped = SteppedClock()
+    rig = FakeRig(scene, constants, tool, stepped)
+    stepped.world = rig
+    return stepped, rig, Rehearsal(rig)

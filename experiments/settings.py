@@ -1,0 +1,243 @@
+"""rig.toml and matrix.toml: read, checked, with an error that says what to write."""
+
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from acquisition.errors import SettingsError
+
+_Vector3 = tuple[float, float, float]
+_Vector7 = tuple[float, float, float, float, float, float, float]
+_M = TypeVar("_M", bound=BaseModel)
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class CanSettings(_Section):
+    """The CAN interface, in python-can's words."""
+
+    interface: str = Field(examples=["socketcan"])
+    channel: str = Field(examples=["can0"])
+    bitrate: int = Field(gt=0, examples=[1000000])
+
+
+class SensorSection(_Section):
+    """The wrist sensor and how it is mounted."""
+
+    kind: Literal["bota"] = Field(examples=["bota"])
+    port: str = Field(examples=["/dev/ttyUSB0"])
+    baudrate: int = Field(gt=0, examples=[460800])
+    sinc: int = Field(ge=51, le=512, examples=[64])
+    mass: Positive = Field(examples=[0.136])
+    height: float = Field(ge=0, le=0.2, examples=[0.012])
+    angle_deg: float = Field(ge=-360, le=360, examples=[0.0])
+    sign: Literal[1, -1] = Field(examples=[1])
+
+
+class FootSection(_Section):
+    """A foot with its adapter, in frame 7."""
+
+    mass: Positive = Field(examples=[0.45])
+    com: _Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
+    inertia: tuple[Positive, Positive, Positive] = Field(
+        examples=[[4e-4, 5.5e-4, 4.5e-4]]
+    )
+    sole: _Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
+
+
+class Feet(_Section):
+    """The two feet of the experiment."""
+
+    tread: FootSection
+    bare: FootSection
+
+
+class ControlSection(_Section):
+    """The control law's numbers."""
+
+    virtual_mass: float = Field(ge=0, le=2, examples=[0.30])
+    lock_kp: float = Field(ge=0, le=30, examples=[20.0])
+    lock_kd: float = Field(ge=0, le=0.25, examples=[0.2])
+
+
+class LimitSection(_Section):
+    """Where the guard steps in."""
+
+    speed: _Vector7 = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: _Vector7 = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    foot_speed: Positive = Field(examples=[0.8])
+    joint7_mrad: Positive = Field(examples=[50.0])
+    ft_stale_ms: Positive = Field(examples=[6.0])
+    ft_stop_ms: Positive = Field(examples=[20.0])
+    tare_spread: Positive = Field(examples=[0.5])
+    free_disk_gb: float = Field(ge=0, examples=[5.0])
+
+
+class RigSettings(_Section):
+    """Everything in rig.toml."""
+
+    can: CanSettings
+    ft_sensor: SensorSection
+    feet: Feet
+    control: ControlSection
+    limits: LimitSection
+
+
+class TerrainRow(_Section):
+    """One row of the matrix."""
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
+    stones: Literal["small", "big", "none"] = Field(examples=["small"])
+    incline_deg: float = Field(ge=0, le=30, examples=[10.0])
+    foot: Literal["tread", "bare"] = Field(examples=["tread"])
+    far_end: _Vector3 = Field(examples=[[0.70, 0.0, 0.12]])
+    heading_deg: float = Field(ge=-180, le=180, examples=[0.0])
+    travel: float = Field(gt=0.05, le=1.0, examples=[0.45])
+    trials: int = Field(ge=1, le=99, examples=[10])
+    start_q: _Vector7 = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
+
+
+class MatrixSettings(_Section):
+    """Everything in matrix.toml."""
+
+    terrains: tuple[TerrainRow, ...] = Field(min_length=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The resolved settings and where they came from.
+
+    Attributes:
+        rig: rig.toml.
+        matrix: matrix.toml.
+        rig_text: text of rig.toml, for the recording.
+        matrix_text: text of matrix.toml.
+        origin: "shipped default" or the folder of the files.
+    """
+
+    rig: RigSettings
+    matrix: MatrixSettings
+    rig_text: str
+    matrix_text: str
+    origin: str
+
+    def row(self, terrain: str) -> TerrainRow:
+        """Return the matrix row of `terrain`.
+
+        Raises:
+            SettingsError: there is no such row.
+        """
+        for row in self.matrix.terrains:
+            if row.name == terrain:
+                return row
+        known = " ".join(row.name for row in self.matrix.terrains)
+        raise SettingsError(
+            f"There is no terrain {terrain!r} in matrix.toml.",
+            hint=f"Terrains: {known}. Nothing was started.",
+        )
+
+
+def load_settings(config: Path | None) -> Settings:
+    """Return settings from `config`, a rig.toml with a matrix.toml beside it.
+
+    Without `config` the shipped defaults are used; a missing matrix.toml too.
+
+    Raises:
+        SettingsError: a file is missing, no TOML, or holds a wrong key or value.
+    """
+    shipped = resources.files("experiments.data")
+    rig_text = (shipped / "rig.toml").read_text()
+    matrix_text = (shipped / "matrix.toml").read_text()
+    origin = "shipped default"
+    if config is not None:
+        rig_text = _read(config)
+        origin = str(config)
+        beside = config.with_name("matrix.toml")
+        if beside.exists():
+            matrix_text = _read(beside)
+    rig = _parse(RigSettings, rig_text, "rig.toml")
+    matrix = _parse(MatrixSettings, matrix_text, "matrix.toml")
+    names = [row.name for row in matrix.terrains]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SettingsError(
+            f"matrix.toml: terrain {twice[0]!r} stands there twice.",
+            hint="Every row needs a name of its own. Nothing was started.",
+        )
+    return Settings(rig, matrix, rig_text, matrix_text, origin)
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise SettingsError(
+            f"{path} cannot be read ({reason}).",
+            hint="Name a rig.toml with --config. Nothing was started.",
+        ) from error
+
+
+def _parse(model: type[_M], text: str, name: str) -> _M:
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise SettingsError(
+            _explain(model, name, error), hint="Nothing was started."
+        ) from error
+
+
+def _explain(model: type[BaseModel], name: str, error: ValidationError) -> str:
+    first = error.errors()[0]
+    place = ""
+    for part in first["loc"]:
+        place += f"[{part}]" if isinstance(part, int) else f".{part}"
+    place = place.lstrip(".")
+    if first["type"] == "missing":
+        return f"{name}: {place} is missing{_example(model, first['loc'])}."
+    if first["type"] == "extra_forbidden":
+        return f"{name}: {place} is no setting Traction knows."
+    got = first["input"]
+    shown = f'"{got}"' if isinstance(got, str) else repr(got)
+    expected = first["msg"].removeprefix("Input should be ")
+    return (
+        f"{name}: {place} = {shown} - expected {expected}"
+        f"{_example(model, first['loc'])}."
+    )
+
+
+def _example(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
+    """Return ", e.g. ..." from the field's examples, following `location`."""
+    current: type[BaseModel] | None = model
+    found = ""
+    for part in location:
+        if not isinstance(part, str) or current is None:
+            continue
+        field = current.model_fields.get(part)
+        if field is None:
+            return found
+        if field.examples:
+            found = f", e.g. {field.examples[0]}"
+        current = _section_of(field.annotation)
+    return found
+
+
+def _section_of(annotation: Any) -> type[BaseModel] | None:  # noqa: ANN401
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in get_args(annotation):
+        found = _section_of(inner)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,207 @@
+"""Folders and files of sessions: numbered, written atomically, never overwritten."""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, cast
+
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, SettingsError
+
+_FOLDER = re.compile(
+    r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
+    r"(?P<fake>\.fake)?$"
+)
+_TRIAL_FILE = re.compile(r"^T\d\d[a-z]*\.json$")
+
+
+@dataclass(frozen=True, slots=True)
+class SessionFolder:
+    """One session on the disk.
+
+    Attributes:
+        path: its folder.
+        id: such as "S012".
+        terrain: name of the terrain.
+        is_simulated: the folder ends in .fake.
+    """
+
+    path: Path
+    id: str
+    terrain: str
+    is_simulated: bool
+
+    @property
+    def trials(self) -> Path:
+        """Folder of the kept trials."""
+        return self.path / "trials"
+
+    @property
+    def rejected(self) -> Path:
+        """Folder of rejected and interrupted trials."""
+        return self.path / "rejected"
+
+    @property
+    def faults(self) -> Path:
+        """Folder of flight records."""
+        return self.path / "faults"
+
+    def append_event(self, event: Mapping[str, object]) -> None:
+        """Append one line to the journal and force it to the disk."""
+        line = json.dumps(event, allow_nan=False) + "\n"
+        with (self.path / "events.jsonl").open("ab") as file:
+            file.write(line.encode())
+            file.flush()
+            os.fsync(file.fileno())
+
+    def events(self) -> list[dict[str, Any]]:
+        """Return the journal; a torn last line is left out."""
+        path = self.path / "events.jsonl"
+        if not path.exists():
+            return []
+        events: list[dict[str, Any]] = []
+        for line in path.read_bytes().splitlines():
+            event = _as_object(line)
+            if event is None:
+                break
+            events.append(event)
+        return events
+
+    def kept_trials(self) -> list[Path]:
+        """Return the kept trial files, in order, whose checksum is right."""
+        kept: list[Path] = []
+        for sidecar in sorted(self.trials.glob("T*.json")):
+            if not _TRIAL_FILE.match(sidecar.name):
+                continue
+            facts = read_json(sidecar)
+            path = sidecar.with_suffix(".mcap")
+            is_sound = path.exists() and sha256_of(path) == facts.get("sha256")
+            if facts.get("verdict") == "keep" and is_sound:
+                kept.append(path)
+        return kept
+
+    def rejected_sidecars(self) -> list[dict[str, Any]]:
+        """Return the sidecars of rejected and interrupted trials."""
+        return [read_json(path) for path in sorted(self.rejected.glob("T*.json"))]
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return a JSON object, an empty one where the file is damaged."""
+    try:
+        return _as_object(path.read_bytes()) or {}
+    except OSError:
+        return {}
+
+
+def _as_object(text: bytes) -> dict[str, Any] | None:
+    try:
+        value: object = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else None
+
+
+def write_json(path: Path, value: Mapping[str, object]) -> None:
+    """Replace `path` atomically: temporary file, fsync, rename."""
+    temporary = path.with_name(path.name + ".tmp")
+    with temporary.open("wb") as file:
+        file.write(json.dumps(value, indent=1, allow_nan=False).encode())
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hex digest of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def list_sessions(data: Path) -> list[SessionFolder]:
+    """Return all sessions below `data`, oldest number first."""
+    folder = data / "sessions"
+    if not folder.is_dir():
+        return []
+    found = [_session_at(path) for path in folder.iterdir() if path.is_dir()]
+    return sorted((s for s in found if s), key=lambda s: (int(s.id[1:]), s.path.name))
+
+
+def find_session(data: Path, name: str) -> SessionFolder:
+    """Return the session called `name`: an id, a folder name or a path.
+
+    Raises:
+        SessionError: there is none, or more than one.
+    """
+    path = Path(name)
+    as_path = _session_at(path) if path.is_dir() else None
+    if as_path is not None:
+        return as_path
+    found = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
+    if len(found) == 1:
+        return found[0]
+    known = " ".join(s.id for s in list_sessions(data)) or "none yet"
+    raise SessionError(
+        f"There is no session {name!r} in {data / 'sessions'}.",
+        hint=f"Sessions: {known}.",
+    )
+
+
+def create_session(
+    data: Path, terrain: str, *, is_simulated: bool, utc_ns: int
+) -> SessionFolder:
+    """Create the folder of a new session with the next free number.
+
+    Raises:
+        SettingsError: `data` cannot be written.
+    """
+    sessions = data / "sessions"
+    try:
+        sessions.mkdir(parents=True, exist_ok=True)
+        with _locked(sessions / ".lock"):
+            numbers = [int(s.id[1:]) for s in list_sessions(data)]
+            number = max(numbers, default=0) + 1
+            date = datetime.fromtimestamp(utc_ns * 1e-9, UTC).strftime("%Y-%m-%d")
+            suffix = ".fake" if is_simulated else ""
+            path = sessions / f"{date}_S{number:03d}_{terrain}{suffix}"
+            path.mkdir()
+        for name in ("trials", "rejected", "faults"):
+            (path / name).mkdir()
+    except OSError as error:
+        raise SettingsError(
+            f"{data} cannot be written ({error.strerror}).",
+            hint="Name another folder with --data. Nothing was started.",
+        ) from error
+    return SessionFolder(path, f"S{number:03d}", terrain, is_simulated)
+
+
+def _session_at(path: Path) -> SessionFolder | None:
+    match = _FOLDER.match(path.name)
+    if not match:
+        return None
+    return SessionFolder(path, match["id"], match["terrain"], bool(match["fake"]))
+
+
+@contextmanager
+def _locked(path: Path) -> Generator[None, None, None]:
+    with path.open("ab") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def session_utc_ns() -> int:
+    """Return the machine's UTC [ns]: folders carry the real date, fake or not."""
+    return SystemClock().utc_ns()
+
+
+def iso_utc(utc_ns: int) -> str:
+    """Return UTC as text, e.g. 2027-03-14T10:14:05Z."""
+    return datetime.fromtimestamp(utc_ns // 1_000_000_000, UTC).strftime(
+        "%Y-%m-%dT%H:%M:%SZ"
+    )

@@ -1,0 +1,113 @@
+"""One simulated motor puck: its power, its properties, its torque."""
+
+from enum import Enum
+
+from fakes.network_options import NetworkOptions
+from wam.pucks import (
+    MAGNETIC_ENCODER,
+    Device,
+    PuckMode,
+    Role,
+    Stat,
+    names,
+    property_number,
+)
+
+READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM"))
+
+
+class Power(Enum):
+    """What a puck's processor is doing."""
+
+    OFF = "no power"
+    MONITOR = "asleep"
+    SILENT = "booting or resetting"
+    AWAKE = "running"
+
+
+class MotorPuck:
+    """State of one motor puck.
+
+    Attributes:
+        node: its number, 1 to 7.
+        vers: its firmware.
+        power: what its processor is doing.
+        epoch: number of its lives; events of an earlier one are void.
+        is_mute: its transmit wire is cut.
+        offset: its position less the encoder's [counts].
+        torque: torque it makes [puck units].
+        p_number: number of the property P in its firmware.
+        t_header: first byte of a torque frame that it takes.
+        properties: what a host has set or may ask for, by name.
+    """
+
+    def __init__(self, node: int, options: NetworkOptions) -> None:
+        i = node - 1
+        self.node = node
+        self.vers = options.vers[i]
+        self.power = Power.OFF
+        self.epoch = 0
+        self.is_mute = False
+        self.offset = 0
+        self.torque = 0
+        self.p_number = property_number(Device.MOTOR, "P", self.vers)
+        self.t_header = 0x80 | property_number(Device.MOTOR, "T", self.vers)
+        self.properties = {
+            "ROLE": MAGNETIC_ENCODER | Role.TATER,
+            **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
+            **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33, "VBUS": 48},
+            **{"GRPA": 0, "GRPB": 1 if node <= 4 else 2, "GRPC": 4},
+            **{"CTS": options.cts[i], "IPNM": options.ipnm[i], "MT": options.mt[i]},
+            **{"POLES": options.poles[i], "ECMIN": 0, "ECMAX": 0},
+            **{"PIDX": node if node <= 4 else node - 4, "JIDX": node},
+        }
+        self._monitor_vers = options.monitor_vers
+
+    @property
+    def is_listening(self) -> bool:
+        """Whether it takes frames at all."""
+        return self.power in (Power.AWAKE, Power.MONITOR)
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether it follows torques."""
+        return self.properties["MODE"] == PuckMode.TORQUE
+
+    def hears(self, group: int) -> bool:
+        """Return whether the puck belongs to `group` and runs."""
+        mine = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
+        return self.is_listening and group in mine
+
+    def name_of(self, number: int) -> str | None:
+        """Return what `number` means to the puck as it is now."""
+        if self.power is Power.MONITOR:
+            return names(Device.MONITOR).get(number)
+        return names(Device.MOTOR, self.vers).get(number)
+
+    def value_of(self, name: str, counts: int) -> int | None:
+        """Return the value of a property, None for one that is not modelled."""
+        is_asleep = self.power is Power.MONITOR
+        computed = {
+            "VERS": self._monitor_vers if is_asleep else self.vers,
+            "STAT": Stat.RESET if is_asleep else Stat.READY,
+            "MECH": counts % (self.properties["CTS"] or 1),
+            "T": self.torque,
+        }
+        return computed.get(name, self.properties.get(name))
+
+    def take_torque(self, units: int) -> None:
+        """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
+        if self.is_driven:
+            limit = self.properties["MT"]
+            self.torque = max(-limit, min(units, limit))
+
+    def restart(self, power: Power) -> None:
+        """Lose what a puck loses with its program."""
+        self.epoch += 1
+        self.power = power
+        self.torque = 0
+        self.properties["MODE"] = PuckMode.IDLE
+
+    def lose_position(self, counts: int) -> None:
+        """Count from within one turn again, as the magnetic encoder sees it."""
+        self.offset = counts % (self.properties["CTS"] or 1) - counts

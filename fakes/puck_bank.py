@@ -1,0 +1,211 @@
+"""The seven simulated motor pucks of an arm, and the motors behind them."""
+
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from acquisition.devices import SafetyMode
+from fakes.motor_puck import READ_ONLY, MotorPuck, Power
+from fakes.network_options import NetworkOptions
+from fakes.safety_module import puck_mode_in
+from fakes.schedule import Schedule
+from wam.frames import (
+    MOTOR_NODES,
+    Property,
+    encode_position,
+    position_reply_id,
+)
+from wam.pucks import Stat
+
+
+class MotorSide(Protocol):
+    """The motors and the arm behind the pucks."""
+
+    def advance(self, t_ns: int) -> None:
+        """Let the world go on to `t_ns`."""
+        ...
+
+    def counts(self) -> Sequence[int]:
+        """Return the encoder counts of the seven motors now."""
+        ...
+
+    def set_torques(self, units: Sequence[int]) -> None:
+        """Apply these torques [puck units] to motors 1 to 7 from now on."""
+        ...
+
+    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
+        """Short the windings or not; without power the arm falls freely."""
+        ...
+
+
+class PuckBank:
+    """Motor pucks 1 to 7: they are told, asked, driven, and lose their power.
+
+    Motors are advanced to the instants at which pucks touch them and no further.
+    `on_position` is called for each position report.
+    """
+
+    def __init__(
+        self,
+        motors: MotorSide,
+        options: NetworkOptions,
+        schedule: Schedule,
+        on_position: Callable[[], None],
+    ) -> None:
+        self._motors = motors
+        self._options = options
+        self._schedule = schedule
+        self._on_position = on_position
+        self._mode = options.safety_mode
+        self._pucks = [MotorPuck(node, options) for node in MOTOR_NODES]
+        self._members: dict[int, list[MotorPuck]] = {}
+        self._wake_up()
+
+    def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
+        """Go where the safety module sends the pucks in its new `mode`."""
+        self._mode = mode
+        for puck in self._pucks:
+            if mode is SafetyMode.E_STOP:
+                puck.restart(Power.OFF)
+            elif before is SafetyMode.E_STOP:
+                puck.restart(Power.MONITOR)
+        self._members.clear()
+        self._set_puck_modes()
+
+    def silence(self, node: int, *, is_mute: bool) -> None:
+        """Cut the transmit wire of a puck, or mend it."""
+        self._pucks[node - 1].is_mute = is_mute
+
+    def reboot(self, node: int) -> None:
+        """Let a puck fall into its monitor."""
+        self._pucks[node - 1].restart(Power.MONITOR)
+        self._members.clear()
+        self._apply()
+
+    def receive(self, node: int, request: Property) -> None:
+        """Take a GET or SET sent to one puck."""
+        puck = self._pucks[node - 1]
+        if puck.is_listening:
+            self._ask_or_tell([puck], request)
+
+    def receive_group(self, group: int, request: Property) -> None:
+        """Take a GET or SET sent to a group."""
+        self._ask_or_tell(self._group(group), request)
+
+    def receive_torques(self, group: int, header: int, units: Sequence[int]) -> None:
+        """Take a torque frame: its first byte and four torques [puck units]."""
+        for puck in self._group(group):
+            if puck.t_header == header:
+                puck.take_torque(units[(puck.properties["PIDX"] - 1) & 3])
+        self._apply()
+
+    def _wake_up(self) -> None:
+        power = Power.MONITOR if self._options.are_asleep else Power.AWAKE
+        for puck in self._pucks:
+            puck.restart(power if self._options.has_power else Power.OFF)
+        if not self._options.has_positions:
+            self._lose_positions(self._pucks)
+        self._set_puck_modes()
+
+    def _ask_or_tell(self, pucks: list[MotorPuck], request: Property) -> None:
+        number = request.number
+        if request.value is not None:
+            for puck in pucks:
+                self._tell(puck, number, request.value)
+            return
+        feedback = [p for p in pucks if p.p_number == number and p.power is Power.AWAKE]
+        if feedback:
+            self._schedule.after(self._options.latch_ns, lambda: self._report(feedback))
+            return
+        for puck in pucks:
+            if (name := puck.name_of(number)) is not None:
+                self._answer_later(puck, number, name)
+
+    def _answer_later(self, puck: MotorPuck, number: int, name: str) -> None:
+        epoch = puck.epoch
+
+        def answer() -> None:
+            if puck.epoch != epoch or puck.is_mute:
+                return
+            value = puck.value_of(name, self._encoder_counts()[puck.node - 1])
+            if value is not None:
+                self._schedule.reply(puck.node, number, name, value)
+
+        # A choice within the 75 to 150 us that are known.
+        self._schedule.after(self._options.latch_ns + 10_000 * puck.node, answer)
+
+    def _report(self, pucks: list[MotorPuck]) -> None:
+        """Latch the positions of `pucks` and hand them to the wire."""
+        counts = self._encoder_counts()
+        for puck in pucks:
+            if puck.power is Power.AWAKE and not puck.is_mute:
+                position = encode_position(counts[puck.node - 1] + puck.offset)
+                self._schedule.emit(position_reply_id(puck.node), position)
+                self._on_position()
+
+    def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
+        name = puck.name_of(number)
+        if name == "STAT":
+            self._restart(puck, value)
+        elif puck.power is Power.MONITOR or name is None or name in READ_ONLY:
+            return
+        elif name == "P":
+            puck.offset = value - self._encoder_counts()[puck.node - 1]
+        elif name == "T":
+            puck.take_torque(value)
+            self._apply()
+        else:
+            puck.properties[name] = value
+            self._members.clear()
+            if name == "MODE":
+                puck.torque = 0
+                self._apply()
+
+    def _restart(self, puck: MotorPuck, stat: int) -> None:
+        """Obey SET STAT: wake a sleeping puck, reset a running one."""
+        if stat == Stat.READY and puck.power is Power.MONITOR:
+            delay_ns, power = self._options.boot_ns, Power.AWAKE
+        elif stat == Stat.RESET and puck.power is Power.AWAKE:
+            delay_ns, power = self._options.reset_ns, Power.MONITOR
+        else:
+            return
+        puck.restart(Power.SILENT)
+        epoch = puck.epoch
+
+        def finish() -> None:
+            if puck.epoch == epoch:
+                puck.restart(power)
+                self._lose_positions([puck])
+                self._members.clear()
+
+        self._schedule.after(delay_ns, finish)
+        self._members.clear()
+        self._apply()
+
+    def _set_puck_modes(self) -> None:
+        for puck in self._pucks:
+            if puck.power is Power.AWAKE:
+                puck.properties["MODE"] = puck_mode_in(self._mode)
+            puck.torque = 0
+        self._apply()
+
+    def _apply(self) -> None:
+        """Hand the torques and brakes as they are now to the motors."""
+        self._motors.advance(self._schedule.now_ns)
+        is_driven = any(puck.is_driven for puck in self._pucks)
+        is_powered = self._mode is not SafetyMode.E_STOP
+        self._motors.set_braking(is_powered and not is_driven, is_powered)
+        self._motors.set_torques([puck.torque for puck in self._pucks])
+
+    def _encoder_counts(self) -> Sequence[int]:
+        self._motors.advance(self._schedule.now_ns)
+        return self._motors.counts()
+
+    def _lose_positions(self, pucks: list[MotorPuck]) -> None:
+        counts = self._encoder_counts()
+        for puck in pucks:
+            puck.lose_position(counts[puck.node - 1])
+
+    def _group(self, group: int) -> list[MotorPuck]:
+        if group not in self._members:
+            self._members[group] = [p for p in self._pucks if p.hears(group)]
+        return self._members[group]

@@ -1,0 +1,228 @@
+"""The whole simulated rig: arm, pucks, sensor, ground and hand, and its handle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.messages import TRUTH
+from acquisition.sample import Record
+from fakes.can_bus import FakeCanBus
+from fakes.ft_streams import BotaOptions, BotaStream
+from fakes.hand import Pace
+from fakes.network_options import NetworkOptions
+from fakes.plant import CYCLE_NS, ArmPlant, PlantOptions, Truth
+from fakes.pucks import PuckNetwork
+from fakes.randomness import trial_generator
+from fakes.safety_module import PendantAction
+from fakes.sensor_errors import SensorErrors
+from fakes.serial_port import FakeSerialPort
+from fakes.terrain import make_terrain
+from ft_sensor.payload import TerrainFrame
+from wam.constants import ArmConstants, Array
+from wam.model import ArmModel
+from wam.tool import Tool
+
+_START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What stands on the laboratory floor.
+
+    Attributes:
+        terrain: its name, e.g. "S10".
+        stones: "small", "big" or "none".
+        foot: "tread" or "bare".
+        frame: where the container is.
+        start_q: joint positions with the foot at the far end [rad], shape (7,).
+        seed: of everything random.
+    """
+
+    terrain: str
+    stones: str
+    foot: str
+    frame: TerrainFrame
+    start_q: Array
+    seed: int
+
+
+def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
+    """Return joint positions near `q` with the sole `height` [m] above the far end.
+
+    The sole is parallel to the ground. Newton's method on joints 2, 4 and 6.
+    """
+    axes = frame.axes()
+    goal = np.array(frame.far_end) + height * axes[2]
+    q = q.copy()
+    joints = [1, 3, 5]
+    for _ in range(20):
+        position, rotation = model.sole_pose(q)
+        error = axes @ (goal - position)
+        turn = np.cross(rotation[:, 2], -axes[2]) @ axes[1]
+        J = model.sole_jacobian(q)[:, joints]
+        rows = np.vstack([axes[[0, 2]] @ J[:3], axes[1] @ J[3:]])
+        q[joints] += np.linalg.solve(rows, np.array([error[0], error[2], turn]))
+    return q
+
+
+class FakeRig:
+    """Simulated devices joined by one plant; a World for the stepped clock."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        constants: ArmConstants,
+        tool: Tool,
+        clock: Clock,
+        options: PlantOptions | None = None,
+    ) -> None:
+        self.scene = scene
+        self._clock = clock
+        model = ArmModel(constants, tool)
+        q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
+        self.plant = ArmPlant(constants, tool, scene.frame, q, options)
+        self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
+        self.network = PuckNetwork(
+            self.plant,
+            NetworkOptions(safety_mode=SafetyMode.IDLE, mt=constants.mt),
+            clock.now_ns(),
+        )
+        self.bus = FakeCanBus(self.network, clock)
+        rng = trial_generator(scene.seed, scene.terrain, 0)
+        self.errors = SensorErrors(rng)
+        self.stream = BotaStream(
+            self.plant.sensor_load,
+            self.errors,
+            BotaOptions(is_running=True, sinc=64, clock_error_ppm=20.0),
+            clock.now_ns(),
+        )
+        self._port: FakeSerialPort | None = None
+        self._lay(rng)
+
+    def open_port(self) -> FakeSerialPort:
+        """Return the sensor's serial port, opened now."""
+        self._port = FakeSerialPort(self.stream, self._clock)
+        return self._port
+
+    def advance(self, t_ns: int) -> None:
+        """Let every device go on to `t_ns`."""
+        self.bus.advance(t_ns)
+        if self._port is not None:
+            self._port.advance(t_ns)
+        self.plant.advance(t_ns)
+
+    def next_event_ns(self) -> int | None:
+        """Return when a frame or byte arrives next."""
+        times = [self.bus.next_event_ns()]
+        if self._port is not None:
+            times.append(self._port.next_event_ns())
+        return min((t for t in times if t is not None), default=None)
+
+    def rake(self, trial: int) -> None:
+        """Rake the bed for `trial`: everything random starts anew."""
+        self.rng = trial_generator(self.scene.seed, self.scene.terrain, trial)
+        self._lay(self.rng)
+
+    def _lay(self, rng: np.random.Generator) -> None:
+        scene = self.scene
+        self.rng = rng
+        self.ground = make_terrain(scene.stones, scene.foot, scene.frame.incline, rng)
+        self.plant.terrain = self.ground
+
+
+class Rehearsal:
+    """What only the simulation can be asked: hand, pendant, bed, faults, truth.
+
+    The drivers never see it; experiments.rigs owns it.
+    """
+
+    def __init__(self, rig: FakeRig, pace: Pace | None = None) -> None:
+        self._rig = rig
+        self._pace = pace or Pace()
+        self._faults: dict[str, Callable[[], None]] = {
+            "ft-silent": rig.stream.go_silent,
+            "ft-stale": rig.stream.go_silent,
+            "puck-missing": lambda: rig.network.silence(5),
+            "can-silence": self._silence_all,
+            "estop": lambda: rig.network.pendant("estop"),
+        }
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """Names that `inject` knows."""
+        return tuple(self._faults)
+
+    def prepare(self, trial: int) -> None:
+        """Rake the bed for `trial` and begin to write the truth."""
+        self._rig.rake(trial)
+
+    def lift(self) -> None:
+        """Let the hand carry the foot above the far end and hold it still."""
+        self._rig.plant.hand.lift_to_start()
+
+    def put_down(self) -> None:
+        """Let the hand put the foot down at the far end."""
+        self._rig.plant.hand.put_down(self._rig.ground.surface(0.0))
+
+    def push(self) -> None:
+        """Let the hand push the foot across; the tare error of a trial begins here."""
+        rig = self._rig
+        rig.errors.new_trial(rig.rng)
+        rig.plant.hand.push(self._pace, rig.rng)
+        rig.plant.start_truth()
+
+    def is_hand_done(self) -> bool:
+        """Return whether the hand has done what it was told."""
+        return self._rig.plant.hand.is_done
+
+    def pendant(self, button: PendantAction) -> None:
+        """Press the pendant: "activate", "idle" or "estop"."""
+        self._rig.network.pendant(button)
+
+    def inject(self, fault: str) -> None:
+        """Let a device fail; `fault` is one of `fault_names`."""
+        self._faults[fault]()
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        self._rig.stream.speak()
+        for node in range(1, 8):
+            self._rig.network.silence(node, is_mute=False)
+
+    def take_truth(self) -> Record:
+        """Return traction_msgs/Truth records since the push began."""
+        return _truth_records(self._rig.plant.take_truth(), self._rig.scene.frame)
+
+    def parameters(self) -> dict[str, str]:
+        """Return the true parameters of the ground as strings."""
+        values = self._rig.ground.truth()
+        return {name: f"{value:.9g}" for name, value in values.items()}
+
+    def _silence_all(self) -> None:
+        for node in range(1, 8):
+            self._rig.network.silence(node)
+
+
+def _truth_records(truth: Truth, frame: TerrainFrame) -> Record:
+    """Return `truth` in the layout of traction_msgs/Truth, base frame."""
+    count = len(truth.t_ns)
+    buffer = bytearray(TRUTH.template * count)
+    records: Record = np.frombuffer(buffer, TRUTH.dtype)
+    if not count:
+        return records
+    axes = frame.axes()
+    contact = np.array(truth.contact)
+    velocity = np.array(truth.velocity)
+    in_terrain = contact * [-1.0, 1.0, 1.0]
+    records["host_ns"] = truth.t_ns
+    records["position"] = truth.q
+    records["sole_position"] = np.array(truth.sole) @ axes + np.array(frame.far_end)
+    records["contact_force"] = in_terrain @ axes
+    records["hand_force"] = np.array(truth.hand) @ axes
+    records["traction"] = np.column_stack(
+        [velocity[:, 0], contact[:, 0], contact[:, 2]]
+    )
+    return records

@@ -1,0 +1,158 @@
+"""The simulated safety module: mode, pendant, and what it watches.
+
+Neither the heartbeat's limit nor the content of the broadcast is known outside Barrett:
+the one is an option, the other the mode that the pucks go to.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+from acquisition.devices import SafetyMode
+from fakes.network_options import NetworkOptions
+from fakes.schedule import Schedule
+from wam.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
+from wam.pucks import Device, PuckMode, Role, Stat, names
+from wam.safety import MONITORS, Button, Level, PendantWord, encode_pendant
+
+PendantAction = Literal["activate", "idle", "estop"]
+TORQUE_GROUPS = (Group.LOWER_TORQUE, Group.WRIST_TORQUE)
+_MODE = 8  # number of the property in every firmware
+_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
+_READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "STAT"))
+_POWER_UP_LIMITS = {"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204}
+_ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
+
+
+def puck_mode_in(mode: SafetyMode) -> PuckMode:
+    """Return the mode that the module sends the pucks to in its own `mode`."""
+    return PuckMode.TORQUE if mode is SafetyMode.ACTIVE else PuckMode.IDLE
+
+
+class FakeSafetyModule:
+    """State of the safety module, which answers hosts and watches their traffic.
+
+    `on_change(before)` is called when the mode has changed.
+
+    Attributes:
+        mode: the true mode.
+        is_mute: its transmit wire is cut.
+    """
+
+    def __init__(
+        self,
+        options: NetworkOptions,
+        schedule: Schedule,
+        on_change: Callable[[SafetyMode], None],
+    ) -> None:
+        self.mode = options.safety_mode
+        self.is_mute = False
+        self._options = options
+        self._schedule = schedule
+        self._on_change = on_change
+        self._last_position_ns = schedule.now_ns
+        self._levels: dict[str, Level] = dict.fromkeys(MONITORS, Level.SAFE)
+        if not options.has_power:
+            self._levels["other"] = Level.FAULT
+        self._largest_command: dict[Group, int] = dict.fromkeys(TORQUE_GROUPS, 0)
+        self._properties = {
+            **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
+            **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0, "STAT": int(Stat.READY)},
+            **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
+            **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57, "VNOM": 48},
+            **{"ZERO": int(options.has_positions), **_POWER_UP_LIMITS},
+        }
+
+    @property
+    def pendant_word(self) -> PendantWord:
+        """What the pendant shows."""
+        is_stopped = self.mode is SafetyMode.E_STOP
+        return PendantWord(
+            **self._levels,
+            segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
+            is_idle_lit=self.mode is SafetyMode.IDLE,
+            is_active_lit=self.mode is SafetyMode.ACTIVE,
+            button=Button.E_STOP if is_stopped else Button.NONE,
+        )
+
+    def press(self, action: PendantAction) -> None:
+        """Press a button of the pendant."""
+        if action == "estop":
+            self._levels["other"] = Level.FAULT
+            self._enter(SafetyMode.E_STOP)
+        elif action == "idle":
+            self._levels = dict.fromkeys(self._levels, Level.SAFE)
+            self._enter(SafetyMode.IDLE)
+            self._judge_torque()
+        elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
+            self._enter(SafetyMode.ACTIVE)
+
+    def receive(self, request: Property) -> None:
+        """Take a GET or SET sent to the module."""
+        number = request.number
+        name = names(Device.SAFETY, self._options.safety_vers).get(number)
+        if request.value is not None:
+            self._tell(name, request.value)
+        elif name is not None:
+            self._schedule.after(
+                self._options.latch_ns, lambda: self._answer(number, name)
+            )
+
+    def hear_position(self) -> None:
+        """Note a position on the bus: the heartbeat of the arm."""
+        self._last_position_ns = self._schedule.now_ns
+
+    def hear_torques(self, group: Group, units: Sequence[int]) -> None:
+        """Judge a torque command as it stands on the bus, before a puck clips it."""
+        self._largest_command[group] = max(map(abs, units))
+        self._judge_torque()
+
+    def beat_due_ns(self) -> int | None:
+        """Return when the next position is missed, None unless ACTIVE."""
+        if self.mode is not SafetyMode.ACTIVE:
+            return None
+        return self._last_position_ns + self._options.heartbeat_ns
+
+    def miss_beat(self) -> None:
+        """Fault the arm: nobody has asked for positions in time."""
+        self._fault("heartbeat")
+
+    def _answer(self, number: int, name: str) -> None:
+        computed = {"MODE": int(self.mode), "PEN": encode_pendant(self.pendant_word)}
+        value = computed.get(name, self._properties.get(name))
+        if value is not None and not self.is_mute:
+            self._schedule.reply(SAFETY_NODE, number, name, value)
+
+    def _tell(self, name: str | None, value: int) -> None:
+        if name == "MODE":
+            if 0 <= value < self.mode:  # a host can lower the mode only
+                self._enter(SafetyMode(value))
+        elif name in ("DEF", "LOAD"):
+            limit = names(Device.SAFETY, self._options.safety_vers).get(value)
+            if limit in _POWER_UP_LIMITS:
+                self._properties[limit] = _POWER_UP_LIMITS[limit]
+        elif name in self._properties and name not in _READ_ONLY:
+            self._properties[name] = value
+
+    def _judge_torque(self) -> None:
+        largest = max(self._largest_command.values())
+        if self.mode is SafetyMode.ACTIVE and largest > self._properties["TL2"]:
+            self._fault("torque")
+        elif self._levels["torque"] is not Level.FAULT:
+            is_high = largest > self._properties["TL1"]
+            self._levels["torque"] = Level.WARNING if is_high else Level.SAFE
+
+    def _fault(self, monitor: str) -> None:
+        """Note a fault until Shift-idle and stop the arm."""
+        self._levels[monitor] = Level.FAULT
+        self._enter(SafetyMode.IDLE)
+
+    def _enter(self, mode: SafetyMode) -> None:
+        if mode is self.mode:
+            return
+        before, self.mode = self.mode, mode
+        if mode is SafetyMode.E_STOP:
+            self._properties["ZERO"] = 0
+        self._last_position_ns = self._schedule.now_ns
+        told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
+        self._schedule.emit(_BROADCAST_ID, told)
+        self._on_change(before)

@@ -1,0 +1,217 @@
+"""The start-up of a WAM: who is on the bus, is it healthy, is it the right arm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import DeviceFaultError, PreflightError
+from wam.dialogue import Dialogue
+from wam.frames import MOTOR_NODES, SAFETY_NODE, Group
+from wam.pucks import (
+    POLES_OF_GIMBALS,
+    POLES_OF_WRIST,
+    Device,
+    PuckMode,
+    Stat,
+    device_of,
+    property_number,
+)
+from wam.safety import SafetyModule
+
+_VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
+_MS = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class PuckInfo:
+    """What one motor puck said about itself at start-up.
+
+    Attributes:
+        node: puck number, 1 to 7.
+        vers: firmware revision.
+        role: type in the low five bits, options above.
+        cts: encoder counts per motor turn.
+        ipnm: torque units per N m at the motor.
+        was_asleep: the puck had to be woken.
+    """
+
+    node: int
+    vers: int
+    role: int
+    cts: int
+    ipnm: int
+    was_asleep: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ArmInfo:
+    """The arm as found at start-up.
+
+    Attributes:
+        pucks: the seven motor pucks.
+        nodes: every node that answered.
+        safety_vers: firmware of the safety module.
+        safety_mode: its mode at the end of start-up.
+        is_zeroed: positions have been defined since power-up.
+        late_replies: replies that came after their question was given up.
+    """
+
+    pucks: tuple[PuckInfo, ...]
+    nodes: tuple[int, ...]
+    safety_vers: int
+    safety_mode: SafetyMode
+    is_zeroed: bool
+    late_replies: int
+
+
+class StartUp:
+    """The questions to a WAM before it is driven.
+
+    It follows libbarrett's start-up, without its waits for a person. `boot_ns` is the
+    silence kept while pucks boot [ns].
+    """
+
+    def __init__(self, dialogue: Dialogue, clock: Clock, boot_ns: int) -> None:
+        self._dialogue = dialogue
+        self._clock = clock
+        self._boot_ns = boot_ns
+
+    def run(self) -> ArmInfo:
+        """Return what is there, awake and idle.
+
+        Raises:
+            PreflightError: a puck or the safety module is missing, in E-stop, asleep
+                for good, or of another kind.
+            DeviceFaultError: a device reports an error or nonsense.
+            LinkTimeoutError: a device stopped answering on the way.
+            LinkError: the bus is down.
+        """
+        stats = self._enumerate()
+        safety = self._find_safety(stats)
+        mode = safety.mode()
+        _check_present(stats, mode)
+        asleep = [node for node, stat in stats.items() if stat == Stat.RESET]
+        self._wake(asleep)
+        pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
+        _check_same_numbers(pucks)
+        self._check_wrist(pucks[-1])
+        if mode is not SafetyMode.ACTIVE:
+            self._dialogue.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
+        return ArmInfo(
+            pucks=pucks,
+            nodes=tuple(stats),
+            safety_vers=self._dialogue.require(SAFETY_NODE, _VERS, "VERS"),
+            safety_mode=safety.mode(),
+            is_zeroed=safety.is_zeroed(),
+            late_replies=self._dialogue.late_replies,
+        )
+
+    def _enumerate(self) -> dict[int, int]:
+        """Return STAT by node of everything that answers within 1 ms."""
+        found: dict[int, int] = {}
+        for node in range(1, 32):
+            stat = self._dialogue.ask(node, _STAT, _MS)
+            if stat is not None:
+                found[node] = stat
+        return found
+
+    def _find_safety(self, stats: dict[int, int]) -> SafetyModule:
+        if SAFETY_NODE not in stats:
+            others = ",".join(map(str, stats)) or "nobody"
+            raise PreflightError(
+                f"The safety module does not answer ({others} on the bus).",
+                hint="Check the arm's power, the CAN cable and its terminators.",
+            )
+        vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
+        return SafetyModule(self._dialogue, self._clock, vers)
+
+    def _wake(self, asleep: list[int]) -> None:
+        """Wake nodes, keep silent while they boot, and see that they are there.
+
+        A transceiver that comes up while others talk can push a host off the bus.
+        """
+        if not asleep:
+            return
+        for node in asleep:
+            self._dialogue.tell(node, _STAT, Stat.READY)
+            self._dialogue.pause(10 * _MS)
+        self._dialogue.pause(self._boot_ns)
+        stats = {node: self._dialogue.ask(node, _STAT) for node in asleep}
+        dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != Stat.READY]
+        if dozing:
+            raise PreflightError(
+                f"{pucks_do(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
+                hint="Switch the arm off and on, then start again.",
+            )
+
+    def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
+        # Asleep, VERS is the monitor's; only now does it select the right table.
+        vers = self._dialogue.require(node, _VERS, "VERS")
+        role = self._dialogue.require(node, _ROLE, "ROLE")
+        if device_of(role) is not Device.MOTOR:
+            raise PreflightError(
+                f"Node {node} is not a motor puck (ROLE {role:#06x}).",
+                hint="Is this a seven-joint WAM?",
+            )
+        cts, ipnm = self._get(node, "CTS", vers), self._get(node, "IPNM", vers)
+        if cts <= 0 or ipnm <= 0:
+            raise DeviceFaultError(
+                f"Puck {node} reports CTS {cts}, IPNM {ipnm}; both must be positive.",
+                hint="The puck has lost its configuration; see Barrett's manual.",
+            )
+        return PuckInfo(node, vers, role, cts, ipnm, was_asleep)
+
+    def _check_wrist(self, puck: PuckInfo) -> None:
+        poles = self._get(puck.node, "POLES", puck.vers)
+        if poles != POLES_OF_WRIST:
+            kind = "gimbals" if poles == POLES_OF_GIMBALS else "something unknown"
+            raise PreflightError(
+                f"Puck 7 has {poles} poles: {kind}, a wrist has {POLES_OF_WRIST}.",
+                hint="Traction drives the seven-joint WAM with wrist only.",
+            )
+
+    def _get(self, node: int, name: str, vers: int) -> int:
+        number = property_number(Device.MOTOR, name, vers)
+        return self._dialogue.require(node, number, name)
+
+
+def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
+    """Raise PreflightError or DeviceFaultError unless seven healthy pucks answer."""
+    present = [node for node in MOTOR_NODES if node in stats]
+    missing = [node for node in MOTOR_NODES if node not in stats]
+    if missing and mode is SafetyMode.E_STOP:
+        raise PreflightError(
+            "The arm is in E-stop: its pucks have no power.",
+            hint="Release the stop, press Shift-idle, then start again.",
+        )
+    if missing:
+        others = f"{','.join(map(str, present))} do" if present else "none does"
+        raise PreflightError(
+            f"{pucks_do(missing)} not answer ({others}).",
+            hint="Check its cable or a puck in reset.",
+        )
+    ill = [n for n in present if stats[n] not in (Stat.RESET, Stat.READY)]
+    if ill:
+        raise DeviceFaultError(
+            f"{pucks_do(ill)} not work: STAT {stats[ill[0]]}.",
+            hint="Switch the arm off and on, then start again.",
+        )
+
+
+def _check_same_numbers(pucks: tuple[PuckInfo, ...]) -> None:
+    """Raise PreflightError when one group frame would not mean the same to all."""
+    for name in ("P", "T"):
+        found = {property_number(Device.MOTOR, name, p.vers) for p in pucks}
+        if len(found) > 1:
+            versions = ",".join(str(p.vers) for p in pucks)
+            raise PreflightError(
+                f"The pucks disagree on the number of {name} (firmware {versions}).",
+                hint="Bring all pucks to the same firmware.",
+            )
+
+
+def pucks_do(nodes: Sequence[int]) -> str:
+    """Return "Puck 5 does" or "Pucks 5,6 do"."""
+    names = ",".join(map(str, nodes))
+    return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"
