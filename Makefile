@@ -16,6 +16,17 @@ $(STAMP): pyproject.toml constraints.txt
 test: $(STAMP)  ## set up, then run every test of the default suite
 	$(BIN)/python -m pytest
 
+demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
+	rm -rf demo
+	@echo "Two simulated sessions side by side, ten trials each; their logs: demo/*.log"
+	@mkdir -p demo
+	@$(BIN)/traction run S0 --fake --fast --data demo > demo/S0.log 2>&1 & first=$$!; \
+	  $(BIN)/traction run TF --fake --fast --data demo > demo/TF.log 2>&1 & second=$$!; \
+	  wait $$first || { cat demo/S0.log; exit 1; }; \
+	  wait $$second || { cat demo/TF.log; exit 1; }
+	$(BIN)/traction status --data demo
+	$(BIN)/traction report --all --data demo
+
 lint: $(STAMP)  ## ruff: lint and format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
