@@ -142,11 +142,11 @@ def check(
         _check_trial(limits, seen),
         _check_cadence(limits, state, now),
     )
-    return state, max(verdicts, key=_severity)  # of equals, max takes the first
-
-
-def _severity(verdict: Verdict) -> int:
-    return _SEVERITY[verdict.action]
+    worst = OK
+    for verdict in verdicts:
+        if verdict is not OK and verdict.severity > worst.severity:
+            worst = verdict
+    return state, worst
 
 
 def _remember(
@@ -190,8 +190,9 @@ def _check_silence(limits: Limits, seen: Observation) -> Verdict:
 
 def _check_numbers(seen: Observation) -> Verdict:
     reading = seen.reading
-    total = float(reading.q.sum() + reading.qd.sum() + seen.tau.sum())
-    total += seen.foot_speed + seen.joint7_offset
+    q, qd, tau = reading.q, reading.qd, seen.tau
+    total = float(q @ q + qd @ qd + tau @ tau)  # squares: infinities cannot cancel
+    total += abs(seen.foot_speed) + abs(seen.joint7_offset)
     if total - total != 0.0:  # NaN or infinite
         return Verdict(Action.IDLE, "not-a-number")
     return OK

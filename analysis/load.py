@@ -22,6 +22,8 @@ from wam.model import ArmModel
 from wam.tool import Tool
 
 Array = NDArray[np.float64]
+_LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
+_LONGEST_NUMBER = 20  # digits of 64 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,17 +93,19 @@ def load_trial(path: Path) -> RecordedTrial:
         TrialFileError: the file is not a sound trial, or lacks its calibration.
     """
     reader = TrialReader(path)
+    _check_metadata(reader)
     cycles = reader.cycles().data
-    if len(cycles) < 3:
-        raise TrialFileError(path, f"holds only {len(cycles)} cycles")
+    _check_cycles(path, cycles)
     try:
         payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
         terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
         constants = load_constants(_text(reader, "arm_model.toml"))
+        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        model = ArmModel(constants, Tool(nothing, nothing, sole_point))
     except SettingsError as error:
         raise TrialFileError(path, error.message.rstrip(".")) from error
-    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
-    model = ArmModel(constants, Tool(nothing, nothing, sole_point))
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        raise TrialFileError(path, f"has an impossible arm model ({error})") from error
     t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
     path_of_sole = model.sole_path(np.ascontiguousarray(cycles["position"]))
     velocity = foot_velocity(t, path_of_sole.position)
@@ -109,7 +113,7 @@ def load_trial(path: Path) -> RecordedTrial:
     contact = payload.contact(raw, path_of_sole.rotation)
     force = payload.to_base(contact, path_of_sole.rotation)
     axes = frame.axes()
-    return RecordedTrial(
+    trial = RecordedTrial(
         path=path,
         metadata=reader.metadata,
         terrain=terrain,
@@ -123,6 +127,35 @@ def load_trial(path: Path) -> RecordedTrial:
         frame=frame,
         payload=payload,
     )
+    try:
+        trial.series()
+    except SettingsError as error:
+        raise TrialFileError(path, f"is of no use ({error.message})") from error
+    return trial
+
+
+def _check_metadata(reader: TrialReader) -> None:
+    """Refuse a file that lacks what the report says about every trial."""
+    for section, key in (("clock", "utc_offset_ns"), ("result", "cycles_missed")):
+        value = reader.metadata.get(section, {}).get(key, "")
+        if not value.removeprefix("-").isdecimal() or len(value) > _LONGEST_NUMBER:
+            raise TrialFileError(
+                reader.path,
+                f"has no number {section}.{key} in its metadata",
+                hint="Was the recording ended properly?",
+            )
+    if "provenance" not in reader.metadata:
+        raise TrialFileError(reader.path, "lacks metadata provenance")
+
+
+def _check_cycles(path: Path, cycles: Record) -> None:
+    """Refuse records that no arm can have produced."""
+    if len(cycles) < 3:
+        raise TrialFileError(path, f"holds only {len(cycles)} cycles")
+    if not bool((cycles["host_ns"][1:] > cycles["host_ns"][:-1]).all()):
+        raise TrialFileError(path, "has cycles out of order")
+    if not bool((np.abs(cycles["position"]) < _LARGEST_ANGLE).all()):
+        raise TrialFileError(path, "has joint positions that no arm can reach")
 
 
 def _text(reader: TrialReader, name: str) -> str:

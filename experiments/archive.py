@@ -8,7 +8,7 @@ from acquisition.recorder import seal
 from acquisition.trial_file.verify import Verified
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from experiments.rigs import Rig
-from experiments.store import iso_utc, write_json
+from experiments.store import iso_utc, move_file, write_json
 from experiments.trial import SessionFacts, TrialName, write_flight, write_truth
 
 COMPLETE = frozenset({"travel", "key", "time-limit"})
@@ -101,5 +101,5 @@ class Archive:
         for suffix in (".mcap", ".truth.mcap"):
             source = folder.trials / f"{name.kept}{suffix}"
             if source.exists():
-                source.rename(folder.rejected / f"{name.rejected}{suffix}")
+                move_file(source, folder.rejected / f"{name.rejected}{suffix}")
         write_json(folder.rejected / f"{name.rejected}.json", sidecar)

@@ -80,7 +80,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         return 0
+    except Exception:
+        return _report_bug()
     return int(code)
+
+
+def _report_bug() -> int:
+    """Write the traceback to a log and say where it is."""
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="traction-bug-", suffix=".log", delete=False
+    ) as log:
+        log.write(traceback.format_exc())
+    print(  # noqa: T201
+        f"Bug: {sys.exc_info()[1]!r}. The arm is idle if one was connected. "
+        f"Log: {log.name}. What was recorded is safe.",
+        file=sys.stderr,
+    )
+    return 1
 
 
 def _version() -> str:

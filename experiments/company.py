@@ -1,11 +1,14 @@
 """Who takes part in a session beside the rig, and how they end it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from acquisition.clock import NS_PER_S, Clock, SystemClock
 from acquisition.guard import Verdict
 from experiments.console import Console
 from experiments.faults import FaultPlan
 from experiments.operator import Keys, RehearsedHand
+
+TWICE_NS = 3 * NS_PER_S  # two requests closer than this mean: now
 
 
 class StopAskedError(Exception):
@@ -26,13 +29,25 @@ class FaultedError(Exception):
 
 @dataclass(slots=True)
 class StopFlag:
-    """How often a stop was asked for; set by signal handlers, read every tick."""
+    """How often a stop was asked for; set by signal handlers, read every tick.
 
+    Attributes:
+        clock: the person's time, which is never the simulated one.
+        count: how often.
+        is_urgent: twice within 3 s: the arm first, whatever is still being finished.
+    """
+
+    clock: Clock = field(default_factory=SystemClock)
     count: int = 0
+    is_urgent: bool = False
+    _asked_ns: int = 0
 
     def ask(self, *_: object) -> None:
         """Ask once more."""
+        now = self.clock.now_ns()
+        self.is_urgent |= self.count > 0 and now - self._asked_ns <= TWICE_NS
         self.count += 1
+        self._asked_ns = now
 
 
 @dataclass(slots=True)

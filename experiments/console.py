@@ -1,5 +1,7 @@
 """What is said to the person: the one place that prints."""
 
+import io
+import os
 import sys
 from collections.abc import Sequence
 
@@ -7,14 +9,28 @@ GOOD, WARNING, BAD = "✔", "▲", "✘"
 
 
 class Console:
-    """Prints plain lines; the same without a terminal."""
+    """Prints plain lines; the same without a terminal.
+
+    Attributes:
+        is_lost: nobody reads any more: the other end of the pipe was closed.
+    """
 
     def __init__(self, *, color: bool = True) -> None:
+        self.is_lost = False
         self._color = color and sys.stdout.isatty()
+        for stream in (sys.stdout, sys.stderr):
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")  # a sign is worth no crash
 
     def say(self, text: str = "") -> None:
-        """Print one line."""
-        print(text, flush=True)
+        """Print one line; a closed pipe is remembered, never raised."""
+        if self.is_lost:
+            return
+        try:
+            print(text, flush=True)
+        except BrokenPipeError:
+            self.is_lost = True
+            _discard_output()
 
     def check(self, mark: str, name: str, text: str) -> None:
         """Print one line of a graded page."""
@@ -35,3 +51,10 @@ class Console:
         RichConsole(no_color=not self._color, highlight=False, markup=False).print(
             table
         )
+
+
+def _discard_output() -> None:
+    """Point stdout at nothing, or Python would fail again when it flushes at exit."""
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, sys.stdout.fileno())
+    os.close(nothing)

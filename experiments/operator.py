@@ -22,6 +22,10 @@ REJECT_REASONS = {
 }
 
 
+AUTO_ATTEMPTS = 8  # at one trial, before the automatic operator gives up
+AUTO_PATIENCE = 60.0  # for a foot that is never lifted and still [s]
+
+
 class Prompt(Enum):
     """What the person is asked for."""
 
@@ -60,16 +64,23 @@ class Keys(Protocol):
 
 
 class AutoKeys:
-    """Presses the obvious key: space when ready, keep what is complete."""
+    """Presses the obvious key: space when ready, keep what is complete.
+
+    It gives up where a person would: a rehearsal must come to an end.
+    """
 
     def answer(self, asked: Asked) -> str:
         """Return a key as soon as it makes sense."""
         if asked.prompt is Prompt.SUPPORT:
             return " "
+        if asked.prompt is Prompt.LIFT:
+            return "q" if asked.since > AUTO_PATIENCE else ""
         if asked.prompt is Prompt.READY:
             return " " if asked.since > 2.2 else ""
         if asked.prompt is Prompt.REVIEW:
-            return "k" if asked.is_complete else "r5"
+            if asked.is_complete:
+                return "k"
+            return "r5" if asked.attempt < AUTO_ATTEMPTS else "q"
         return ""
 
 
@@ -165,11 +176,12 @@ def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
     Raises:
         SettingsError: a real session without a terminal, or a bad script.
     """
-    if script == "auto" or (script is None and is_fake and not sys.stdin.isatty()):
+    has_person = sys.stdin is not None and sys.stdin.isatty()
+    if script == "auto" or (script is None and is_fake and not has_person):
         return AutoKeys()
     if script is not None:
         return ScriptKeys(Path(script))
-    if not sys.stdin.isatty():
+    if not has_person:
         raise SettingsError(
             "A real session needs a person at a terminal, and there is none.",
             hint="Run it in a terminal, or add --fake. Nothing was started.",

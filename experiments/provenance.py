@@ -43,12 +43,11 @@ def _git() -> tuple[str, str]:
         return "unknown", ""
 
     def ask(*words: str) -> str:
-        done = subprocess.run(
-            [git, "-C", str(folder), *words],
-            capture_output=True,
-            check=False,
-            timeout=10,
-        )
+        command = [git, "-C", str(folder), *words]
+        try:
+            done = subprocess.run(command, capture_output=True, check=False, timeout=10)
+        except (OSError, subprocess.TimeoutExpired):
+            return ""
         return done.stdout.decode(errors="replace") if done.returncode == 0 else ""
 
     return ask("rev-parse", "HEAD").strip() or "unknown", ask("diff", "HEAD")

@@ -1,20 +1,32 @@
 """From sessions to a report: which trials, what is said about them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-
-import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
-from acquisition.trial_file.reader import TrialReader
 from analysis.load import RecordedTrial, load_trial
 from analysis.models import FitOptions
 from analysis.prepare import PrepareOptions
-from analysis.report import ReportContext, ReportTable, write_report
+from analysis.report import ReportContext, write_report
 from analysis.study import StudyOptions, run_study
 from experiments.console import Console
+from experiments.report_tables import report_tables
 from experiments.store import SessionFolder, find_session, iso_utc, list_sessions
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """How a report is laid out: terrains in the matrix's order, seed of the points."""
+
+    terrains: Sequence[str]
+    seed: int
+
+    def sorted(self, names: Iterable[str]) -> list[str]:
+        """Return `names` in the matrix's order, others last by name."""
+        place = {name: i for i, name in enumerate(self.terrains)}
+        return sorted(names, key=lambda name: (place.get(name, len(place)), name))
 
 
 def choose_sessions(
@@ -49,7 +61,7 @@ def choose_sessions(
 
 
 def report_sessions(
-    sessions: Sequence[SessionFolder], data: Path, seed: int, console: Console
+    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
 ) -> Path:
     """Load the kept trials, fit, and write the report; return the page.
 
@@ -60,7 +72,7 @@ def report_sessions(
     """
     trials: dict[str, list[RecordedTrial]] = {}
     problems: list[str] = []
-    for session in sessions:
+    for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
             try:
                 trial = load_trial(path)
@@ -68,24 +80,25 @@ def report_sessions(
                 problems.append(str(error))
                 console.say(f"▲ left out: {error}")
                 continue
+            if trial.is_simulated is not session.is_simulated:
+                raise SessionError(
+                    f"{path.name} of {session.id} is "
+                    f"{'' if trial.is_simulated else 'not '}simulated, its folder says "
+                    "otherwise. Reports do not mix.",
+                    hint="Put the file back where it came from.",
+                )
             trials.setdefault(trial.terrain, []).append(trial)
     count = sum(len(group) for group in trials.values())
     if not count:
         raise SessionError(
             f"{', '.join(s.id for s in sessions)}: no kept trials to report."
         )
-    for group in trials.values():
-        group.sort(
-            key=lambda trial: (
-                int(trial.metadata["clock"]["utc_offset_ns"])
-                + int(trial.cycles["host_ns"][0])
-            )
-        )
+    trials = {name: trials[name] for name in order.sorted(trials)}
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     is_simulated = sessions[0].is_simulated
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
-        prepare=PrepareOptions(container_travel=travel), fit=FitOptions(seed=seed)
+        prepare=PrepareOptions(container_travel=travel), fit=FitOptions(seed=order.seed)
     )
     series = {name: [t.series() for t in group] for name, group in trials.items()}
     study = run_study(series, options, simulated=is_simulated)
@@ -96,146 +109,7 @@ def report_sessions(
         is_simulated=is_simulated,
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
-        tables=_tables(sessions, trials),
+        tables=report_tables(sessions, trials),
         warnings=problems,
     )
     return write_report(study, out, context)
-
-
-def _tables(
-    sessions: Sequence[SessionFolder], trials: dict[str, list[RecordedTrial]]
-) -> list[ReportTable]:
-    every = [trial for group in trials.values() for trial in group]
-    tables = [_session_table(sessions), _rejected_table(sessions), _health(every)]
-    truth = _truth_table(every)
-    return [*tables, *([truth] if truth else []), _provenance(every)]
-
-
-def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
-    rows = [
-        (
-            s.id,
-            s.terrain,
-            s.path.name[:10],
-            str(len(s.kept_trials())),
-            str(len(s.rejected_sidecars())),
-        )
-        for s in sessions
-    ]
-    return ReportTable(
-        "Sessions", ("session", "terrain", "date", "kept", "rejected"), rows
-    )
-
-
-def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
-    rows = [
-        (
-            s.id,
-            f"{facts.get('trial', '?')} attempt {facts.get('attempt', '?')}",
-            str(facts.get("status", "")),
-            str(facts.get("reason", "")),
-            str(facts.get("who", "")),
-            str(facts.get("when", "")),
-        )
-        for s in sessions
-        for facts in s.rejected_sidecars()
-    ]
-    return ReportTable(
-        "Rejected and interrupted trials",
-        ("session", "trial", "status", "reason", "who", "when (UTC)"),
-        rows,
-        note="" if rows else "None: every recorded trial was kept.",
-    )
-
-
-def _health(trials: Sequence[RecordedTrial]) -> ReportTable:
-    rows: list[tuple[str, ...]] = []
-    for trial in trials:
-        gaps = np.diff(trial.t) * 1e3
-        q7 = trial.cycles["position"][:, 6]
-        age = (trial.cycles["host_ns"] - trial.cycles["ft_ns"]).astype(float) * 1e-6
-        moving = np.abs(trial.traction[:, 0]) > 0.005
-        ratio = np.abs(trial.lateral[moving]).mean() if moving.any() else np.nan
-        rows.append(
-            (
-                f"{trial.terrain} {trial.name}",
-                f"{np.median(gaps):.3f}",
-                f"{gaps.max():.2f}",
-                trial.metadata["result"]["cycles_missed"],
-                f"{np.median(age):.2f}",
-                f"{np.abs(q7 - q7[0]).max() * 1e3:.1f}",
-                f"{ratio:.2f}",
-            )
-        )
-    return ReportTable(
-        "Rig health",
-        (
-            "trial",
-            "period, median (ms)",
-            "longest gap (ms)",
-            "missed",
-            "F/T age, median (ms)",
-            "joint 7 (mrad)",
-            "mean |F_y| while moving (N)",
-        ),
-        rows,
-    )
-
-
-def _truth_table(trials: Sequence[RecordedTrial]) -> ReportTable | None:
-    """Return measured against true for simulated trials with a truth file."""
-    rows: list[tuple[str, ...]] = []
-    for trial in trials:
-        path = trial.path.with_name(trial.path.stem + ".truth.mcap")
-        if not path.exists():
-            continue
-        try:
-            truth = TrialReader(path).truth().data
-        except TrialFileError:
-            continue
-        t_true = truth["host_ns"].astype(float)
-        inside = (trial.cycles["host_ns"] >= truth["host_ns"][0]) & (
-            trial.cycles["host_ns"] <= truth["host_ns"][-1]
-        )
-        t = trial.cycles["host_ns"][inside].astype(float)
-        error = _smooth(trial.traction[inside]) - _smooth(
-            np.column_stack(
-                [np.interp(t, t_true, truth["traction"][:, k]) for k in range(3)]
-            )
-        )
-        v_t, F_t, F_n = (
-            np.sqrt(np.nanmean(error[:, 0] ** 2)),
-            *np.nanmean(np.abs(error[:, 1:]), axis=0),
-        )
-        rows.append(
-            (
-                f"{trial.terrain} {trial.name}",
-                f"{v_t * 1e3:.2f}",
-                f"{F_t:.2f}",
-                f"{F_n:.2f}",
-            )
-        )
-    if not rows:
-        return None
-    return ReportTable(
-        "Measured against true",
-        ("trial", "v_t, rms (mm/s)", "F_t, mean |error| (N)", "F_n, mean |error| (N)"),
-        rows,
-        note="Simulated trials only; after the same smoothing on both.",
-    )
-
-
-def _smooth(values: np.ndarray, width: int = 11) -> np.ndarray:
-    kernel = np.full(width, 1.0 / width)
-    columns = [np.convolve(column, kernel, "same") for column in values.T]
-    return np.column_stack(columns)
-
-
-def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
-    facts: dict[str, set[str]] = {}
-    for trial in trials:
-        for key, value in trial.metadata["provenance"].items():
-            if not key.startswith("sha256:"):
-                facts.setdefault(key, set()).add(value)
-    rows = [(key, " | ".join(sorted(values))) for key, values in facts.items()]
-    return ReportTable("Provenance", ("what", "value"), rows)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
@@ -38,6 +38,11 @@ if TYPE_CHECKING:
     from fakes.rig import FakeRig
 
 MS = 1_000_000
+# A simulation shares its thread with plant and recorder; only real arms need cadence.
+LATE_WHEN_SIMULATED = 250
+# On the wall clock the simulated safety module lives in the loop's own process, so a
+# stall of the machine stops both: it must not look like a lost heartbeat.
+HEARTBEAT_IN_PROCESS_NS = 1_000_000_000
 
 
 class Rehearsing(Protocol):
@@ -161,12 +166,15 @@ class Rig:
 
         control = self.settings.rig.control
         gains = LockGains(kp=control.lock_kp, kd=control.lock_kd)
+        limits = build_limits(self.settings.rig, self.model.constants)
+        if self.is_simulated:
+            limits = replace(limits, late_per_second=LATE_WHEN_SIMULATED)
         cycle = Cycle(
             self.arm,
             sensor,
             FootController(self.model, control.virtual_mass, gains),
             self.foot,
-            build_limits(self.settings.rig, self.model.constants),
+            limits,
             ring.write,
             on_wrench,
             extra_flags=Flag.SIMULATED if self.is_simulated else 0,
@@ -213,6 +221,7 @@ def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
         joint7=limits.joint7_mrad * 1e-3,
         ft_stale_ns=round(limits.ft_stale_ms * MS),
         ft_stop_ns=round(limits.ft_stop_ms * MS),
+        late_per_second=limits.late_per_second,
     )
 
 
@@ -284,7 +293,9 @@ def _simulate(
     )
     if not fake.is_fast:
         clock = SystemClock()
-        rig = FakeRig(scene, constants, tool, clock)
+        rig = FakeRig(
+            scene, constants, tool, clock, heartbeat_ns=HEARTBEAT_IN_PROCESS_NS
+        )
         return clock, rig, Rehearsal(rig)
     stepped = SteppedClock()
     rig = FakeRig(scene, constants, tool, stepped)

@@ -1,5 +1,7 @@
 """The runner: lift, tare, put down, record, review, until the session is complete."""
 
+import sys
+import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -20,16 +22,19 @@ from experiments.operator import REJECT_REASONS, Asked, Prompt
 from experiments.review import Review, review_trial
 from experiments.rigs import Rig
 from experiments.session import SessionState, apply
-from experiments.store import iso_utc, write_json
+from experiments.store import iso_utc, write_json, write_text
 from experiments.trial import EndWatch, SessionFacts, TrialName, trial_header
 from ft_sensor.tare import TareError, tare
 
+SWITCH_INTERVAL = 0.0002  # while slow work shares the interpreter with the loop [s]
 TICK = 0.02  # the console looks this often [s]
 TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
 LIVE_SECONDS = 5.0  # between two lines of a running trial
+FAULTS_IN_A_ROW = 5  # end the session: something is wrong that redoing cannot mend
+DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 _T = TypeVar("_T")
@@ -48,6 +53,8 @@ class SessionRunner:
     _asked: tuple[Prompt, int, int] | None = None
     _asked_at: int = 0
     _place: tuple[str, float] = ("The session", 0.0)
+    _faults: int = 0
+    _is_stopped: bool = False
 
     def __post_init__(self) -> None:
         """Open the archive of the session's trials."""
@@ -72,9 +79,13 @@ class SessionRunner:
             self._say(CATALOGUE["interrupted"].text({}, self._saved()))
         except FaultedError as fault:
             code, reason = 4, fault.verdict.reason
+            self._tell_fault(fault.verdict)
         except TractionError as error:
             code, reason = error.exit_code, "error"
             self.company.console.problem(f"{error} {self._saved()}")
+        except Exception:  # the arm first, then the person, the traceback to the log
+            self._make_safe()
+            self._tell_bug(traceback.format_exc())
         finally:
             self._make_safe()
             self._note("session-ended", reason=reason)
@@ -108,10 +119,13 @@ class SessionRunner:
         try:
             self._one_trial()
         except FaultedError as fault:
-            self._tell_fault(fault.verdict)
-            if fault.verdict.reason in ENDING:
+            self._faults += 1
+            if fault.verdict.reason in ENDING or self._faults >= FAULTS_IN_A_ROW:
                 raise
+            self._tell_fault(fault.verdict)
             self._mend()
+        else:
+            self._faults = 0
 
     def _one_trial(self) -> None:
         number = self.state.next_trial
@@ -136,7 +150,7 @@ class SessionRunner:
             raise
         except StopAskedError:
             outcome.reason = "interrupted"
-            self.control.request(ArmState.HOLD)
+            self._obey_stop()
             self._end_recording(name, header, outcome)
             raise
         self.control.request(ArmState.HOLD)
@@ -243,7 +257,16 @@ class SessionRunner:
         self._say(f"[k]eep   [r]edo: {reasons}")
         is_whole = outcome.displacement >= ENOUGH * self.rig.frame.travel
         while True:
-            key = self._tick(Prompt.REVIEW, name, is_complete=is_whole)
+            try:
+                key = self._tick(Prompt.REVIEW, name, is_complete=is_whole)
+            except FaultedError as fault:
+                # The trial is whole: only the end of the session takes it away.
+                if fault.verdict.reason in ENDING:
+                    self._reject(name, sidecar, "session ended at the review")
+                    raise
+                self._tell_fault(fault.verdict)
+                self._mend()
+                continue
             if key == "k":
                 self.archive.keep(name, sidecar)
                 self._note("trial-kept", trial=name.number, attempt=name.attempt)
@@ -275,6 +298,8 @@ class SessionRunner:
         verdict = self.control.status.verdict
         if verdict is not None:
             raise FaultedError(verdict)
+        if self.company.console.is_lost:
+            self.company.stop.ask()
         if self.company.stop.count and prompt is not Prompt.REVIEW:
             raise StopAskedError
         number, attempt = (name.number, name.attempt) if name else (0, 0)
@@ -311,11 +336,29 @@ class SessionRunner:
         """Do slow work without letting the loop stop: it is the arm's heartbeat."""
         if self.rig.is_stepped:
             return work()
-        with ThreadPoolExecutor(1) as pool:
-            future = pool.submit(work)
-            while not future.done():
-                self.control.advance(TICK)
-            return future.result()
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        try:
+            with ThreadPoolExecutor(1) as pool:
+                future = pool.submit(work)
+                while not future.done():
+                    self.control.advance(TICK)
+                    if self.company.stop.is_urgent:
+                        self._obey_stop()
+                return future.result()
+        finally:
+            sys.setswitchinterval(interval)
+
+    def _obey_stop(self) -> None:
+        """Hold; when asked twice within 3 s, damp for a moment and brake, once."""
+        if not self.company.stop.is_urgent:
+            self.control.request(ArmState.HOLD)
+        elif not self._is_stopped:
+            self._is_stopped = True
+            self.control.request(ArmState.DAMP)
+            self.control.advance(DAMP_SECONDS)
+            self.control.request(ArmState.IDLE)
+            self.control.advance(TICK)
 
     # --- words --------------------------------------------------------------------
 
@@ -346,6 +389,13 @@ class SessionRunner:
         facts.update(dict(verdict.facts))
         message = CATALOGUE[verdict.reason]
         self.company.console.problem(message.text(facts, self._saved()))
+
+    def _tell_bug(self, text: str) -> None:
+        log = self.facts.folder.path / "log.txt"
+        self.company.console.problem(
+            f"Bug: {text.splitlines()[-1]}. Log: {log}. {self._saved()}"
+        )
+        write_text(log, text)
 
     def _saved(self) -> str:
         kept = len(self.state.kept)

@@ -56,16 +56,28 @@ def apply(state: SessionState, event: Mapping[str, Any]) -> SessionState:
 def _start(state: SessionState, event: Mapping[str, Any]) -> SessionState:
     if state.terrain:
         return state
-    return replace(state, terrain=str(event["terrain"]), wanted=int(event["trials"]))
+    terrain, wanted = str(event.get("terrain", "")), _whole(event, "trials")
+    return replace(state, terrain=terrain, wanted=wanted) if wanted else state
 
 
 def _end(state: SessionState, event: Mapping[str, Any]) -> SessionState:
-    return replace(state, ended=str(event["reason"]), running=None)
+    if not state.terrain:
+        return state
+    reason = str(event.get("reason") or "unfinished")
+    return replace(state, ended=reason, running=None)
+
+
+def _whole(event: Mapping[str, Any], key: str) -> int:
+    """Return the whole number at `key`, 0 where there is none above 0."""
+    value = event.get(key)
+    return value if type(value) is int and value > 0 else 0
 
 
 def _start_trial(state: SessionState, event: Mapping[str, Any]) -> SessionState:
-    number = int(event["trial"])
-    if state.running is not None or number in state.kept:
+    number = _whole(event, "trial")
+    if not (state.terrain and number) or state.running is not None:
+        return state
+    if number in state.kept:
         return state
     attempts = dict(state.attempts)
     attempts[number] = attempts.get(number, 0) + 1
@@ -73,14 +85,14 @@ def _start_trial(state: SessionState, event: Mapping[str, Any]) -> SessionState:
 
 
 def _keep(state: SessionState, event: Mapping[str, Any]) -> SessionState:
-    number = int(event["trial"])
+    number = _whole(event, "trial")
     if state.running != number:
         return state
     return replace(state, running=None, kept=(*state.kept, number))
 
 
 def _reject(state: SessionState, event: Mapping[str, Any]) -> SessionState:
-    if state.running != int(event["trial"]):
+    if state.running != _whole(event, "trial"):
         return state
     return replace(state, running=None, rejected=state.rejected + 1)
 

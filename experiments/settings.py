@@ -7,13 +7,19 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic.fields import FieldInfo
 
 from acquisition.errors import SettingsError
 
-_Vector3 = tuple[float, float, float]
-_Vector7 = tuple[float, float, float, float, float, float, float]
+_Near = Annotated[float, Field(ge=-10, le=10)]  # metres and radians of this room
+_Vector3 = tuple[_Near, _Near, _Near]
+_Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
+_KINDS: dict[object, str] = {int: "a whole number", float: "a number"}
+_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 _M = TypeVar("_M", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Mass = Annotated[float, Field(gt=0, le=20)]
+_Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
 
 
 class _Section(BaseModel):
@@ -35,7 +41,7 @@ class SensorSection(_Section):
     port: str = Field(examples=["/dev/ttyUSB0"])
     baudrate: int = Field(gt=0, examples=[460800])
     sinc: int = Field(ge=51, le=512, examples=[64])
-    mass: Positive = Field(examples=[0.136])
+    mass: Mass = Field(examples=[0.136])
     height: float = Field(ge=0, le=0.2, examples=[0.012])
     angle_deg: float = Field(ge=-360, le=360, examples=[0.0])
     sign: Literal[1, -1] = Field(examples=[1])
@@ -44,7 +50,7 @@ class SensorSection(_Section):
 class FootSection(_Section):
     """A foot with its adapter, in frame 7."""
 
-    mass: Positive = Field(examples=[0.45])
+    mass: Mass = Field(examples=[0.45])
     com: _Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
     inertia: tuple[Positive, Positive, Positive] = Field(
         examples=[[4e-4, 5.5e-4, 4.5e-4]]
@@ -70,12 +76,13 @@ class ControlSection(_Section):
 class LimitSection(_Section):
     """Where the guard steps in."""
 
-    speed: _Vector7 = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
-    torque: _Vector7 = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    speed: _Limits = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: _Limits = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
     foot_speed: Positive = Field(examples=[0.8])
     joint7_mrad: Positive = Field(examples=[50.0])
     ft_stale_ms: Positive = Field(examples=[6.0])
     ft_stop_ms: Positive = Field(examples=[20.0])
+    late_per_second: int = Field(ge=1, le=500, examples=[10])
     tare_spread: Positive = Field(examples=[0.5])
     free_disk_gb: float = Field(ge=0, examples=[5.0])
 
@@ -101,7 +108,7 @@ class TerrainRow(_Section):
     heading_deg: float = Field(ge=-180, le=180, examples=[0.0])
     travel: float = Field(gt=0.05, le=1.0, examples=[0.45])
     trials: int = Field(ge=1, le=99, examples=[10])
-    start_q: _Vector7 = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
+    start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
 
 
 class MatrixSettings(_Section):
@@ -210,26 +217,47 @@ def _explain(model: type[BaseModel], name: str, error: ValidationError) -> str:
         return f"{name}: {place} is no setting Traction knows."
     got = first["input"]
     shown = f'"{got}"' if isinstance(got, str) else repr(got)
-    expected = first["msg"].removeprefix("Input should be ")
+    expected = _expected(model, first["loc"], first["msg"])
     return (
         f"{name}: {place} = {shown} - expected {expected}"
         f"{_example(model, first['loc'])}."
     )
 
 
+def _expected(
+    model: type[BaseModel], location: tuple[int | str, ...], otherwise: str
+) -> str:
+    """Return what a number should be, with its bounds; else what pydantic says."""
+    field = _field_at(model, location)
+    kind = _KINDS.get(field.annotation) if field else None
+    if field is None or kind is None:
+        return otherwise.removeprefix("Input should be ")
+    bounds = [
+        f"{sign} {getattr(constraint, name)}"
+        for constraint in field.metadata
+        for name, sign in _BOUNDS
+        if hasattr(constraint, name)
+    ]
+    return f"{kind} {' and '.join(bounds)}".rstrip()
+
+
 def _example(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    """Return ", e.g. ..." from the field's examples, following `location`."""
+    """Return ", e.g. ..." from the examples of the field at `location`."""
+    field = _field_at(model, location)
+    return f", e.g. {field.examples[0]}" if field and field.examples else ""
+
+
+def _field_at(
+    model: type[BaseModel], location: tuple[int | str, ...]
+) -> FieldInfo | None:
+    """Return the last field on the way along `location`."""
     current: type[BaseModel] | None = model
-    found = ""
+    found: FieldInfo | None = None
     for part in location:
         if not isinstance(part, str) or current is None:
             continue
-        field = current.model_fields.get(part)
-        if field is None:
-            return found
-        if field.examples:
-            found = f", e.g. {field.examples[0]}"
-        current = _section_of(field.annotation)
+        found = current.model_fields.get(part)
+        current = _section_of(found.annotation) if found else None
     return found
 
 

@@ -13,12 +13,13 @@ from pathlib import Path
 from typing import Any, cast
 
 from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, SettingsError
+from acquisition.errors import SessionError, SettingsError, TrialFileError
 
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
     r"(?P<fake>\.fake)?$"
 )
+LONGEST_NAME = 64
 _TRIAL_FILE = re.compile(r"^T\d\d[a-z]*\.json$")
 
 
@@ -54,9 +55,14 @@ class SessionFolder:
         return self.path / "faults"
 
     def append_event(self, event: Mapping[str, object]) -> None:
-        """Append one line to the journal and force it to the disk."""
+        """Append one line to the journal and force it to the disk.
+
+        Raises:
+            TrialFileError: the disk is full or gone.
+        """
         line = json.dumps(event, allow_nan=False) + "\n"
-        with (self.path / "events.jsonl").open("ab") as file:
+        path = self.path / "events.jsonl"
+        with _writing(path), path.open("ab") as file:
             file.write(line.encode())
             file.flush()
             os.fsync(file.fileno())
@@ -82,7 +88,7 @@ class SessionFolder:
                 continue
             facts = read_json(sidecar)
             path = sidecar.with_suffix(".mcap")
-            is_sound = path.exists() and sha256_of(path) == facts.get("sha256")
+            is_sound = path.is_file() and sha256_of(path) == facts.get("sha256")
             if facts.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
@@ -109,13 +115,50 @@ def _as_object(text: bytes) -> dict[str, Any] | None:
 
 
 def write_json(path: Path, value: Mapping[str, object]) -> None:
-    """Replace `path` atomically: temporary file, fsync, rename."""
+    """Replace `path` atomically: temporary file, fsync, rename.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    write_text(path, json.dumps(value, indent=1, allow_nan=False))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace `path` by `text`, as `write_json` does.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
     temporary = path.with_name(path.name + ".tmp")
-    with temporary.open("wb") as file:
-        file.write(json.dumps(value, indent=1, allow_nan=False).encode())
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    with _writing(path):
+        with temporary.open("wb") as file:
+            file.write(text.encode())
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+
+
+def move_file(source: Path, target: Path) -> None:
+    """Give `source` the name `target` in another folder; never replaces a file.
+
+    Raises:
+        TrialFileError: `target` exists, or the disk is full or gone.
+    """
+    with _writing(target):
+        target.hardlink_to(source)
+        source.unlink()
+
+
+@contextmanager
+def _writing(path: Path) -> Generator[None, None, None]:
+    try:
+        yield
+    except OSError as error:
+        raise TrialFileError(
+            path,
+            f"cannot be written ({error.strerror})",
+            hint="Is the disk full? Nothing that was kept is lost.",
+        ) from error
 
 
 def sha256_of(path: Path) -> str:
@@ -139,9 +182,8 @@ def find_session(data: Path, name: str) -> SessionFolder:
     Raises:
         SessionError: there is none, or more than one.
     """
-    path = Path(name)
-    as_path = _session_at(path) if path.is_dir() else None
-    if as_path is not None:
+    as_path = _session_at(Path(name))
+    if as_path is not None and as_path.path.is_dir():
         return as_path
     found = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
     if len(found) == 1:
@@ -183,7 +225,7 @@ def create_session(
 
 def _session_at(path: Path) -> SessionFolder | None:
     match = _FOLDER.match(path.name)
-    if not match:
+    if not match or len(path.name) > LONGEST_NAME:
         return None
     return SessionFolder(path, match["id"], match["terrain"], bool(match["fake"]))
 

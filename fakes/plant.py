@@ -44,20 +44,27 @@ class PlantOptions:
     substeps: int = 4
 
 
-@dataclass(slots=True)
 class Truth:
-    """What really happened, one row per cycle; terrain frame where not said."""
+    """What really happened, one row per cycle; terrain frame where not said.
 
-    t_ns: list[int]
-    q: list[Array]
-    sole: list[tuple[float, ...]]
-    velocity: list[tuple[float, ...]]
-    contact: list[Contact]
-    hand: list[tuple[float, float, float]]
+    Columns: q [rad] 0-6, sole [m] 7-9, its velocity [m/s] 10-12, ground's force on the
+    foot against x, along y, along z [N] 13-15, hand's force [N] 16-18.
+    """
 
+    COLUMNS = 19
 
-def _empty_truth() -> Truth:
-    return Truth([], [], [], [], [], [])
+    def __init__(self) -> None:
+        self.t_ns: list[int] = []
+        self._values: list[float] = []
+
+    def add(self, t_ns: int, values: Sequence[float]) -> None:
+        """Append one row."""
+        self.t_ns.append(t_ns)
+        self._values.extend(values)
+
+    def table(self) -> Array:
+        """Return all rows, shape (n, 19)."""
+        return np.array(self._values).reshape(-1, self.COLUMNS)
 
 
 class ArmPlant:
@@ -194,12 +201,12 @@ class ArmPlant:
 
     def start_truth(self) -> None:
         """Begin to write down what really happens."""
-        self.truth = _empty_truth()
+        self.truth = Truth()
 
     def take_truth(self) -> Truth:
         """Return what happened since the last call."""
-        taken = self.truth or _empty_truth()
-        self.truth = _empty_truth()
+        taken = self.truth or Truth()
+        self.truth = Truth()
         return taken
 
     def _hand_rotation(self) -> Array:
@@ -303,10 +310,7 @@ class ArmPlant:
         self._cycle_a = (v - self._cycle_v) / (CYCLE_NS * 1e-9)
         self._cycle_v = v
         if self.truth is not None:
-            mean = self._cycle_force.tolist()
-            self.truth.t_ns.append(self.t_ns)
-            self.truth.q.append(self.q.copy())
-            self.truth.sole.append(position)
-            self.truth.velocity.append(velocity)
-            self.truth.contact.append(Contact(-mean[0], mean[1], mean[2]))
-            self.truth.hand.append(push)
+            along, across, normal = self._cycle_force.tolist()
+            force = (-along, across, normal)
+            row = (*self.q.tolist(), *position, *velocity, *force, *push)
+            self.truth.add(self.t_ns, row)

@@ -7,6 +7,7 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
+from acquisition.errors import SettingsError
 from acquisition.messages import TRUTH
 from acquisition.sample import Record
 from fakes.can_bus import FakeCanBus
@@ -26,6 +27,8 @@ from wam.model import ArmModel
 from wam.tool import Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
+_CLOSE = 1e-9  # m and rad, where the search for the start pose ends
+_LARGEST_STEP = 0.5  # rad
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,19 +56,29 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
     """Return joint positions near `q` with the sole `height` [m] above the far end.
 
     The sole is parallel to the ground. Newton's method on joints 2, 4 and 6.
+
+    Raises:
+        SettingsError: it ends nowhere: out of reach, or `q` is a singular pose.
     """
     axes = frame.axes()
     goal = np.array(frame.far_end) + height * axes[2]
-    q = q.copy()
+    start, q = q, q.copy()
     joints = [1, 3, 5]
     for _ in range(20):
         position, rotation = model.sole_pose(q)
         error = axes @ (goal - position)
         turn = np.cross(rotation[:, 2], -axes[2]) @ axes[1]
+        if abs(error[0]) + abs(error[2]) < _CLOSE and abs(turn) < _CLOSE:
+            return q
         J = model.sole_jacobian(q)[:, joints]
         rows = np.vstack([axes[[0, 2]] @ J[:3], axes[1] @ J[3:]])
-        q[joints] += np.linalg.solve(rows, np.array([error[0], error[2], turn]))
-    return q
+        step = np.linalg.lstsq(rows, np.array([error[0], error[2], turn]))[0]
+        q[joints] += np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+    raise SettingsError(
+        f"matrix.toml: the foot cannot stand at far_end = {list(frame.far_end)} "
+        f"from start_q = {start.tolist()}.",
+        hint="Correct far_end or start_q of this terrain. Nothing was started.",
+    )
 
 
 class FakeRig:
@@ -78,6 +91,7 @@ class FakeRig:
         tool: Tool,
         clock: Clock,
         options: PlantOptions | None = None,
+        heartbeat_ns: int = 100_000_000,
     ) -> None:
         self.scene = scene
         self._clock = clock
@@ -87,7 +101,9 @@ class FakeRig:
         self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
         self.network = PuckNetwork(
             self.plant,
-            NetworkOptions(safety_mode=SafetyMode.IDLE, mt=constants.mt),
+            NetworkOptions(
+                safety_mode=SafetyMode.IDLE, mt=constants.mt, heartbeat_ns=heartbeat_ns
+            ),
             clock.now_ns(),
         )
         self.bus = FakeCanBus(self.network, clock)
@@ -214,15 +230,12 @@ def _truth_records(truth: Truth, frame: TerrainFrame) -> Record:
     if not count:
         return records
     axes = frame.axes()
-    contact = np.array(truth.contact)
-    velocity = np.array(truth.velocity)
-    in_terrain = contact * [-1.0, 1.0, 1.0]
+    rows = truth.table()
+    velocity, force, hand = rows[:, 10:13], rows[:, 13:16], rows[:, 16:19]
     records["host_ns"] = truth.t_ns
-    records["position"] = truth.q
-    records["sole_position"] = np.array(truth.sole) @ axes + np.array(frame.far_end)
-    records["contact_force"] = in_terrain @ axes
-    records["hand_force"] = np.array(truth.hand) @ axes
-    records["traction"] = np.column_stack(
-        [velocity[:, 0], contact[:, 0], contact[:, 2]]
-    )
+    records["position"] = rows[:, :7]
+    records["sole_position"] = rows[:, 7:10] @ axes + np.array(frame.far_end)
+    records["contact_force"] = (force * [-1.0, 1.0, 1.0]) @ axes
+    records["hand_force"] = hand @ axes
+    records["traction"] = np.column_stack([velocity[:, 0], force[:, 0], force[:, 2]])
     return records

@@ -1,6 +1,12 @@
-"""Options of the whole suite."""
+"""Options and fixtures of the whole suite."""
 
+import json
+from pathlib import Path
+
+import numpy as np
 import pytest
+
+DATA = Path(__file__).parent / "data"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -9,3 +15,48 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="fail instead of skipping where ../shared/data is not there",
     )
+
+
+@pytest.fixture(scope="session")
+def shared_data(request):
+    """Return the folder of the measurements that stay outside the project."""
+    folder = Path(__file__).resolve().parents[2] / "shared" / "data"
+    if not folder.is_dir():
+        reason = f"no measurements in {folder}"
+        if request.config.getoption("--require-shared-data", default=False):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def arm_vectors():
+    """Return kinematics and dynamics of the arm from two independent programs."""
+    return json.loads((DATA / "wam7_vectors.json").read_text())
+
+
+@pytest.fixture(scope="session")
+def example_tool(arm_vectors):
+    """Return the sensor and the foot that the vectors were computed with."""
+    from wam.constants import Body
+    from wam.tool import Tool
+
+    tool = arm_vectors["tool"]
+    bodies = (
+        Body(
+            tool[f"{name}_mass"],
+            np.array(tool[f"{name}_com"]),
+            np.array(tool[f"{name}_inertia_com"]),
+        )
+        for name in ("sensor", "foot")
+    )
+    return Tool(*bodies, sole=np.array(tool["sole_point"]))
+
+
+@pytest.fixture(scope="session")
+def foot_model(example_tool):
+    """Return the arm with that sensor and foot on it."""
+    from wam.constants import load_constants
+    from wam.model import ArmModel
+
+    return ArmModel(load_constants(), example_tool)

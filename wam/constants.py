@@ -3,10 +3,18 @@
 import tomllib
 from dataclasses import dataclass
 from importlib import resources
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
 from acquisition.errors import SettingsError
 
@@ -15,6 +23,15 @@ Array = NDArray[np.float64]
 
 _Vector3 = tuple[float, float, float]
 _Vector7 = tuple[float, float, float, float, float, float, float]
+_Counts7 = tuple[
+    PositiveInt,
+    PositiveInt,
+    PositiveInt,
+    PositiveInt,
+    PositiveInt,
+    PositiveInt,
+    PositiveInt,
+]
 
 
 class _Model(BaseModel):
@@ -31,6 +48,12 @@ class _Limits(_Model):
     lower: _Vector7
     upper: _Vector7
 
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if any(low >= high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ValueError("a lower stop is not below its upper stop")
+        return self
+
 
 class _Home(_Model):
     position: _Vector7
@@ -41,10 +64,10 @@ class _Transmission(_Model):
 
 
 class _Pucks(_Model):
-    cts: tuple[int, int, int, int, int, int, int]
-    ipnm: tuple[int, int, int, int, int, int, int]
-    poles: tuple[int, int, int, int, int, int, int]
-    mt: tuple[int, int, int, int, int, int, int]
+    cts: _Counts7
+    ipnm: _Counts7
+    poles: _Counts7
+    mt: _Counts7
 
 
 class _Motors(_Model):

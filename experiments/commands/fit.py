@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from experiments.arguments import whole_number
+
 EXAMPLES = """\
   traction fit trials.npz --out fit
   traction fit a.csv b.csv --out fit --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N"""
@@ -21,7 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the choice of points (0)"
+        "--seed",
+        type=whole_number,
+        default=0,
+        metavar="N",
+        help="of the choice of points (0)",
     )
 
 

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from experiments.arguments import whole_number
+
 EXAMPLES = """\
   traction report S012                      one session, into its own folder
   traction report --all                     the study of all sessions"""
@@ -15,18 +17,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="of the choice of points (0)"
+        "--seed",
+        type=whole_number,
+        default=0,
+        metavar="N",
+        help="of the choice of points (0)",
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     from experiments.console import Console
-    from experiments.reporting import choose_sessions, report_sessions
+    from experiments.reporting import Order, choose_sessions, report_sessions
+    from experiments.settings import load_settings
 
     console = Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
-    page = report_sessions(sessions, data, args.seed, console)
+    order = [row.name for row in load_settings(args.config).matrix.terrains]
+    page = report_sessions(sessions, data, Order(order, args.seed), console)
     console.say(str(page))
     return 0

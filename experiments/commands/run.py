@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import signal
+from collections.abc import Generator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.company import StopFlag
     from experiments.console import Console
     from experiments.preflight import Preflight
     from experiments.rigs import Rig
@@ -64,20 +67,30 @@ def run(args: argparse.Namespace) -> int:
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {row.name}        {kind}")
         page = run_preflight(rig, Path(args.data), console)
-        facts = _open_session(args, rig, page, console)
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, stop.ask)
-        hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
-        company = Company(keys, console, stop, hand, fault)
-        runner = SessionRunner(rig, rig.connect(page.sensor), facts, company)
-        code = runner.run(args.trials or row.trials)
-        page.sensor.close()
+        with closing(page.sensor), _signals_ask(stop):
+            facts = _open_session(args, rig, page, console)
+            hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
+            company = Company(keys, console, stop, hand, fault)
+            runner = SessionRunner(rig, rig.connect(page.sensor), facts, company)
+            code = runner.run(args.trials or row.trials)
     finally:
         rig.arm.close()
     if code == 0:
         data = f" --data {args.data}" if str(args.data) != "data" else ""
         console.say(f"Complete. Next: traction report {facts.folder.id}{data}")
     return code
+
+
+@contextmanager
+def _signals_ask(stop: StopFlag) -> Generator[None]:
+    """Let Ctrl-C, SIGTERM and a lost terminal ask for a stop while a session runs."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, stop.ask) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
@@ -103,7 +116,12 @@ def _open_session(
     args: argparse.Namespace, rig: Rig, page: Preflight, console: Console
 ) -> SessionFacts:
     """Create the session's folder and write what is known at its start."""
-    from experiments.store import create_session, session_utc_ns, write_json
+    from experiments.store import (
+        create_session,
+        session_utc_ns,
+        write_json,
+        write_text,
+    )
     from experiments.trial import collect_facts
 
     folder = create_session(
@@ -118,7 +136,7 @@ def _open_session(
     facts = collect_facts(folder, operator, seed, page.sensor)
     write_json(folder.path / "preflight.json", page.as_dict())
     write_json(folder.path / "provenance.json", facts.provenance)
-    (folder.path / "config.toml").write_text(rig.settings.rig_text)
-    (folder.path / "matrix.toml").write_text(rig.settings.matrix_text)
-    (folder.path / "diff.patch").write_text(facts.diff)
+    write_text(folder.path / "config.toml", rig.settings.rig_text)
+    write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
+    write_text(folder.path / "diff.patch", facts.diff)
     return facts

@@ -2,6 +2,7 @@
 
 from functools import cache
 
+from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from acquisition.messages import schema_text
@@ -22,3 +23,16 @@ def decode(type_name, payload):
 def encode(type_name, message):
     """Return `message` (as `decode` gives it) serialised by the other library."""
     return bytes(_store(type_name).serialize_cdr(message, type_name))
+
+
+def messages_of(path):
+    """Return topic -> [(log time, payload)] of the trial file at `path`."""
+    reader = McapReader(path)
+    reader.open()
+    try:
+        found = {connection.topic: [] for connection in reader.connections}
+        for connection, time, data in reader.messages(reader.connections):
+            found[connection.topic].append((time, bytes(data)))
+    finally:
+        reader.close()
+    return found

@@ -205,6 +205,31 @@ def test_a_chunk_that_states_too_much_is_not_unpacked(put, pristine):
         TrialReader(path).cycles()
 
 
+def test_chunks_that_state_a_petabyte_are_refused_at_once(put, pristine):
+    data = pristine[0]
+    path = put(chunk_index_field(data, index_tail(data) + 16, "<Q", 2**50))
+    with pytest.raises(TrialFileError, match="chunks of"):
+        TrialReader(path)
+
+
+def test_a_message_index_of_two_gigabytes_is_not_read(put, pristine):
+    data = pristine[0]
+    index = next(s for s in spans(data) if s.opcode == INDEX and s.end - s.body > 300)
+    path = put(resealed(patched(data, index.body + 2, "<I", 2**31)))
+    with pytest.raises(TrialFileError, match="damaged message index"):
+        TrialReader(path).cycles()
+
+
+@pytest.mark.parametrize(
+    ("back", "what"), [(8 + 29, "no footer"), (None, "no end of data")]
+)
+def test_section_ends_must_be_where_they_belong(put, pristine, back, what):
+    data = pristine[0]
+    at = len(data) - back if back else summary_start(data) - 13
+    with pytest.raises(TrialFileError, match=what):
+        TrialReader(put(resealed(patched(data, at, "<B", 99))))
+
+
 def test_an_unknown_compression_is_refused(put, pristine):
     data = pristine[0]
     path = put(chunk_index_field(data, index_tail(data) + 4, "<4s", b"zip1"))

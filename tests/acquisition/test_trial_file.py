@@ -8,7 +8,6 @@ import mcap.reader
 import numpy as np
 import pytest
 from mcap.writer import Writer
-from rosbags.rosbag2.storage_mcap import McapReader
 
 from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
@@ -24,7 +23,7 @@ from acquisition.trial_file.writer import (
     TrialWriter,
     publish,
 )
-from tests.acquisition.ros import decode
+from tests.acquisition.ros import decode, messages_of
 from tests.acquisition.trials import (
     ATTACHMENTS,
     OFFSET_NS,
@@ -39,19 +38,6 @@ from tests.acquisition.trials import (
 
 MESSAGE_OPCODES = {5, 6}
 METADATA, ATTACHMENT = 12, 9
-
-
-def rosbags_messages(path):
-    """Return topic -> [(log time, payload)] as rosbags reads them."""
-    reader = McapReader(path)
-    reader.open()
-    try:
-        found = {connection.topic: [] for connection in reader.connections}
-        for connection, time, data in reader.messages(reader.connections):
-            found[connection.topic].append((time, bytes(data)))
-    finally:
-        reader.close()
-    return found
 
 
 @pytest.fixture(scope="module")
@@ -82,13 +68,13 @@ def test_cycles_come_back_bit_for_bit(reader, cycles):
 
 def test_cycles_are_bit_identical_to_what_rosbags_reads(trial, reader):
     rows = reader.cycles()
-    theirs = rosbags_messages(trial)["/cycle"]
+    theirs = messages_of(trial)["/cycle"]
     assert rows.data.tobytes() == b"".join(data for _, data in theirs)
     assert rows.log_time.tolist() == [time for time, _ in theirs]
 
 
 def test_every_topic_is_readable_by_rosbags(trial, reader):
-    theirs = rosbags_messages(trial)
+    theirs = messages_of(trial)
     counts = {topic: len(messages) for topic, messages in theirs.items()}
     assert counts == reader.topic_counts()
     assert counts["/cycle"] == 600
@@ -288,7 +274,7 @@ def test_sensor_samples_keep_their_own_times(tmp_path):
     writer.write_wrench_samples(samples)
     writer.write_wrench_samples([])
     seal(writer, "end")
-    ((time, payload),) = rosbags_messages(tmp_path / "T.mcap")["/ft/raw"]
+    ((time, payload),) = messages_of(tmp_path / "T.mcap")["/ft/raw"]
     batch = decode("traction_msgs/msg/WrenchBatch", payload)
     assert time == START_NS + 2 + OFFSET_NS
     assert batch.t_ns.tolist() == [START_NS, START_NS + 1, START_NS + 2]
@@ -304,7 +290,7 @@ def test_a_flight_record_keeps_raw_frames(tmp_path):
         [RawFrame(START_NS, 0x404, b"\x2c"), RawFrame(START_NS + 5, 1, b"")]
     )
     seal(writer, "fault")
-    ((time, payload),) = rosbags_messages(tmp_path / "F.mcap")["/can/raw"]
+    ((time, payload),) = messages_of(tmp_path / "F.mcap")["/can/raw"]
     batch = decode("traction_msgs/msg/CanBatch", payload)
     assert time == START_NS + 5 + OFFSET_NS
     assert batch.t_ns.tolist() == [START_NS, START_NS + 5]
@@ -355,6 +341,13 @@ def test_verify_accepts_a_cadence_within_two_percent(tmp_path):
 def test_verify_refuses_cycles_out_of_order(tmp_path):
     cycles = make_cycles(50)
     cycles["cycle"][[10, 11]] = cycles["cycle"][[11, 10]]
+    with pytest.raises(TrialFileError, match="out of order"):
+        verify(sealed_anyway(tmp_path, cycles).partial)
+
+
+def test_verify_refuses_a_cycle_that_comes_twice(tmp_path):
+    cycles = make_cycles(50)
+    cycles["cycle"][11] = cycles["cycle"][10]
     with pytest.raises(TrialFileError, match="out of order"):
         verify(sealed_anyway(tmp_path, cycles).partial)
 

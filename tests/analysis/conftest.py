@@ -14,17 +14,6 @@ DATA = Path(__file__).parent.parent / "data"
 
 
 @pytest.fixture(scope="session")
-def shared_data(request):
-    folder = Path(__file__).resolve().parents[3] / "shared" / "data"
-    if not folder.is_dir():
-        reason = f"no measurements in {folder}"
-        if request.config.getoption("--require-shared-data", default=False):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    return folder
-
-
-@pytest.fixture(scope="session")
 def vectors():
     return json.loads((DATA / "gp_vectors.json").read_text())
 

@@ -1,0 +1,531 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.cycle import ArmState, Cycle
+from acquisition.devices import ArmReading, SafetyMode, WrenchSample
+from acquisition.guard import Limits
+from acquisition.loop import PERIOD_NS, Tick
+from acquisition.messages import CYCLE
+from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
+
+MS = 1_000_000
+START_NS = 1_000 * MS
+LIMITS = Limits(
+    q_lower=np.full(7, -2.0),
+    q_upper=np.full(7, 2.0),
+    qd=np.full(7, 1.5),
+    tau=np.full(7, 30.0),
+)
+TORQUE = {
+    ArmState.FLOAT: 1.0,
+    ArmState.HOLD: 2.0,
+    ArmState.DAMP: 3.0,
+}
+
+
+class Arm:
+    """An arm that says what it is told to say and keeps what it was sent."""
+
+    def __init__(self):
+        self.mode = SafetyMode.ACTIVE
+        self.is_confirmed = True
+        self.q, self.qd = np.zeros(7), np.zeros(7)
+        self.missing = 0
+        self.clip = 100.0
+        self.sent = []
+        self.idled = 0
+
+    def read(self, now_ns):
+        return ArmReading(
+            host_ns=now_ns,
+            arm_ns=now_ns + 700_000,
+            counts=list(range(7)),
+            q=self.q,
+            qd=self.qd,
+            qd7_raw=0.0,
+            fresh=0x7F if self.missing == 0 else 0x3F,
+            is_complete=self.missing == 0,
+            missing_cycles=self.missing,
+        )
+
+    def send(self, tau, tau_gravity):
+        sent = np.clip(tau, -self.clip, self.clip)
+        self.sent.append(sent)
+        return sent
+
+    def safety_mode(self):
+        return self.mode
+
+    def idle(self):
+        self.idled += 1
+        if self.is_confirmed:
+            self.mode = SafetyMode.IDLE
+        return self.is_confirmed
+
+    def close(self):
+        self.idle()
+
+
+class Sensor:
+    def __init__(self):
+        self.queue = []
+
+    def open(self):
+        """Nothing to configure."""
+
+    def poll(self, now_ns):
+        samples, self.queue = self.queue, []
+        return samples
+
+    def describe(self):
+        return {}
+
+    def close(self):
+        """Nothing to give back."""
+
+
+class Law:
+    """Torque 1, 2, 3 N m on every joint in float, hold, damp."""
+
+    def __init__(self):
+        self.state = ArmState.IDLE
+        self.entered = []
+        self.offset = 0.0
+        self.torques = TORQUE
+
+    def enter(self, state, reading):
+        self.state = state
+        self.entered.append(state)
+
+    def torque(self, reading):
+        tau = np.full(7, self.torques[self.state])
+        return tau, tau / 2
+
+    def joint7_offset(self, reading):
+        return self.offset
+
+
+class Observer:
+    """Shows the force along z of the wrench it is given."""
+
+    def __init__(self):
+        self.speed = 0.0
+        self.seen = []
+
+    def observe(self, reading, wrench, sample):
+        self.seen.append(wrench)
+        if wrench is not None:
+            sample.wrench_raw[:] = wrench.wrench
+            sample.traction[2] = wrench.wrench[2]
+        return self.speed
+
+
+class Bench:
+    """One cycle with everything around it, run period by period."""
+
+    def __init__(self):
+        self.arm, self.sensor, self.law = Arm(), Sensor(), Law()
+        self.observer = Observer()
+        self.records, self.wrenches = [], []
+        self.number = 0
+        self.now_ns = START_NS
+        self.limits = LIMITS
+        self.cycle = self.make()
+
+    def make(self, extra_flags=0):
+        return Cycle(
+            self.arm,
+            self.sensor,
+            self.law,
+            self.observer,
+            self.limits,
+            lambda payload: self.records.append(bytes(payload)),
+            self.wrenches.extend,
+            extra_flags,
+        )
+
+    def run(self, cycles=1, *, force=5.0, is_late=False):
+        """Run; every cycle has a fresh force unless `force` is None."""
+        for _ in range(cycles):
+            if force is not None:
+                self.sensor.queue.append(self.wrench(force))
+            tick = Tick(self.number, self.now_ns, self.now_ns, is_late)
+            self.cycle(tick)
+            self.number += 1
+            self.now_ns += PERIOD_NS
+        return self.record()
+
+    def wrench(self, force, **changes):
+        values = (0.0, 0.0, force, 0.0, 0.0, 0.0)
+        sample = WrenchSample(self.now_ns, self.number, values, 0, True, False)
+        return replace(sample, **changes)
+
+    def record(self, index=-1):
+        return np.frombuffer(self.records[index], CYCLE.dtype)[0]
+
+    def enter(self, state):
+        self.cycle.request(state)
+        return self.run()
+
+    @property
+    def state(self):
+        return self.cycle.status.state
+
+    @property
+    def reason(self):
+        verdict = self.cycle.status.verdict
+        return verdict.reason if verdict else ""
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def has(record, flag):
+    return bool(record["flags"] & flag)
+
+
+def test_every_cycle_gives_one_record_with_its_number_and_times(bench):
+    bench.run(3)
+    assert len(bench.records) == 3
+    record = bench.record()
+    assert record["cycle"] == 2
+    assert record["host_ns"] == START_NS + 2 * PERIOD_NS
+    assert record["arm_ns"] == record["host_ns"] + 700_000
+    assert record["ft_ns"] == record["host_ns"]
+    assert record["ft_counter"] == 2
+
+
+def test_the_record_holds_what_the_arm_said(bench):
+    bench.arm.q, bench.arm.qd = np.linspace(0, 1, 7), np.linspace(-1, 0, 7)
+    record = bench.run()
+    assert record["position"].tolist() == bench.arm.q.tolist()
+    assert record["velocity"].tolist() == bench.arm.qd.tolist()
+    assert record["counts"].tolist() == list(range(7))
+
+
+@pytest.mark.parametrize("state", TORQUE)
+def test_the_torque_of_a_state_is_sent_in_the_cycle_it_is_entered(bench, state):
+    record = bench.enter(state)
+    assert bench.arm.sent[-1].tolist() == [TORQUE[state]] * 7
+    assert record["torque_command"].tolist() == [TORQUE[state]] * 7
+    assert record["torque_gravity"].tolist() == [TORQUE[state] / 2] * 7
+
+
+def test_an_idle_arm_is_sent_zero(bench):
+    bench.run()
+    assert bench.arm.sent[-1].tolist() == [0.0] * 7
+
+
+def test_the_record_holds_the_torque_as_sent(bench):
+    bench.arm.clip = 0.25
+    record = bench.enter(ArmState.FLOAT)
+    assert record["torque_command"].tolist() == [0.25] * 7
+    assert has(record, Flag.TORQUE_CLIPPED)
+
+
+def test_torque_that_was_not_cut_is_not_flagged(bench):
+    assert not has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
+
+
+def test_rounding_to_the_motors_unit_is_no_clipping(bench):
+    bench.arm.clip = 1.0 - 0.049
+    assert not has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
+
+
+def test_cuts_on_two_joints_do_not_cancel(bench):
+    bench.arm.send = lambda tau, _: tau + np.array([1.0, -1.0, 0, 0, 0, 0, 0])
+    assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
+
+
+def test_a_missing_reply_sends_no_torque(bench):
+    bench.enter(ArmState.FLOAT)
+    sent = len(bench.arm.sent)
+    bench.arm.missing = 1
+    bench.law.torques = {ArmState.FLOAT: 9.0}  # wanted, and not sent
+    record = bench.run()
+    assert len(bench.arm.sent) == sent
+    assert record["torque_command"].tolist() == [1.0] * 7  # what the motors still have
+    assert not has(record, Flag.ARM_FRESH)
+    assert not has(record, Flag.TORQUE_CLIPPED)
+
+
+def test_the_fresh_bits_name_the_silent_motor(bench):
+    complete = bench.run()
+    bench.arm.missing = 1
+    record = bench.run()
+    assert int(complete["flags"]) >> MOTOR_FRESH_SHIFT == 0x7F
+    assert int(record["flags"]) >> MOTOR_FRESH_SHIFT == 0x3F
+    assert has(complete, Flag.ARM_FRESH)
+
+
+def test_a_state_is_not_entered_on_an_incomplete_reading(bench):
+    bench.arm.missing = 1
+    bench.enter(ArmState.FLOAT)
+    assert bench.state is ArmState.IDLE
+    bench.arm.missing = 0
+    bench.run()
+    assert bench.state is ArmState.FLOAT
+
+
+def test_idle_does_not_wait_for_a_complete_reading(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.missing = 1
+    bench.enter(ArmState.IDLE)
+    assert bench.state is ArmState.IDLE
+    assert bench.arm.idled == 1
+
+
+def test_a_stale_force_repeats_the_last_value_and_clears_the_bit(bench):
+    fresh = bench.run(force=5.0)
+    stale = bench.run(4, force=None)
+    assert has(fresh, Flag.FT_FRESH)
+    assert not has(stale, Flag.FT_FRESH)
+    assert stale["wrench_raw"].tolist() == fresh["wrench_raw"].tolist()
+    assert stale["ft_ns"] == fresh["ft_ns"]
+    assert bench.observer.seen[-1] is None
+
+
+@pytest.mark.parametrize(("cycles", "is_fresh"), [(3, True), (4, False)])
+def test_a_force_is_stale_after_six_milliseconds(bench, cycles, is_fresh):
+    bench.run(force=5.0)
+    assert has(bench.run(cycles, force=None), Flag.FT_FRESH) is is_fresh
+
+
+def test_there_is_no_force_before_the_first_sample(bench):
+    record = bench.run(force=None)
+    assert np.isnan(record["wrench_raw"]).all()
+    assert record["ft_ns"] == 0
+    assert not has(record, Flag.FT_FRESH)
+
+
+def test_of_several_samples_the_newest_is_used_and_all_are_handed_on(bench):
+    bench.sensor.queue = [bench.wrench(1.0), bench.wrench(2.0)]
+    record = bench.run(force=None)
+    assert record["wrench_raw"][2] == 2.0
+    assert [sample.wrench[2] for sample in bench.wrenches] == [1.0, 2.0]
+
+
+def test_a_sample_the_device_does_not_vouch_for_is_not_used(bench):
+    good, bad = bench.wrench(1.0), bench.wrench(9.0, is_valid=False)
+    bench.sensor.queue = [good, bad]
+    record = bench.run(force=None)
+    assert record["wrench_raw"][2] == 1.0
+    assert bench.wrenches == [good, bad]
+
+
+def test_invalid_samples_alone_age_the_force(bench):
+    bench.run()
+    for _ in range(4):
+        bench.sensor.queue = [bench.wrench(9.0, is_valid=False)]
+        record = bench.run(force=None)
+    assert not has(record, Flag.FT_FRESH)
+    assert record["wrench_raw"][2] == 5.0
+
+
+def test_saturation_is_flagged(bench):
+    assert not has(bench.run(), Flag.FT_SATURATED)
+    bench.sensor.queue = [bench.wrench(9.0, is_saturated=True)]
+    assert has(bench.run(force=None), Flag.FT_SATURATED)
+
+
+@pytest.mark.parametrize(("force", "touches"), [(0.5, False), (0.51, True)])
+def test_contact_is_flagged(bench, force, touches):
+    assert has(bench.run(force=force), Flag.CONTACT) is touches
+
+
+def test_a_late_cycle_is_flagged(bench):
+    assert has(bench.run(is_late=True), Flag.DEADLINE_MISSED)
+    assert not has(bench.run(), Flag.DEADLINE_MISSED)
+
+
+@pytest.mark.parametrize("mode", SafetyMode)
+def test_the_safety_mode_is_in_the_flags(bench, mode):
+    bench.arm.mode = mode
+    assert int(bench.run()["flags"]) & SAFETY_MODE_MASK == mode
+
+
+def test_the_lock_is_flagged_while_it_holds(bench):
+    assert not has(bench.run(), Flag.JOINT7_LOCKED)
+    for state in TORQUE:
+        assert has(bench.enter(state), Flag.JOINT7_LOCKED)
+
+
+def test_a_simulated_arm_is_flagged(bench):
+    assert not has(bench.run(), Flag.SIMULATED)
+    bench.cycle = bench.make(Flag.SIMULATED)
+    assert has(bench.run(), Flag.SIMULATED)
+
+
+def test_a_verdict_changes_the_torque_in_the_same_cycle(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    record = bench.run()
+    assert bench.state is ArmState.DAMP
+    assert record["torque_command"].tolist() == [3.0] * 7
+    assert bench.arm.sent[-1].tolist() == [3.0] * 7
+    assert bench.reason == "overspeed"
+
+
+def test_a_verdict_of_hold_ends_floating(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.law.offset = 0.06
+    record = bench.run()
+    assert bench.state is ArmState.HOLD
+    assert record["torque_command"].tolist() == [2.0] * 7
+    assert bench.reason == "joint7-slip"
+
+
+def test_a_verdict_ends_the_watch_on_the_trial(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.law.offset = 0.06
+    bench.run()
+    assert not bench.cycle.is_recording
+
+
+def test_a_silent_sensor_stops_a_trial_after_20_ms(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.run(10, force=None)
+    assert bench.state is ArmState.FLOAT
+    bench.run(force=None)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "ft-stale")
+
+
+def test_a_sensor_that_never_spoke_stops_a_trial(bench):
+    bench.cycle.request(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.run(12, force=None)
+    assert bench.reason == "ft-stale"
+
+
+def test_a_fault_is_never_made_milder(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    bench.arm.qd = np.zeros(7)
+    bench.arm.missing = 6
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+
+
+def test_a_worse_fault_replaces_the_first(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.law.offset = 0.06
+    bench.run()
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+
+
+def test_the_first_of_two_equal_faults_is_told(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    bench.arm.qd = np.zeros(7)
+    bench.observer.speed = 2.0
+    bench.run()
+    assert bench.reason == "overspeed"
+
+
+def test_a_lasting_fault_enters_its_state_once(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run(5)
+    assert bench.law.entered == [ArmState.FLOAT, ArmState.DAMP]
+
+
+def test_a_new_request_clears_the_verdict(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    bench.arm.qd = np.zeros(7)
+    bench.enter(ArmState.HOLD)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "")
+
+
+def test_silence_of_the_pucks_holds_and_then_idles(bench):
+    bench.enter(ArmState.FLOAT)
+    for missing in range(1, 26):
+        bench.arm.missing = missing
+        bench.run()
+        expected = ArmState.FLOAT if missing < 5 else ArmState.HOLD
+        assert bench.state is (expected if missing < 25 else ArmState.IDLE)
+    assert bench.arm.idled == 1
+    assert bench.reason == "can-silence"
+
+
+def test_a_confirmed_idle_is_idle_with_zero_torque(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.mode = SafetyMode.E_STOP
+    record = bench.run()
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "estop")
+    assert record["torque_command"].tolist() == [0.0] * 7
+
+
+def test_idle_in_the_middle_of_a_silence_is_recorded_as_zero_torque(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.missing = 25
+    assert bench.run()["torque_command"].tolist() == [0.0] * 7
+
+
+def test_an_unconfirmed_idle_is_unknown_and_nothing_is_let_fall(bench):
+    bench.enter(ArmState.FLOAT)
+    sent = len(bench.arm.sent)
+    bench.arm.is_confirmed = False
+    bench.arm.q = np.full(7, np.nan)
+    record = bench.run()
+    bench.arm.q = np.zeros(7)
+    bench.run(5)
+    assert bench.state is ArmState.UNKNOWN
+    assert len(bench.arm.sent) == sent  # zero torque in ACTIVE would be free fall
+    assert record["torque_command"].tolist() == [1.0] * 7
+
+
+@pytest.mark.parametrize(
+    ("is_confirmed", "state"), [(True, ArmState.IDLE), (False, ArmState.UNKNOWN)]
+)
+def test_idle_on_request_is_confirmed_or_unknown(bench, is_confirmed, state):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.is_confirmed = is_confirmed
+    bench.enter(ArmState.IDLE)
+    assert bench.state is state
+
+
+def test_an_unknown_arm_can_be_held_again(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.IDLE)
+    bench.enter(ArmState.HOLD)
+    assert bench.state is ArmState.HOLD
+    assert bench.arm.sent[-1].tolist() == [2.0] * 7
+
+
+def test_torques_are_there_before_the_pendant_activates(bench):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.HOLD)
+    bench.run(10)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "")
+    assert bench.arm.sent[-1].tolist() == [2.0] * 7
+
+
+def test_idle_at_the_pendant_after_activation_is_a_verdict(bench):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.HOLD)
+    bench.arm.mode = SafetyMode.ACTIVE
+    bench.run()
+    bench.arm.mode = SafetyMode.IDLE
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "pendant-idle")
+
+
+def test_the_status_shows_the_age_of_the_force(bench):
+    bench.run()
+    bench.run(3, force=None)
+    assert bench.cycle.status.ft_age_ns == 3 * PERIOD_NS

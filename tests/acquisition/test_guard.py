@@ -1,0 +1,303 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.devices import ArmReading, SafetyMode
+from acquisition.guard import (
+    Action,
+    GuardState,
+    Limits,
+    Observation,
+    Verdict,
+    check,
+)
+
+MS = 1_000_000
+S = 1_000_000_000
+ARMED = GuardState(armed=0x7F)
+LIMITS = Limits(
+    q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
+    q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
+    qd=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
+    tau=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
+)
+
+
+def reading(**changes):
+    facts = {
+        "host_ns": 10 * S,
+        "arm_ns": 10 * S,
+        "counts": [0] * 7,
+        "q": np.zeros(7),
+        "qd": np.zeros(7),
+        "qd7_raw": 0.0,
+        "fresh": 0x7F,
+        "is_complete": True,
+        "missing_cycles": 0,
+    }
+    return ArmReading(**(facts | changes))
+
+
+QUIET = Observation(
+    reading=reading(),
+    safety=SafetyMode.ACTIVE,
+    foot_speed=0.0,
+    joint7_offset=0.0,
+    ft_age_ns=0,
+    tau=np.zeros(7),
+    is_recording=True,
+    is_powered=True,
+    is_late=False,
+)
+
+
+def seen(**changes):
+    """Return a quiet cycle with `changes` to it or to its reading."""
+    own = {k: v for k, v in changes.items() if k in Observation.__dataclass_fields__}
+    rest = {k: v for k, v in changes.items() if k not in own}
+    return replace(QUIET, reading=reading(**rest), **own)
+
+
+def judge(state=ARMED, **changes):
+    return check(LIMITS, state, seen(**changes))[1]
+
+
+def at(joint, value, n=7):
+    vector = np.zeros(n)
+    vector[joint - 1] = value
+    return vector
+
+
+def missing(cycles):
+    return {"missing_cycles": cycles, "is_complete": False, "fresh": 0x5F}
+
+
+E = 1e-9
+LIMIT_TABLE = [
+    (
+        "estop",
+        Action.IDLE,
+        {"safety": SafetyMode.ACTIVE},
+        {"safety": SafetyMode.E_STOP},
+    ),
+    (
+        "pendant-idle",
+        Action.IDLE,
+        {"safety": SafetyMode.UNKNOWN},
+        {"safety": SafetyMode.IDLE},
+    ),
+    ("can-silence", Action.HOLD, missing(4), missing(5)),
+    ("can-silence", Action.HOLD, missing(0), missing(24)),
+    ("can-silence", Action.IDLE, missing(0), missing(25)),
+    ("foot-speed", Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
+    ("joint7-slip", Action.HOLD, {"joint7_offset": 0.05}, {"joint7_offset": 0.05 + E}),
+    (
+        "joint7-slip",
+        Action.HOLD,
+        {"joint7_offset": -0.05},
+        {"joint7_offset": -0.05 - E},
+    ),
+    (
+        "ft-stale",
+        Action.HOLD,
+        {"ft_age_ns": 20 * MS},
+        {"ft_age_ns": 20 * MS + 1},
+    ),
+]
+
+
+@pytest.mark.parametrize(("reason", "action", "inside", "outside"), LIMIT_TABLE)
+def test_every_limit_trips_just_outside_and_not_just_inside(
+    reason, action, inside, outside
+):
+    assert judge(**inside).reason != reason
+    verdict = judge(**outside)
+    assert (verdict.reason, verdict.action) == (reason, action)
+
+
+@pytest.mark.parametrize("joint", range(1, 8))
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
+    limit = float(getattr(LIMITS, f"q_{side}")[joint - 1])
+    beyond = limit + (E if side == "upper" else -E)
+    assert judge(q=at(joint, limit)).action is Action.NONE
+    verdict = judge(q=at(joint, beyond))
+    assert (verdict.reason, verdict.action) == ("joint-limit", Action.DAMP)
+    assert dict(verdict.facts) == {"joint": joint, "value": beyond, "limit": limit}
+
+
+@pytest.mark.parametrize("joint", range(1, 8))
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(
+    ("field", "limits", "reason"),
+    [("qd", LIMITS.qd, "overspeed"), ("tau", LIMITS.tau, "torque-limit")],
+)
+def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, reason):
+    limit = float(limits[joint - 1])
+    assert judge(**{field: at(joint, sign * limit)}).action is Action.NONE
+    verdict = judge(**{field: at(joint, sign * (limit + E))})
+    assert (verdict.reason, verdict.action) == (reason, Action.DAMP)
+    assert dict(verdict.facts)["joint"] == joint
+    assert dict(verdict.facts)["limit"] == limit
+
+
+def test_a_quiet_cycle_passes():
+    state, verdict = check(LIMITS, ARMED, QUIET)
+    assert verdict == Verdict(Action.NONE)
+    assert state == ARMED
+
+
+@pytest.mark.parametrize("field", ["q", "qd", "tau"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("joint", [1, 7])
+def test_what_is_no_number_ends_in_idle(field, value, joint):
+    verdict = judge(**{field: at(joint, value)})
+    assert (verdict.reason, verdict.action) == ("not-a-number", Action.IDLE)
+
+
+@pytest.mark.parametrize("field", ["foot_speed", "joint7_offset"])
+def test_a_speed_or_offset_that_is_no_number_ends_in_idle(field):
+    assert judge(**{field: float("nan")}).reason == "not-a-number"
+
+
+def test_opposite_infinities_do_not_cancel():
+    q = np.zeros(7)
+    q[0], q[1] = np.inf, -np.inf
+    assert judge(q=q).reason == "not-a-number"
+
+
+FAULTS = {
+    "estop": {"safety": SafetyMode.E_STOP},
+    "not-a-number": {"tau": at(1, np.nan)},
+    "joint-limit": {"q": at(2, 2.5)},
+    "overspeed": {"qd": at(3, 9.0)},
+    "foot-speed": {"foot_speed": 2.0},
+    "torque-limit": {"tau": at(4, 99.0)},
+    "can-silence": missing(7),
+    "joint7-slip": {"joint7_offset": 0.2},
+    "ft-stale": {"ft_age_ns": S},
+}
+PAIRS = [
+    (worse, milder)
+    for i, worse in enumerate(FAULTS)
+    for milder in list(FAULTS)[i + 1 :]
+    if {worse, milder} != {"not-a-number", "torque-limit"}  # both are in tau
+]
+
+
+@pytest.mark.parametrize(("worse", "milder"), PAIRS)
+def test_of_two_faults_the_more_severe_is_told(worse, milder):
+    assert judge(**(FAULTS[milder] | FAULTS[worse])).reason == worse
+
+
+def test_no_fault_hides_a_more_severe_one():
+    for changes in FAULTS.values():
+        both = changes | {"safety": SafetyMode.E_STOP}
+        assert judge(**both).action is Action.IDLE
+
+
+def test_damping_is_worse_than_holding_and_better_than_idle():
+    severities = [Verdict(action).severity for action in Action]
+    assert severities == sorted(severities)
+    assert len(set(severities)) == 4
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_an_arm_that_is_not_powered_is_left_alone(name):
+    assert judge(**FAULTS[name], is_powered=False).action is Action.NONE
+
+
+@pytest.mark.parametrize("name", ["joint7-slip", "ft-stale"])
+def test_what_only_ends_a_trial_needs_a_trial(name):
+    assert judge(**FAULTS[name], is_recording=False).action is Action.NONE
+
+
+@pytest.mark.parametrize("name", sorted(set(FAULTS) - {"joint7-slip", "ft-stale"}))
+def test_the_other_limits_hold_without_a_trial_too(name):
+    assert judge(**FAULTS[name], is_recording=False).reason == name
+
+
+HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
+
+
+def test_home_on_the_stops_is_no_fault():
+    state, verdict = check(LIMITS, GuardState(), seen(q=HOME))
+    assert verdict.action is Action.NONE
+    assert state.armed == 0b1110101  # joints 2 and 4 stand on theirs
+
+
+@pytest.mark.parametrize(
+    ("value", "is_armed"), [(-1.9, False), (-1.9 + E, True), (1.9, False)]
+)
+def test_a_position_limit_is_armed_a_tenth_of_a_radian_inside(value, is_armed):
+    state, _ = check(LIMITS, GuardState(), seen(q=at(2, value)))
+    assert bool(state.armed & 0b10) is is_armed
+
+
+def test_an_armed_limit_stays_armed():
+    state, _ = check(LIMITS, GuardState(), QUIET)
+    assert state.armed == 0x7F
+    state, verdict = check(LIMITS, state, seen(q=HOME))
+    assert verdict.reason == "joint-limit"
+    assert state.armed == 0x7F
+
+
+def test_limits_are_armed_while_the_arm_is_idle():
+    state, _ = check(LIMITS, GuardState(), seen(is_powered=False))
+    assert state.armed == 0x7F
+
+
+def test_an_extrapolated_position_arms_nothing():
+    state, _ = check(LIMITS, GuardState(), seen(**missing(1)))
+    assert state.armed == 0
+
+
+def test_only_joints_whose_limit_is_armed_are_judged():
+    q = np.zeros(7)
+    q[1], q[2] = -2.01, 2.81
+    verdict = judge(GuardState(armed=0b1111101), q=q)
+    assert dict(verdict.facts)["joint"] == 3
+
+
+def late_cycles(times, state=ARMED):
+    verdict = Verdict(Action.NONE)
+    for t_ns in times:
+        changes = {"is_late": True, "host_ns": t_ns}
+        state, verdict = check(LIMITS, state, seen(**changes))
+    return state, verdict
+
+
+def test_ten_late_cycles_in_a_second_are_tolerated():
+    assert late_cycles(range(0, 100 * MS, 10 * MS))[1].action is Action.NONE
+
+
+def test_eleven_late_cycles_in_a_second_end_in_hold():
+    _, verdict = late_cycles(range(0, 110 * MS, 10 * MS))
+    assert (verdict.reason, verdict.action) == ("loop-late", Action.HOLD)
+    assert dict(verdict.facts) == {"late": 11.0, "limit": 10.0}
+
+
+def test_late_cycles_are_forgotten_after_a_second():
+    times = [*range(0, 100 * MS, 10 * MS), S + 1]
+    assert late_cycles(times)[1].action is Action.NONE
+    times = [*range(0, 100 * MS, 10 * MS), S]
+    assert late_cycles(times)[1].reason == "loop-late"
+
+
+def test_a_punctual_cycle_does_not_repeat_the_verdict():
+    state, _ = late_cycles(range(0, 110 * MS, 10 * MS))
+    _, verdict = check(LIMITS, state, seen(host_ns=112 * MS))
+    assert verdict.action is Action.NONE
+
+
+def test_the_memory_of_late_cycles_does_not_grow():
+    state, _ = late_cycles(range(0, 60 * S, 500 * MS))
+    assert len(state.late) <= 3
+    state, _ = check(LIMITS, state, seen(host_ns=70 * S))
+    assert state.late == ()
+
+
+def test_silence_tells_how_long_and_how_many():
+    assert dict(judge(**missing(5)).facts) == {"ms": 10.0, "silent": 1.0}
+    assert dict(judge(**missing(25)).facts) == {"ms": 50.0}

@@ -1,0 +1,241 @@
+import numpy as np
+import pytest
+
+from acquisition.devices import WrenchSample
+from acquisition.errors import TrialFileError
+from acquisition.messages import CYCLE
+from acquisition.recorder import Recorder
+from acquisition.shared import SampleRing
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.writer import TrialWriter
+from fakes.clock import SteppedClock
+from tests.acquisition.ros import decode, messages_of
+from tests.acquisition.trials import PERIOD_NS, make_cycles, make_header
+
+MS = 1_000_000
+
+
+class Desk:
+    """A recorder, its ring and its clock, with a loop that runs when told."""
+
+    def __init__(self, folder, slots=8192):
+        self.clock = SteppedClock()
+        self.ring = SampleRing(slots)
+        self.recorder = Recorder(self.ring, self.clock)
+        self.path = folder / "T01.mcap"
+        self.cycle = 0
+
+    def run(self, cycles, *, drain_every=None):
+        records = make_cycles(cycles, first=self.cycle)
+        records["host_ns"] = self.clock.now_ns() + PERIOD_NS * np.arange(cycles)
+        data = memoryview(records.tobytes())
+        for i in range(cycles):
+            self.ring.write(data[i * CYCLE.size : (i + 1) * CYCLE.size])
+            self.clock.sleep_until(self.clock.now_ns() + PERIOD_NS)
+            if drain_every and (i + 1) % drain_every == 0:
+                self.recorder.drain()
+        self.cycle += cycles
+
+    def start(self):
+        self.recorder.start(lambda: TrialWriter(self.path, make_header()))
+
+    def numbers(self):
+        return TrialReader(self.path).cycles().data["cycle"].tolist()
+
+    def wrench(self, age_ns=0):
+        t_ns = self.clock.now_ns() - age_ns
+        return WrenchSample(t_ns, 0, (0.0,) * 6, 0, True, False)
+
+
+@pytest.fixture
+def desk(tmp_path):
+    return Desk(tmp_path)
+
+
+@pytest.fixture
+def flushes(monkeypatch):
+    """Count what is forced to the disk, in records written so far."""
+    seen = []
+    flush = TrialWriter.flush
+
+    def counted(self):
+        seen.append(self.counts.cycles)
+        flush(self)
+
+    monkeypatch.setattr(TrialWriter, "flush", counted)
+    return seen
+
+
+def test_a_trial_begins_one_second_before_its_trigger(desk):
+    desk.run(1200)
+    desk.start()
+    desk.run(300)
+    desk.recorder.stop("end")
+    assert desk.numbers() == list(range(700, 1500))
+
+
+def test_a_young_loop_gives_what_pre_roll_it_has(desk):
+    desk.run(40)
+    desk.start()
+    desk.run(10)
+    desk.recorder.stop("end")
+    assert desk.numbers() == list(range(50))
+
+
+def test_a_second_trial_repeats_nothing_but_its_pre_roll(desk, tmp_path):
+    desk.start()
+    desk.run(600)
+    desk.recorder.stop("end")
+    desk.path = tmp_path / "T02.mcap"
+    desk.start()
+    desk.run(10)
+    desk.recorder.stop("end")
+    assert desk.numbers() == list(range(100, 610))
+
+
+def test_forces_of_the_pre_roll_are_kept_and_older_ones_are_not(desk):
+    desk.clock.sleep_until(desk.clock.now_ns() + 3000 * MS)
+    young, old = desk.wrench(999 * MS), desk.wrench(1001 * MS)
+    desk.recorder.add_wrenches([old, young])
+    desk.start()
+    desk.run(5)
+    desk.recorder.stop("end")
+    assert batches(desk) == [[young.t_ns]]
+
+
+def test_forces_do_not_pile_up_between_trials(desk):
+    desk.recorder.add_wrenches([desk.wrench() for _ in range(9000)])
+    desk.start()
+    desk.run(5)
+    desk.recorder.stop("end")
+    assert [len(batch) for batch in batches(desk)] == [2000]  # 1 s at 2 kHz
+
+
+def batches(desk):
+    found = messages_of(desk.path)["/ft/raw"]
+    type_name = "traction_msgs/msg/WrenchBatch"
+    return [decode(type_name, payload).t_ns.tolist() for _, payload in found]
+
+
+def test_draining_writes_what_is_new(desk):
+    desk.start()
+    desk.run(10)
+    desk.recorder.drain()
+    desk.recorder.drain()
+    desk.run(7)
+    verified = desk.recorder.stop("end")
+    assert verified.cycles == 17
+
+
+def test_draining_without_a_trial_does_nothing(desk):
+    desk.run(10)
+    desk.recorder.drain()
+    assert not desk.recorder.is_recording
+
+
+def test_the_file_is_forced_to_the_disk_every_quarter_second(desk, flushes):
+    desk.start()
+    desk.run(500, drain_every=10)
+    desk.recorder.abandon()
+    assert flushes == [130, 260, 390]  # first drain at or after 0.25 s: 130 cycles
+
+
+def test_a_fast_drain_does_not_flush_more_often(desk, flushes):
+    desk.start()
+    desk.run(500, drain_every=1)
+    desk.recorder.abandon()
+    assert flushes == [125, 250, 375, 500]
+
+
+def test_what_the_ring_lost_is_in_the_result(tmp_path):
+    desk = Desk(tmp_path, slots=64)
+    desk.run(64)
+    desk.start()
+    desk.run(100)
+    desk.recorder.stop("end")
+    result = TrialReader(desk.path).metadata["result"]
+    assert result["lost_in_ring"] == "100"  # 64 of the pre-roll and 36 after it
+    assert desk.numbers() == list(range(100, 164))
+
+
+def test_a_small_ring_is_not_a_loss(tmp_path):
+    desk = Desk(tmp_path, slots=64)
+    desk.run(200)
+    desk.start()
+    desk.recorder.drain()
+    desk.run(10)
+    desk.recorder.stop("end")
+    assert TrialReader(desk.path).metadata["result"]["lost_in_ring"] == "0"
+
+
+def test_events_are_written_while_a_trial_runs(desk):
+    desk.recorder.event(20, "operator", "before")
+    desk.start()
+    desk.run(5)
+    desk.recorder.event(20, "operator", "during")
+    desk.recorder.stop("end")
+    assert TrialReader(desk.path).topic_counts()["/events"] == 1
+
+
+def full_disk(monkeypatch):
+    def full(_descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+
+
+def test_a_write_error_keeps_the_partial_and_is_told(desk, monkeypatch):
+    desk.start()
+    desk.run(100, drain_every=10)
+    full_disk(monkeypatch)
+    with pytest.raises(TrialFileError, match="No space left"):
+        desk.run(100, drain_every=10)
+    desk.recorder.abandon()
+    assert not desk.recorder.is_recording
+    assert not desk.path.exists()
+    assert desk.path.with_name("T01.mcap.partial").stat().st_size > 0
+
+
+def test_a_write_error_at_the_end_keeps_the_partial(desk, monkeypatch):
+    desk.start()
+    desk.run(100)
+    full_disk(monkeypatch)
+    with pytest.raises(TrialFileError, match="No space left"):
+        desk.recorder.stop("end")
+    assert not desk.recorder.is_recording
+    assert [p.name for p in desk.path.parent.iterdir()] == ["T01.mcap.partial"]
+
+
+def test_a_write_error_in_the_last_drain_ends_the_recording(desk, monkeypatch):
+    desk.start()
+    desk.run(200)  # a quarter of a second has passed: the last drain flushes
+    full_disk(monkeypatch)
+    with pytest.raises(TrialFileError):
+        desk.recorder.detach()
+    assert not desk.recorder.is_recording
+
+
+def test_a_trial_that_cannot_be_verified_is_not_published(desk):
+    desk.start()
+    with pytest.raises(TrialFileError, match="fewer than two"):
+        desk.recorder.stop("end")
+    assert [p.name for p in desk.path.parent.iterdir()] == ["T01.mcap.partial"]
+
+
+def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(desk):
+    desk.path.write_bytes(b"taken")
+    with pytest.raises(TrialFileError):
+        desk.start()
+    assert not desk.recorder.is_recording
+
+
+def test_stopping_without_a_trial_is_an_error_of_the_program(desk):
+    with pytest.raises(RuntimeError):
+        desk.recorder.stop("end")
+
+
+def test_abandoning_twice_does_nothing(desk):
+    desk.start()
+    desk.recorder.abandon()
+    desk.recorder.abandon()
+    assert not desk.recorder.is_recording

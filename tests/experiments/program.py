@@ -1,0 +1,110 @@
+"""The program as a person meets it: arguments in, exit code and texts out."""
+
+import contextlib
+import hashlib
+import io
+import json
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+import fakes.rig
+from experiments.cli import main
+from experiments.operator import AutoKeys
+
+TRAVEL = 0.07  # m, a container that is crossed in a few seconds
+
+
+@dataclass(frozen=True)
+class Done:
+    """How a command ended, and what it said."""
+
+    code: int
+    out: str
+    err: str
+
+
+def traction(*arguments) -> Done:
+    """Run a command in this process; argparse's own refusals are exit codes too."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as exit_:
+            code = exit_.code
+    return Done(code, out.getvalue(), err.getvalue())
+
+
+def run_short(config, data, terrain="TF", trials=1, *more) -> Done:
+    """Run a simulated session in a short container."""
+    options = ("--fake", "--fast", "--operator-script", "auto", "--trials", trials)
+    return traction("run", terrain, *options, "--config", config, "--data", data, *more)
+
+
+def write_config(folder: Path, *, rig=None, matrix=None, travel=TRAVEL) -> Path:
+    """Write rig.toml and matrix.toml, changed by (old, new), and return the first."""
+    shipped = resources.files("experiments.data")
+    for name, change in (("rig.toml", rig), ("matrix.toml", matrix)):
+        text = (shipped / name).read_text()
+        text = text.replace("travel = 0.45", f"travel = {travel}")
+        if change is not None:
+            assert change[0] in text
+            text = text.replace(*change, 1)
+        (folder / name).write_text(text)
+    return folder / "rig.toml"
+
+
+def only_session(data: Path) -> Path:
+    """Return the folder of the one session below `data`."""
+    (folder,) = [path for path in (data / "sessions").iterdir() if path.is_dir()]
+    return folder
+
+
+def journal(folder: Path) -> list[dict]:
+    text = (folder / "events.jsonl").read_text()
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def sidecar(path: Path) -> dict:
+    return json.loads(path.with_name(path.name.split(".")[0] + ".json").read_text())
+
+
+def digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A session and the simulated rig it ran on."""
+
+    done: Done
+    folder: Path
+    rig: fakes.rig.FakeRig
+
+
+def run_watched(config, data, *arguments, press=None):
+    """Run a session and keep hold of the simulated rig.
+
+    `press(asked, rig)` returns the key pressed, or None for what AutoKeys would press.
+    """
+    seen = []
+
+    class Seen(fakes.rig.FakeRig):
+        def __init__(self, *arguments):
+            super().__init__(*arguments)
+            seen.append(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fakes.rig, "FakeRig", Seen)
+        if press is not None:
+            usual = AutoKeys.answer
+
+            def answer(self, asked):
+                key = press(asked, seen[0])
+                return usual(self, asked) if key is None else key
+
+            patch.setattr(AutoKeys, "answer", answer)
+        done = run_short(config, data, "TF", *arguments)
+    return Watched(done, only_session(data), seen[0])

@@ -1,0 +1,168 @@
+import json
+
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.sample import SAFETY_MODE_MASK
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.verify import verify
+from tests.acquisition.ros import decode, messages_of
+from tests.experiments.program import (
+    digest,
+    journal,
+    run_short,
+    run_watched,
+    sidecar,
+)
+
+
+@pytest.fixture(scope="module")
+def stale(tmp_path_factory, config):
+    data = tmp_path_factory.mktemp("stale")
+    return run_watched(config, data, 1, "--fault", "ft-stale@T1+1s", "--seed", 2)
+
+
+@pytest.fixture(scope="module")
+def silence(tmp_path_factory, config):
+    data = tmp_path_factory.mktemp("silence")
+    return run_watched(config, data, 2, "--fault", "can-silence@T2+0.5s")
+
+
+@pytest.fixture(scope="module")
+def estop(tmp_path_factory, config):
+    data = tmp_path_factory.mktemp("estop")
+    return run_watched(config, data, 1, "--fault", "estop@T1+0.4s")
+
+
+@pytest.mark.parametrize(
+    ("fault", "text"),
+    [
+        ("ft-silent", "No F/T data for 100 ms (port open, 0 bytes). ARM: idle."),
+        ("puck-missing", "Puck 5 does not answer (1,2,3,4,6,7 do). ARM: not touched."),
+    ],
+)
+def test_a_rig_that_is_not_fit_is_refused_and_nothing_is_created(
+    config, tmp_path, fault, text
+):
+    data = tmp_path / "data"
+    done = run_short(config, data, "TF", 1, "--fault", fault)
+    assert done.code == 3
+    assert done.err.startswith(text)
+    assert len(done.err.splitlines()) == 1
+    assert not data.exists()
+
+
+# --- the sensor stops in a trial: the trial is lost, the session is not ---------------
+
+
+def test_a_stale_sensor_interrupts_the_trial_and_it_is_redone(stale):
+    assert stale.done.code == 0
+    assert [e["event"] for e in journal(stale.folder) if "trial" in e] == [
+        "trial-started",
+        "trial-rejected",
+        "trial-started",
+        "trial-kept",
+    ]
+    facts = json.loads((stale.folder / "session.json").read_text())
+    assert (facts["kept"], facts["rejected"]) == (["T01"], 1)
+
+
+def test_a_stale_sensor_is_told_with_age_limit_and_what_the_arm_does(stale):
+    (line,) = stale.done.err.splitlines()
+    assert line.startswith("T01 stopped at 1.0 s: F/T sample 21 ms old (limit 20).")
+    assert "ARM: holding. [r]edo when the sensor is back." in line
+
+
+def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
+    path = stale.folder / "rejected" / "T01a.mcap"
+    facts = sidecar(path)
+    assert verify(path).sha256 == facts["sha256"] == digest(path)
+    assert (facts["verdict"], facts["status"]) == ("reject", "interrupted")
+    assert facts["reason"] == "interrupted: ft-stale"
+    assert path.with_suffix(".truth.mcap").exists()
+    reader = TrialReader(path)
+    assert reader.metadata["result"]["stop_reason"] == "ft-stale"
+    lasted = np.ptp(reader.cycles().data["host_ns"].astype(float)) * 1e-9
+    assert lasted == pytest.approx(2.0, abs=0.05)  # pre-roll, 1 s, two ticks
+
+
+def test_the_redone_trial_says_that_it_is_a_second_attempt(stale):
+    path = stale.folder / "trials" / "T01.mcap"
+    assert sidecar(path)["attempt"] == 2
+    assert TrialReader(path).metadata["trial"]["attempt"] == "2"
+
+
+def test_the_flight_record_holds_two_seconds_of_frames(stale):
+    found = messages_of(stale.folder / "faults" / "T01a.flight.mcap")
+    ((_, payload),) = found["/can/raw"]
+    batch = decode("traction_msgs/msg/CanBatch", payload)
+    assert len(batch.frames) == 16 * len(batch.t_ns)
+    assert np.ptp(batch.t_ns.astype(float)) == pytest.approx(2e9, rel=0.01)
+    assert len(found["/cycle"]) == 1000
+    assert any(b"ft-stale" in payload for _, payload in found["/events"])
+
+
+def test_another_seed_gives_other_cycles(stale, recorded):
+    mine = TrialReader(recorded.folder / "trials" / "T01.mcap").cycles().data
+    other = TrialReader(stale.folder / "rejected" / "T01a.mcap").cycles().data
+    count = min(len(mine), len(other))
+    assert mine[:count].tobytes() != other[:count].tobytes()
+
+
+# --- the arm is gone: the session ends ------------------------------------------------
+
+
+def test_silence_on_the_bus_ends_the_session_with_exit_code_4(silence):
+    assert silence.done.code == 4
+    assert journal(silence.folder)[-1]["event"] == "session-ended"
+    assert journal(silence.folder)[-1]["reason"] == "can-silence"
+
+
+def test_silence_on_the_bus_is_told_with_what_to_do(silence):
+    (line,) = silence.done.err.splitlines()
+    assert line.startswith("No reply from the arm for ")
+    assert "ARM: UNKNOWN - support it, press Shift-idle." in line
+    assert line.endswith(f"1 trial is safe in {silence.folder}.")
+    assert "Flight record: faults/T02a.flight.mcap." in silence.done.out
+
+
+def test_after_silence_the_arm_is_braked_as_its_own_devices_see_it(silence):
+    assert silence.rig.network.safety_mode in {SafetyMode.IDLE, SafetyMode.E_STOP}
+    assert not silence.rig.plant.qd.any()
+
+
+def test_after_silence_the_earlier_trial_is_what_it_was(silence):
+    path = silence.folder / "trials" / "T01.mcap"
+    assert {p.name.split(".")[0] for p in path.parent.iterdir()} == {"T01"}
+    assert verify(path).sha256 == sidecar(path)["sha256"]  # as written when kept
+    assert sidecar(path)["verdict"] == "keep"
+    assert (silence.folder / "rejected" / "T02a.mcap").exists()
+
+
+def test_the_same_seed_gives_the_same_cycles_byte_for_byte(silence, recorded):
+    one, two = (
+        TrialReader(folder / "trials" / "T01.mcap").cycles().data
+        for folder in (silence.folder, recorded.folder)
+    )
+    assert one.tobytes() == two.tobytes()
+
+
+def test_a_pressed_stop_ends_the_session_and_says_when(estop):
+    assert estop.done.code == 4
+    (line,) = estop.done.err.splitlines()
+    assert line.startswith("Stop pressed at 0.4")
+    assert "Release it, press Shift-idle, zero the arm" in line
+    assert journal(estop.folder)[-1]["reason"] == "estop"
+
+
+def test_a_pressed_stop_is_never_fought(estop):
+    assert estop.rig.network.safety_mode is SafetyMode.E_STOP
+    last = TrialReader(estop.folder / "faults" / "T01a.flight.mcap").cycles().data[-1]
+    assert last["flags"] & SAFETY_MODE_MASK == SafetyMode.E_STOP
+    assert not last["torque_command"].any()
+
+
+def test_a_pressed_stop_keeps_the_trial_as_interrupted(estop):
+    assert sidecar(estop.folder / "rejected" / "T01a.mcap")["status"] == "interrupted"
+    assert list((estop.folder / "trials").iterdir()) == []

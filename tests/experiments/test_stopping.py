@@ -1,0 +1,175 @@
+import signal
+
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.sample import SAFETY_MODE_MASK
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.verify import verify
+from experiments.company import StopFlag
+from experiments.operator import Prompt
+from tests.experiments.program import journal, run_watched, sidecar
+
+
+def short_trial(asked):
+    """End a recording at once and keep it; None where AutoKeys knows better."""
+    if asked.prompt is Prompt.RECORDING:
+        return " " if asked.since > 0.3 else ""
+    return "k" if asked.prompt is Prompt.REVIEW else None
+
+
+def last_mode(path):
+    flags = TrialReader(path).cycles().data["flags"][-1]
+    return SafetyMode(int(flags) & SAFETY_MODE_MASK)
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory, config):
+    """Return a session that got one Ctrl-C in its second trial."""
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.RECORDING and asked.trial == 2 and asked.since > 0.3:
+            signal.raise_signal(signal.SIGINT)
+            return ""
+        return short_trial(asked)
+
+    return run_watched(config, tmp_path_factory.mktemp("once"), 3, press=press)
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory, config):
+    """Return a session that got Ctrl-C twice at once in its first trial."""
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.RECORDING and asked.since > 0.3:
+            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
+        return None
+
+    return run_watched(config, tmp_path_factory.mktemp("twice"), 1, press=press)
+
+
+@pytest.fixture(scope="module")
+def disturbed(tmp_path_factory, config):
+    """Return a session with an elbow pushed in one review, a stop in the next."""
+    pushed = []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.REVIEW and asked.trial == 1 and not pushed:
+            pushed.append(True)
+            rig.plant.qd[3] = 6.0
+            return ""
+        if asked.prompt is Prompt.REVIEW and asked.trial == 2:
+            rig.network.pendant("estop")
+            return ""
+        return short_trial(asked)
+
+    return run_watched(config, tmp_path_factory.mktemp("disturbed"), 2, press=press)
+
+
+def test_ctrl_c_ends_the_session_unfinished_with_exit_code_5(once):
+    assert once.done.code == 5
+    assert journal(once.folder)[-1]["reason"] == "unfinished"
+    assert "Nothing that was recorded is lost. 1 trial is safe in" in once.done.out
+
+
+def test_ctrl_c_closes_the_running_trial_as_interrupted(once):
+    path = once.folder / "rejected" / "T02a.mcap"
+    assert verify(path).sha256 == sidecar(path)["sha256"]
+    assert sidecar(path)["status"] == "interrupted"
+    assert sidecar(path)["reason"] == "interrupted: interrupted"
+    assert not list(once.folder.rglob("*.partial"))
+
+
+def test_ctrl_c_leaves_earlier_trials_as_they_were(once):
+    path = once.folder / "trials" / "T01.mcap"
+    assert verify(path).sha256 == sidecar(path)["sha256"]
+
+
+def test_ctrl_c_holds_the_arm_until_the_trial_is_closed_and_then_brakes_it(once):
+    assert last_mode(once.folder / "rejected" / "T02a.mcap") is SafetyMode.ACTIVE
+    assert once.rig.network.safety_mode is SafetyMode.IDLE
+    assert once.done.out.splitlines()[-1] == "ARM: idle, braked."
+
+
+def test_ctrl_c_twice_damps_and_brakes_the_arm_before_the_file_is_closed(twice):
+    path = twice.folder / "rejected" / "T01a.mcap"
+    assert twice.done.code == 5
+    assert last_mode(path) is SafetyMode.IDLE
+    assert sidecar(path)["status"] == "interrupted"
+    assert twice.rig.network.safety_mode is SafetyMode.IDLE
+
+
+def test_signals_are_given_back_after_a_session(once, twice):
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+def test_a_fault_during_the_review_does_not_cost_the_trial(disturbed):
+    assert "Joint 4 " in disturbed.done.err
+    assert "ARM: damping, then holding." in disturbed.done.err
+    assert (disturbed.folder / "trials" / "T01.mcap").exists()
+    assert sidecar(disturbed.folder / "trials" / "T01.mcap")["verdict"] == "keep"
+
+
+def test_a_stop_during_the_review_ends_the_session_with_the_trial_rejected(disturbed):
+    assert disturbed.done.code == 4
+    assert "Stop pressed" in disturbed.done.err
+    path = disturbed.folder / "rejected" / "T02a.mcap"
+    assert sidecar(path)["reason"] == "session ended at the review"
+    assert not (disturbed.folder / "trials" / "T02.mcap").exists()
+
+
+def test_a_script_rejects_with_its_reason_and_quits(tmp_path, config):
+    script = tmp_path / "script.txt"
+    script.write_text("redo 2  # the first one\n\nquit\n")
+    seen = run_watched(
+        config, tmp_path / "data", 1, "--operator-script", script, press=short_trial_of
+    )
+    assert seen.done.code == 5
+    reasons = [
+        sidecar(seen.folder / "rejected" / f"{name}.mcap")["reason"]
+        for name in ("T01a", "T01b")
+    ]
+    assert reasons == ["too fast", "session ended at the review"]
+
+
+def short_trial_of(asked, rig):
+    return short_trial(asked)
+
+
+def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
+    tmp_path, config
+):
+    def press(asked, rig):
+        if asked.prompt is Prompt.LIFT and asked.since > 0.1:
+            raise ZeroDivisionError("so to speak")
+        return None
+
+    seen = run_watched(config, tmp_path, 1, press=press)
+    log = seen.folder / "log.txt"
+    assert seen.done.code == 1
+    assert seen.done.err.startswith(f"Bug: ZeroDivisionError: so to speak. Log: {log}.")
+    assert "ZeroDivisionError" in log.read_text()
+    assert seen.rig.network.safety_mode is SafetyMode.IDLE
+
+
+class Hands:
+    """A clock that a test moves."""
+
+    def __init__(self):
+        self.now = 5_000_000_000
+
+    def now_ns(self):
+        return self.now
+
+
+@pytest.mark.parametrize(("pause", "is_urgent"), [(3.0, True), (3.1, False)])
+def test_a_second_request_is_urgent_within_three_seconds(pause, is_urgent):
+    clock = Hands()
+    stop = StopFlag(clock)
+    stop.ask()
+    assert (stop.count, stop.is_urgent) == (1, False)
+    clock.now += round(pause * 1e9)
+    stop.ask()
+    assert (stop.count, stop.is_urgent) == (2, is_urgent)

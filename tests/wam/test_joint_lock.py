@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wam.joint_lock import JointLock, LockGains
+
+S = 1_000_000_000
+START = 7 * S
+FULL = START + S  # long after the stiffness has grown
+
+
+@pytest.fixture
+def lock():
+    lock = JointLock()
+    lock.engage(0.4, START)
+    return lock
+
+
+def test_the_lock_takes_hold_without_a_bump(lock):
+    assert lock.torque(0.4, 0.0, START) == 0.0
+    assert lock.torque(0.45, 0.0, START) == 0.0  # no stiffness yet
+
+
+def test_it_pulls_back_to_where_it_was_engaged(lock):
+    assert lock.torque(0.41, 0.0, FULL) == pytest.approx(-0.2, abs=1e-12)
+    assert lock.torque(0.39, 0.0, FULL) == pytest.approx(+0.2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("after", "share"), [(0.0, 0.0), (0.125, 0.25), (0.25, 0.5), (0.5, 1.0), (9.0, 1.0)]
+)
+def test_the_stiffness_grows_in_half_a_second(lock, after, share):
+    tau = lock.torque(0.41, 0.0, START + int(after * S))
+    assert tau == pytest.approx(-0.2 * share, abs=1e-12)
+
+
+def test_the_damping_is_there_from_the_start(lock):
+    assert lock.torque(0.4, 1.0, START) == pytest.approx(-0.2, abs=1e-12)
+    assert lock.torque(0.4, -1.0, START) == pytest.approx(+0.2, abs=1e-12)
+
+
+@pytest.mark.parametrize("error", [0.064, 0.066, 1.0, 100.0])
+def test_the_torque_is_clipped_where_the_puck_ends(lock, error):
+    expected = min(20.0 * error, 1.3)
+    assert lock.torque(0.4 - error, 0.0, FULL) == pytest.approx(expected, abs=1e-9)
+    assert lock.torque(0.4 + error, 0.0, FULL) == pytest.approx(-expected, abs=1e-9)
+
+
+def test_fast_motion_is_clipped_too(lock):
+    assert lock.torque(0.4, 1e6, FULL) == -1.3
+
+
+@given(
+    q7=st.floats(-3, 3),
+    qd7=st.floats(-50, 50),
+    after_ns=st.integers(0, 10 * S),
+)
+def test_no_motion_makes_more_torque_than_the_limit(q7, qd7, after_ns):
+    lock = JointLock()
+    lock.engage(0.4, START)
+    assert abs(lock.torque(q7, qd7, START + after_ns)) <= 1.3
+
+
+def test_a_second_engage_keeps_the_first_reference(lock):
+    lock.engage(1.0, FULL)
+    assert lock.torque(0.41, 0.0, FULL) == pytest.approx(-0.2, abs=1e-12)
+    assert lock.offset(0.41) == pytest.approx(0.01, abs=1e-12)
+
+
+def test_a_released_lock_lets_go(lock):
+    lock.release()
+    assert not lock.is_engaged
+    assert lock.torque(2.0, 5.0, FULL) == 0.0
+    assert lock.offset(2.0) == 0.0
+
+
+def test_a_lock_engaged_again_grows_again_at_its_new_place(lock):
+    lock.release()
+    lock.engage(1.0, FULL)
+    assert lock.is_engaged
+    assert lock.torque(1.1, 0.0, FULL) == 0.0
+    assert lock.torque(1.01, 0.0, FULL + S) == pytest.approx(-0.2, abs=1e-12)
+
+
+def test_a_fresh_lock_does_nothing():
+    assert not JointLock().is_engaged
+    assert JointLock().torque(1.0, 1.0, START) == 0.0
+
+
+def test_other_gains_are_used():
+    lock = JointLock(LockGains(kp=8.0, kd=0.05, limit=0.5))
+    lock.engage(0.0, START)
+    assert lock.torque(-0.01, 0.2, FULL) == pytest.approx(0.07, abs=1e-12)
+    assert lock.torque(-1.0, 0.0, FULL) == 0.5
+
+
+def test_the_lock_comes_to_rest_on_the_example_foot():
+    """A push of 0.2 N m for 0.2 s, one cycle of delay, quantised to a count."""
+    lock, inertia, count, dt = JointLock(), 1.0e-3 + 0.32e-3, 102.7e-6, 0.002
+    lock.engage(0.0, START)
+    q = qd = tau = 0.0
+    seen, trace = 0.0, []
+    for i in range(1500):
+        before, seen = seen, count * round(q / count)
+        wanted = lock.torque(seen, (seen - before) / dt, START + S + i * 2_000_000)
+        push = 0.2 if 100 <= i < 200 else 0.0
+        for _ in range(10):
+            qd += (tau + push) / inertia * dt / 10
+            q += qd * dt / 10
+        tau = wanted
+        trace.append(q)
+    assert max(np.abs(trace)) < 0.02  # 0.2 N m at 20 N m/rad is 10 mrad
+    assert max(np.abs(trace[-500:])) < 3 * count
