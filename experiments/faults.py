@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 
 from acquisition.errors import SettingsError
-from experiments.rigs import Rehearsing
+from experiments.rehearsing import Rehearsing
 
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"

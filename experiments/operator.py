@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Protocol
 
 from acquisition.errors import SettingsError
-from experiments.rigs import Rehearsing
+from experiments.rehearsing import Rehearsing
 
 REJECT_REASONS = {
     "1": "foot left the bed",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,8 +16,9 @@ from acquisition.flight import FrameTape
 from acquisition.guard import Limits
 from acquisition.loop import Loop
 from acquisition.recorder import Recorder
-from acquisition.sample import Flag, Record
+from acquisition.sample import Flag
 from acquisition.shared import SampleRing
+from experiments.rehearsing import Rehearsing
 from experiments.settings import FootSection, RigSettings, Settings, TerrainRow
 from ft_sensor.observer import LiveFoot
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
@@ -43,51 +44,6 @@ LATE_WHEN_SIMULATED = 250
 # On the wall clock the simulated safety module lives in the loop's own process, so a
 # stall of the machine stops both: it must not look like a lost heartbeat.
 HEARTBEAT_IN_PROCESS_NS = 1_000_000_000
-
-
-class Rehearsing(Protocol):
-    """What only a simulated rig can be asked; see fakes.rig.Rehearsal."""
-
-    @property
-    def fault_names(self) -> tuple[str, ...]:
-        """Names that `inject` knows."""
-        ...
-
-    def prepare(self, trial: int) -> None:
-        """Rake the bed for `trial`."""
-        ...
-
-    def lift(self) -> None:
-        """Let the hand lift the foot above the far end."""
-        ...
-
-    def put_down(self) -> None:
-        """Let the hand put the foot down there."""
-        ...
-
-    def push(self) -> None:
-        """Let the hand push the foot across; the truth is written from here on."""
-        ...
-
-    def pendant(self, button: Literal["activate", "idle", "estop"]) -> None:
-        """Press the pendant."""
-        ...
-
-    def inject(self, fault: str) -> None:
-        """Let a device fail."""
-        ...
-
-    def mend(self) -> None:
-        """End every fault that can be ended without the arm."""
-        ...
-
-    def take_truth(self) -> Record:
-        """Return traction_msgs/Truth records since the push began."""
-        ...
-
-    def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,64 +1,47 @@
 """The runner: lift, tare, put down, record, review, until the session is complete."""
 
-import sys
 import traceback
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import TypeVar
 
 import numpy as np
 
-from acquisition.control import InlineControl
 from acquisition.cycle import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError, TractionError
 from acquisition.guard import Verdict
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from experiments.archive import ENOUGH, Archive, Outcome
-from experiments.company import Company, FaultedError, StopAskedError
+from experiments.book import Book
+from experiments.company import FaultedError, StopAskedError
 from experiments.messages import CATALOGUE
-from experiments.operator import REJECT_REASONS, Asked, Prompt
+from experiments.operator import REJECT_REASONS, Prompt
 from experiments.review import Review, review_trial
-from experiments.rigs import Rig
-from experiments.session import SessionState, apply
-from experiments.store import iso_utc, write_json, write_text
+from experiments.stage import TICK, Stage
+from experiments.store import write_text
 from experiments.trial import EndWatch, SessionFacts, TrialName, trial_header
 from ft_sensor.tare import TareError, tare
 
-SWITCH_INTERVAL = 0.0002  # while slow work shares the interpreter with the loop [s]
-TICK = 0.02  # the console looks this often [s]
 TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3
 STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
 LIVE_SECONDS = 5.0  # between two lines of a running trial
 FAULTS_IN_A_ROW = 5  # end the session: something is wrong that redoing cannot mend
-DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
-_T = TypeVar("_T")
 
 
-@dataclass(slots=True)
 class SessionRunner:
     """Runs one session on a rig that passed its preflight."""
 
-    rig: Rig
-    control: InlineControl
-    facts: SessionFacts
-    company: Company
-    state: SessionState = field(default_factory=SessionState)
-    archive: Archive = field(init=False)
-    _asked: tuple[Prompt, int, int] | None = None
-    _asked_at: int = 0
-    _place: tuple[str, float] = ("The session", 0.0)
-    _faults: int = 0
-    _is_stopped: bool = False
-
-    def __post_init__(self) -> None:
-        """Open the archive of the session's trials."""
-        self.archive = Archive(self.rig, self.facts)
+    def __init__(self, stage: Stage, facts: SessionFacts) -> None:
+        self.stage = stage
+        self.facts = facts
+        self.rig = stage.rig
+        self.control = stage.control
+        self.book = Book(stage.rig, facts)
+        self.archive = Archive(stage.rig, facts)
+        self._place = ("The session", 0.0)
+        self._faults = 0
 
     def run(self, trials: int) -> int:
         """Record until `trials` are kept; return the exit code.
@@ -67,28 +50,28 @@ class SessionRunner:
         recorded on the disk.
         """
         row = self.rig.row
-        self._note("session-started", terrain=row.name, trials=trials)
+        self.book.note("session-started", terrain=row.name, trials=trials)
         code, reason = 1, "bug"
         try:
             self._activate()
-            while not self.state.is_complete:
+            while not self.book.state.is_complete:
                 self._try_trial()
             code, reason = 0, "complete"
         except StopAskedError:
             code, reason = 5, "unfinished"
-            self._say(CATALOGUE["interrupted"].text({}, self._saved()))
+            self._say(CATALOGUE["interrupted"].text({}, self.book.saved()))
         except FaultedError as fault:
             code, reason = 4, fault.verdict.reason
             self._tell_fault(fault.verdict)
         except TractionError as error:
             code, reason = error.exit_code, "error"
-            self.company.console.problem(f"{error} {self._saved()}")
+            self.stage.company.console.problem(f"{error} {self.book.saved()}")
         except Exception:  # the arm first, then the person, the traceback to the log
             self._make_safe()
             self._tell_bug(traceback.format_exc())
         finally:
             self._make_safe()
-            self._note("session-ended", reason=reason)
+            self.book.note("session-ended", reason=reason)
         return code
 
     # --- phases -------------------------------------------------------------------
@@ -101,7 +84,7 @@ class SessionRunner:
         ready = False
         start = self.rig.clock.now_ns()
         while True:
-            key = self._tick(Prompt.SUPPORT)
+            key = self.stage.tick(Prompt.SUPPORT)
             ready = ready or key == " "
             if ready and self.control.status.safety is SafetyMode.ACTIVE:
                 return
@@ -123,22 +106,22 @@ class SessionRunner:
             if fault.verdict.reason in ENDING or self._faults >= FAULTS_IN_A_ROW:
                 raise
             self._tell_fault(fault.verdict)
-            self._mend()
+            self.stage.mend()
         else:
             self._faults = 0
 
     def _one_trial(self) -> None:
-        number = self.state.next_trial
-        name = TrialName(number, self.state.attempt(number) + 1)
+        number = self.book.state.next_trial
+        name = TrialName(number, self.book.state.attempt(number) + 1)
         self._say(
             f"{self.facts.folder.id} {self.rig.row.name} · trial {number} of "
-            f"{self.state.wanted} · kept {len(self.state.kept)} · rejected "
-            f"{self.state.rejected}        ARM: holding"
+            f"{self.book.state.wanted} · kept {len(self.book.state.kept)} · rejected "
+            f"{self.book.state.rejected}        ARM: holding"
         )
         self._tare(name)
         self.control.request(ArmState.FLOAT)
         self._say("Rake, level, foot at the far end, then [space] to record.")
-        while self._tick(Prompt.READY, name) != " ":
+        while self.stage.tick(Prompt.READY, name) != " ":
             pass
         header = trial_header(self.rig, self.facts, name)
         outcome = Outcome("bug")
@@ -150,7 +133,7 @@ class SessionRunner:
             raise
         except StopAskedError:
             outcome.reason = "interrupted"
-            self._obey_stop()
+            self.stage.obey_stop()
             self._end_recording(name, header, outcome)
             raise
         self.control.request(ArmState.HOLD)
@@ -164,7 +147,7 @@ class SessionRunner:
             self._wait_still(name)
             self.rig.wrenches.clear()
             for _ in range(round(TARE_SECONDS / TICK) + 1):
-                self._tick(Prompt.LIFT, name)
+                self.stage.tick(Prompt.LIFT, name)
             try:
                 result = tare(
                     self.rig.wrenches, self.rig.settings.rig.limits.tare_spread
@@ -177,7 +160,7 @@ class SessionRunner:
             self.rig.foot.payload = self.rig.payload.tared(
                 np.array(result.wrench), rotation
             )
-            self._note(
+            self.book.note(
                 "tared",
                 trial_number=name.number,
                 bias=[round(v, 4) for v in self.rig.foot.payload.bias.tolist()],
@@ -188,7 +171,7 @@ class SessionRunner:
     def _wait_still(self, name: TrialName) -> None:
         still = 0.0
         while still < STILL_SECONDS:
-            self._tick(Prompt.LIFT, name)
+            self.stage.tick(Prompt.LIFT, name)
             record = self.control.latest()[0]
             height = float(self.rig.frame.height(record["foot_position"]))
             speed = float(abs(record["foot_velocity"][:3]).max())
@@ -198,7 +181,7 @@ class SessionRunner:
     def _record(self, name: TrialName, header: TrialHeader, outcome: Outcome) -> None:
         """Record until the trial is over; `outcome` is kept up to date."""
         path = self.facts.folder.trials / f"{name.kept}.mcap"
-        self._note("trial-started", trial=name.number, attempt=name.attempt)
+        self.book.note("trial-started", trial=name.number, attempt=name.attempt)
         self.control.recorder.start(lambda: TrialWriter(path, header))
         self.control.recorder.event(20, "operator", "trial started")
         self.control.watch_trial(is_recording=True)
@@ -208,10 +191,10 @@ class SessionRunner:
         while True:
             outcome.seconds = (self.rig.clock.now_ns() - start) * 1e-9
             self._place = (name.kept, outcome.seconds)
-            key = self._tick(Prompt.RECORDING, name)
+            key = self.stage.tick(Prompt.RECORDING, name)
             position = self.control.latest()[0]["foot_position"]
             outcome.displacement = float(self.rig.frame.displacement(position))
-            self._raise_fault(name, outcome.seconds)
+            self.stage.raise_fault(name, outcome.seconds)
             over = watch.reason(outcome.seconds, outcome.displacement)
             if key == " " or over:
                 outcome.reason = over or "key"
@@ -232,7 +215,7 @@ class SessionRunner:
         self.control.watch_trial(is_recording=False)
         self.control.recorder.event(20, "stop", outcome.reason)
         writer = self.control.recorder.detach()
-        verified = self._aside(
+        verified = self.stage.aside(
             lambda: archive.seal(writer, header, name, outcome.reason)
         )
         sidecar = archive.sidecar(name, verified, outcome)
@@ -242,7 +225,7 @@ class SessionRunner:
         )
         if outcome.status == "complete":
             path = self.facts.folder.trials / f"{name.kept}.mcap"
-            self._say_review(self._aside(lambda: review_trial(path)))
+            self._say_review(self.stage.aside(lambda: review_trial(path)))
             return sidecar
         self._reject(name, sidecar, f"interrupted: {outcome.reason}")
         self._say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
@@ -258,118 +241,41 @@ class SessionRunner:
         is_whole = outcome.displacement >= ENOUGH * self.rig.frame.travel
         while True:
             try:
-                key = self._tick(Prompt.REVIEW, name, is_complete=is_whole)
+                key = self.stage.tick(Prompt.REVIEW, name, is_complete=is_whole)
             except FaultedError as fault:
                 # The trial is whole: only the end of the session takes it away.
                 if fault.verdict.reason in ENDING:
                     self._reject(name, sidecar, "session ended at the review")
                     raise
                 self._tell_fault(fault.verdict)
-                self._mend()
+                self.stage.mend()
                 continue
             if key == "k":
                 self.archive.keep(name, sidecar)
-                self._note("trial-kept", trial=name.number, attempt=name.attempt)
+                self.book.note("trial-kept", trial=name.number, attempt=name.attempt)
                 return
             if key[:1] == "r" and key[1:] in REJECT_REASONS:
                 self._reject(name, sidecar, REJECT_REASONS[key[1:]])
                 return
-            if key == "q" or self.company.stop.count:
+            if key == "q" or self.stage.company.stop.count:
                 self._reject(name, sidecar, "session ended at the review")
                 raise StopAskedError
 
     def _reject(self, name: TrialName, sidecar: dict[str, object], why: str) -> None:
         self.archive.reject(name, sidecar, why)
-        self._note(
+        self.book.note(
             "trial-rejected", trial=name.number, attempt=name.attempt, reason=why
         )
-
-    # --- one tick -----------------------------------------------------------------
-
-    def _tick(
-        self,
-        prompt: Prompt,
-        name: TrialName | None = None,
-        *,
-        is_complete: bool = False,
-    ) -> str:
-        """Let 20 ms pass; return the key pressed, raise what stops everything."""
-        self.control.advance(TICK)
-        verdict = self.control.status.verdict
-        if verdict is not None:
-            raise FaultedError(verdict)
-        if self.company.console.is_lost:
-            self.company.stop.ask()
-        if self.company.stop.count and prompt is not Prompt.REVIEW:
-            raise StopAskedError
-        number, attempt = (name.number, name.attempt) if name else (0, 0)
-        now = self.rig.clock.now_ns()
-        if self._asked != (prompt, number, attempt):
-            self._asked = (prompt, number, attempt)
-            self._asked_at = now
-        since = (now - self._asked_at) * 1e-9
-        asked = Asked(prompt, number, attempt, is_complete, since)
-        if self.company.hand is not None:
-            self.company.hand.follow(asked)
-        key = self.company.keys.answer(asked)
-        if key == "q" and prompt is not Prompt.REVIEW:
-            raise StopAskedError
-        return key
-
-    def _raise_fault(self, name: TrialName, seconds: float) -> None:
-        plan = self.company.fault
-        rehearsal = self.rig.rehearsal
-        if plan is None or rehearsal is None or plan.trial != name.number:
-            return
-        if seconds >= plan.seconds:
-            rehearsal.inject(plan.name)
-            self.company.fault = None
-
-    def _mend(self) -> None:
-        """Let a rehearsed fault go, and the guard's verdict with it."""
-        if self.rig.rehearsal is not None:
-            self.rig.rehearsal.mend()
-        self.control.request(ArmState.HOLD)
-        self.control.advance(0.1)
-
-    def _aside(self, work: Callable[[], _T]) -> _T:
-        """Do slow work without letting the loop stop: it is the arm's heartbeat."""
-        if self.rig.is_stepped:
-            return work()
-        interval = sys.getswitchinterval()
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        try:
-            with ThreadPoolExecutor(1) as pool:
-                future = pool.submit(work)
-                while not future.done():
-                    self.control.advance(TICK)
-                    if self.company.stop.is_urgent:
-                        self._obey_stop()
-                return future.result()
-        finally:
-            sys.setswitchinterval(interval)
-
-    def _obey_stop(self) -> None:
-        """Hold; when asked twice within 3 s, damp for a moment and brake, once."""
-        if not self.company.stop.is_urgent:
-            self.control.request(ArmState.HOLD)
-        elif not self._is_stopped:
-            self._is_stopped = True
-            self.control.request(ArmState.DAMP)
-            self.control.advance(DAMP_SECONDS)
-            self.control.request(ArmState.IDLE)
-            self.control.advance(TICK)
 
     # --- words --------------------------------------------------------------------
 
     def _make_safe(self) -> None:
         """Idle the arm; the second call does nothing more."""
-        self.control.recorder.abandon()
-        confirmed = self.rig.arm.idle()
+        confirmed = self.stage.make_safe()
         self._say("ARM: idle, braked." if confirmed else "ARM: UNKNOWN - support it.")
 
     def _say(self, text: str) -> None:
-        self.company.console.say(text)
+        self.stage.company.console.say(text)
 
     def _say_live(self, name: TrialName, outcome: Outcome) -> None:
         v_t, F_t, F_n = self.control.latest()[0]["traction"].tolist()
@@ -388,37 +294,11 @@ class SessionRunner:
         facts: dict[str, object] = {"trial": trial, "seconds": seconds}
         facts.update(dict(verdict.facts))
         message = CATALOGUE[verdict.reason]
-        self.company.console.problem(message.text(facts, self._saved()))
+        self.stage.company.console.problem(message.text(facts, self.book.saved()))
 
     def _tell_bug(self, text: str) -> None:
         log = self.facts.folder.path / "log.txt"
-        self.company.console.problem(
-            f"Bug: {text.splitlines()[-1]}. Log: {log}. {self._saved()}"
+        self.stage.company.console.problem(
+            f"Bug: {text.splitlines()[-1]}. Log: {log}. {self.book.saved()}"
         )
         write_text(log, text)
-
-    def _saved(self) -> str:
-        kept = len(self.state.kept)
-        trials = "1 trial is" if kept == 1 else f"{kept} trials are"
-        return f"{trials} safe in {self.facts.folder.path}."
-
-    def _note(self, event: str, **facts: object) -> None:
-        entry = {"event": event, "utc": self._now(), **facts}
-        self.facts.folder.append_event(entry)
-        self.state = apply(self.state, entry)
-        write_json(
-            self.facts.folder.path / "session.json",
-            {
-                "id": self.facts.folder.id,
-                "terrain": self.state.terrain,
-                "simulated": self.rig.is_simulated,
-                "operator": self.facts.operator,
-                "trials": self.state.wanted,
-                "kept": [f"T{number:02d}" for number in self.state.kept],
-                "rejected": self.state.rejected,
-                "ended": self.state.ended,
-            },
-        )
-
-    def _now(self) -> str:
-        return iso_utc(self.rig.clock.utc_ns())

@@ -149,6 +149,11 @@ class Hand:
         """Whether the last carrying has come to its end."""
         return self.phase is not Phase.CARRY or not self._path
 
+    @property
+    def is_holding(self) -> bool:
+        """Whether the hand is on the arm."""
+        return self.phase is not Phase.AWAY
+
     def carry(self, *points: tuple[float, float, float]) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
         self.phase = Phase.CARRY

@@ -25,7 +25,8 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 CYCLE_NS = 2_000_000
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
-_ORIENTATION_K, _ORIENTATION_B = 40.0, 1.0  # N m/rad, N m s/rad
+_GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
+_NO_GRIP = (0.0, 0.0)
 _STOP_K, _STOP_B = 2000.0, 20.0  # joint stops: N m/rad, N m s/rad
 _EPSILON = 0.01  # rad/s, where Coulomb friction saturates
 _STANDSTILL = 1e-9  # rad/s, keeps the secant finite
@@ -225,7 +226,7 @@ class ArmPlant:
         view = HandView((x, y, z), (sx, sy, sz), self._hand_at, (hx, hy, hz))
         push = self.hand.step(view)
         if not self._is_held:
-            k, b = _ORIENTATION_K, _ORIENTATION_B
+            k, b = _GRIP if self.hand.is_holding else _NO_GRIP
             ex, ey, ez = self._tilt
             ux, uy, uz = self._up
             wrench = np.array(

@@ -53,6 +53,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rigs import FakeOptions
     from experiments.runner import SessionRunner
     from experiments.settings import load_settings
+    from experiments.stage import Stage
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -71,8 +72,8 @@ def run(args: argparse.Namespace) -> int:
             facts = _open_session(args, rig, page, console)
             hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
             company = Company(keys, console, stop, hand, fault)
-            runner = SessionRunner(rig, rig.connect(page.sensor), facts, company)
-            code = runner.run(args.trials or row.trials)
+            stage = Stage(rig, rig.connect(page.sensor), company)
+            code = SessionRunner(stage, facts).run(args.trials or row.trials)
     finally:
         rig.arm.close()
     if code == 0:

@@ -1,6 +1,7 @@
 """Messages as an independent ROS 2 library understands them."""
 
 from functools import cache
+from typing import Any
 
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -15,7 +16,7 @@ def _store(type_name):
     return store
 
 
-def decode(type_name, payload):
+def decode(type_name, payload) -> Any:
     """Return the message in `payload`, decoded by the schema text of `type_name`."""
     return _store(type_name).deserialize_cdr(payload, type_name)
 

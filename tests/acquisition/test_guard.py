@@ -1,4 +1,5 @@
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -59,8 +60,8 @@ def seen(**changes):
     return replace(QUIET, reading=reading(**rest), **own)
 
 
-def judge(state=ARMED, **changes):
-    return check(LIMITS, state, seen(**changes))[1]
+def judge(**changes: Any):
+    return check(LIMITS, ARMED, seen(**changes))[1]
 
 
 def at(joint, value, n=7):
@@ -256,7 +257,7 @@ def test_an_extrapolated_position_arms_nothing():
 def test_only_joints_whose_limit_is_armed_are_judged():
     q = np.zeros(7)
     q[1], q[2] = -2.01, 2.81
-    verdict = judge(GuardState(armed=0b1111101), q=q)
+    _, verdict = check(LIMITS, GuardState(armed=0b1111101), seen(q=q))
     assert dict(verdict.facts)["joint"] == 3
 
 

@@ -1,3 +1,5 @@
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -19,12 +21,13 @@ TYPES = [
 ]
 
 
-def filled(layout, seed):
+def filled(layout, seed) -> Any:
     """Return one record with every number set to something of its own."""
     rng = np.random.default_rng(seed)
     record = np.frombuffer(bytearray(layout.template), layout.dtype)
     for name in numbers_of(layout):
-        kind, shape = record[name].dtype, record[name].shape
+        kind: Any = record[name].dtype
+        shape = record[name].shape
         if kind.kind == "f":
             record[name] = rng.normal(size=shape)
         else:

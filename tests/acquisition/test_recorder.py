@@ -44,7 +44,7 @@ class Desk:
 
     def wrench(self, age_ns=0):
         t_ns = self.clock.now_ns() - age_ns
-        return WrenchSample(t_ns, 0, (0.0,) * 6, 0, True, False)
+        return WrenchSample(t_ns, 0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0, True, False)
 
 
 @pytest.fixture

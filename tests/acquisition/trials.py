@@ -3,6 +3,7 @@
 import struct
 import zlib
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ DATA_END_BYTES = 13
 
 
 def make_header(**changes):
-    facts = {
+    facts: dict[str, Any] = {
         "trial": {"session": "S", "trial": "T01", "simulated": "true"},
         "utc_offset_ns": OFFSET_NS,
         "offset_uncertainty_ns": 80,
@@ -34,7 +35,7 @@ def make_header(**changes):
     return TrialHeader(**(facts | changes))
 
 
-def make_cycles(count=600, *, first=1000, skipped=(), seed=0):
+def make_cycles(count=600, *, first=1000, skipped=(), seed=0) -> Any:
     """Return records of the loop; the numbers in `skipped` are left out."""
     rng = np.random.default_rng(seed)
     numbers = np.setdiff1d(np.arange(first, first + count + len(skipped)), skipped)

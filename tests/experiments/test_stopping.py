@@ -44,7 +44,6 @@ def twice(tmp_path_factory, config):
         if asked.prompt is Prompt.RECORDING and asked.since > 0.3:
             signal.raise_signal(signal.SIGINT)
             signal.raise_signal(signal.SIGINT)
-        return None
 
     return run_watched(config, tmp_path_factory.mktemp("twice"), 1, press=press)
 
@@ -144,7 +143,6 @@ def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
     def press(asked, rig):
         if asked.prompt is Prompt.LIFT and asked.since > 0.1:
             raise ZeroDivisionError("so to speak")
-        return None
 
     seen = run_watched(config, tmp_path, 1, press=press)
     log = seen.folder / "log.txt"

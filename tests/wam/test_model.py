@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from wam.constants import GRAVITY, load_constants
-from wam.model import ArmModel, build_pinocchio, drive_inertia_matrix, quaternion
+from wam.model import ArmModel, drive_inertia_matrix, quaternion
 from wam.tool import Tool, box_inertia, sensor_body
 
 POSES = ["zero", "home", "elbow_square", "foot_down", "generic_a", "generic_b"]
@@ -91,21 +91,6 @@ def test_the_jacobian_of_the_sole_is_the_slope_of_its_position(foot_model, q):
     ]
     # central differences: rounding 1e-16 m over a step of 1e-6 rad
     assert close(foot_model.sole_jacobian(q)[:3], np.transpose(slope), atol=1e-8)
-
-
-def test_the_holding_torque_is_the_slope_of_the_potential_energy(foot_model, q):
-    constants, tool = foot_model.constants, foot_model.tool
-    model = build_pinocchio(constants, (tool.sensor, tool.foot))
-    import pinocchio as pin
-
-    data = model.createData()
-    step = 1e-5
-    slope = [
-        pin.computePotentialEnergy(model, data, q + d)
-        - pin.computePotentialEnergy(model, data, q - d)
-        for d in step * np.eye(7)
-    ]
-    assert close(foot_model.gravity(q), np.array(slope) / (2 * step), atol=1e-6)
 
 
 def test_a_path_is_every_pose_of_it(foot_model, arm_vectors):

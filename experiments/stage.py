@@ -1,0 +1,111 @@
+"""The stage: time passes, keys and stops are heard, rehearsed faults come and go."""
+
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TypeVar
+
+from acquisition.control import InlineControl
+from acquisition.cycle import ArmState
+from experiments.company import Company, FaultedError, StopAskedError
+from experiments.operator import Asked, Prompt
+from experiments.rigs import Rig
+from experiments.trial import TrialName
+
+SWITCH_INTERVAL = 0.0002  # while slow work shares the interpreter with the loop [s]
+TICK = 0.02  # the console looks this often [s]
+DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
+_T = TypeVar("_T")
+
+
+@dataclass(slots=True)
+class Stage:
+    """Rig, loop and company of a session, and the passing of time between them."""
+
+    rig: Rig
+    control: InlineControl
+    company: Company
+    _asked: tuple[Prompt, int, int] | None = None
+    _asked_at: int = 0
+    _is_stopped: bool = False
+
+    def tick(
+        self,
+        prompt: Prompt,
+        name: TrialName | None = None,
+        *,
+        is_complete: bool = False,
+    ) -> str:
+        """Let 20 ms pass; return the key pressed, raise what stops everything."""
+        self.control.advance(TICK)
+        verdict = self.control.status.verdict
+        if verdict is not None:
+            raise FaultedError(verdict)
+        if self.company.console.is_lost:
+            self.company.stop.ask()
+        if self.company.stop.count and prompt is not Prompt.REVIEW:
+            raise StopAskedError
+        number, attempt = (name.number, name.attempt) if name else (0, 0)
+        now = self.rig.clock.now_ns()
+        if self._asked != (prompt, number, attempt):
+            self._asked = (prompt, number, attempt)
+            self._asked_at = now
+        since = (now - self._asked_at) * 1e-9
+        asked = Asked(prompt, number, attempt, is_complete, since)
+        if self.company.hand is not None:
+            self.company.hand.follow(asked)
+        key = self.company.keys.answer(asked)
+        if key == "q" and prompt is not Prompt.REVIEW:
+            raise StopAskedError
+        return key
+
+    def raise_fault(self, name: TrialName, seconds: float) -> None:
+        """Raise the rehearsed fault when its moment in trial `name` has come."""
+        plan = self.company.fault
+        rehearsal = self.rig.rehearsal
+        if plan is None or rehearsal is None or plan.trial != name.number:
+            return
+        if seconds >= plan.seconds:
+            rehearsal.inject(plan.name)
+            self.company.fault = None
+
+    def mend(self) -> None:
+        """Let a rehearsed fault go, and the guard's verdict with it."""
+        if self.rig.rehearsal is not None:
+            self.rig.rehearsal.mend()
+        self.control.request(ArmState.HOLD)
+        self.control.advance(0.1)
+
+    def aside(self, work: Callable[[], _T]) -> _T:
+        """Do slow work without letting the loop stop: it is the arm's heartbeat."""
+        if self.rig.is_stepped:
+            return work()
+        interval = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        try:
+            with ThreadPoolExecutor(1) as pool:
+                future = pool.submit(work)
+                while not future.done():
+                    self.control.advance(TICK)
+                    if self.company.stop.is_urgent:
+                        self.obey_stop()
+                return future.result()
+        finally:
+            sys.setswitchinterval(interval)
+
+    def obey_stop(self) -> None:
+        """Hold; when asked twice within 3 s, damp for a moment and brake, once."""
+        if not self.company.stop.is_urgent:
+            self.control.request(ArmState.HOLD)
+        elif not self._is_stopped:
+            self._is_stopped = True
+            self.control.request(ArmState.DAMP)
+            self.control.advance(DAMP_SECONDS)
+            self.control.request(ArmState.IDLE)
+            self.control.advance(TICK)
+
+    def make_safe(self) -> bool:
+        """Idle the arm and let go of an open file; return whether it is confirmed."""
+        self.control.recorder.abandon()
+        return self.rig.arm.idle()

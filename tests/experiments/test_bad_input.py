@@ -1,0 +1,329 @@
+"""Each mistake is answered by one clear message and an exit code, no traceback."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+
+from experiments.store import create_session, write_json
+from tests.experiments.program import (
+    digest,
+    only_session,
+    run_short,
+    sidecar,
+    traction,
+    write_config,
+)
+
+FAKE = ("--fake", "--fast", "--operator-script", "auto")
+
+
+def refusal(done, code=2):
+    """Return the one line that a command was refused with."""
+    assert done.code == code, done.err
+    (line,) = done.err.splitlines()
+    return line
+
+
+# --- run ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("ZZ", *FAKE), "There is no terrain 'ZZ' in matrix.toml. Terrains: S0 S10"),
+        (("TF", "--fast"), "--fast, --fault and --operator-script work only with --f"),
+        (("TF", "--fault", "estop"), "--fast, --fault and --operator-script work on"),
+        (("TF", *FAKE, "--trials", 0), "--trials 0 - expected a whole number 1..99"),
+        (("TF", *FAKE, "--trials", 100), "--trials 100 - expected a whole number"),
+        (("TF", *FAKE, "--seed", -1), "--seed -1 - expected a whole number >= 0"),
+        (("TF", *FAKE, "--fault", "flood"), "--fault 'flood' is not a fault that can"),
+        (("TF", *FAKE, "--fault", "estop@T1"), "--fault 'estop@T1' is not a fault"),
+        (("TF",), "A real session needs a person at a terminal, and there is none."),
+        (("TF", *FAKE, "--config", "/no/rig.toml"), "/no/rig.toml cannot be read (No"),
+    ],
+)
+def test_a_run_that_cannot_be_is_refused(tmp_path, arguments, text):
+    done = traction("run", *arguments, "--data", tmp_path / "data")
+    assert refusal(done).startswith(text)
+    assert done.err.rstrip().endswith("Nothing was started.")
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.mark.parametrize("below", ["", "deeper"])
+def test_a_data_folder_that_is_a_file_is_refused(config, tmp_path, below):
+    place = tmp_path / "occupied"
+    place.write_text("precious")
+    done = run_short(config, place / below)
+    assert "occupied" in refusal(done)
+    assert "cannot be written" in done.err
+    assert place.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("keep it", "line 2: 'keep it' - expected keep, redo 1..5 or quit."),
+        ("redo 6", "line 2: 'redo 6' - expected keep, redo 1..5 or quit."),
+    ],
+)
+def test_a_bad_line_of_an_operator_script_is_named(config, tmp_path, line, text):
+    script = tmp_path / "script.txt"
+    script.write_text(f"keep\n{line}\n")
+    done = run_short(config, tmp_path / "data", "TF", 1, "--operator-script", script)
+    assert text in refusal(done)
+
+
+def test_an_operator_script_that_is_no_text_is_refused(config, tmp_path):
+    script = tmp_path / "script.txt"
+    script.write_bytes(b"\xff\xfe\x00")
+    done = run_short(config, tmp_path / "data", "TF", 1, "--operator-script", script)
+    assert "cannot be read" in refusal(done)
+
+
+def test_the_real_rig_without_its_bus_is_a_failed_preflight(tmp_path):
+    config = write_config(tmp_path, rig=('"socketcan"', '"no-such-adapter"'))
+    done = traction("check", "--config", config, "--data", tmp_path)
+    assert "ARM: not touched." in refusal(done, 3)
+
+
+def test_a_stop_pressed_before_the_start_is_a_failed_preflight(config, tmp_path):
+    done = run_short(config, tmp_path / "data", "TF", 1, "--fault", "estop@T0+0s")
+    assert refusal(done, 3).startswith("The arm is in E-stop")
+    assert not (tmp_path / "data").exists()
+
+
+def test_too_little_room_on_the_disk_is_a_failed_preflight(tmp_path):
+    config = write_config(tmp_path, rig=("free_disk_gb = 5.0", "free_disk_gb = 1e9"))
+    done = run_short(config, tmp_path / "data")
+    assert "GB free, a session needs 0.9 GB, minimum 1000000000 GB." in done.err
+    assert done.code == 3
+
+
+def test_a_container_out_of_reach_is_refused_by_the_simulation(tmp_path):
+    config = write_config(tmp_path, matrix=("[0.70, 0.0,", "[9.70, 0.0,"))
+    done = run_short(config, tmp_path / "data", "S0")
+    assert "the foot cannot stand at far_end = [9.7, 0.0, 0.12]" in refusal(done)
+
+
+# --- settings -------------------------------------------------------------------------
+
+SETTINGS = [
+    (
+        "matrix",
+        ("trials = 10", 'trials = "ten"'),
+        'matrix.toml: terrains[0].trials = "ten" - expected a whole number >= 1 and '
+        "<= 99, e.g. 10. Nothing was started.",
+    ),
+    (
+        "matrix",
+        ("trials = 10\n", ""),
+        "matrix.toml: terrains[0].trials is missing, e.g. 10. Nothing was started.",
+    ),
+    (
+        "matrix",
+        ('stones = "small"', 'stones = "tiny"'),
+        "matrix.toml: terrains[0].stones = \"tiny\" - expected 'small', 'big' or ",
+    ),
+    (
+        "matrix",
+        ("travel = 0.07", "travel = nan"),
+        "matrix.toml: terrains[0].travel = nan - expected a number > 0.05 and <= 1.0",
+    ),
+    (
+        "matrix",
+        ('name = "S10"', 'name = "S0"'),
+        "matrix.toml: terrain 'S0' stands there twice.",
+    ),
+    (
+        "matrix",
+        ('name = "S0"', 'name = "../S0"'),
+        'matrix.toml: terrains[0].name = "../S0" - expected',
+    ),
+    ("matrix", ("[[terrains]]", "[[terrains"), "matrix.toml: Expected "),
+    (
+        "rig",
+        ("foot_speed", "foot_sped"),
+        "rig.toml: limits.foot_speed is missing, e.g. 0.8.",
+    ),
+    (
+        "rig",
+        ("[limits]", "[limits]\nhaste = 1"),
+        "rig.toml: limits.haste is no setting Traction knows.",
+    ),
+    (
+        "rig",
+        ("mass = 0.45", "mass = 1e300"),
+        "rig.toml: feet.tread.mass = 1e+300 - expected a number > 0 and <= 20",
+    ),
+    ("rig", ("speed = [1.5", "speed = [-1.5"), "rig.toml: limits.speed[0] = -1.5 - "),
+]
+
+
+@pytest.mark.parametrize(("name", "change", "text"), SETTINGS)
+def test_a_wrong_setting_is_named_with_what_to_write(tmp_path, name, change, text):
+    config = write_config(tmp_path, **{name: change})
+    done = traction("status", "--config", config, "--data", tmp_path)
+    assert refusal(done).startswith(text)
+
+
+def test_settings_that_are_no_text_are_refused(tmp_path):
+    config = tmp_path / "rig.toml"
+    config.write_bytes(b"\xff\x00\xff")
+    done = traction("status", "--config", config)
+    assert "cannot be read (it is no text)" in refusal(done)
+
+
+# --- report ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def copied(recorded, tmp_path):
+    """Return a data folder with a copy of the session that may be damaged."""
+    data = tmp_path / "data"
+    shutil.copytree(recorded.data, data)
+    for path in data.rglob("*.mcap"):
+        path.chmod(0o644)
+    return data
+
+
+def vouch_for(path):
+    """Let the sidecar state the checksum of the file as it is now."""
+    facts = sidecar(path) | {"sha256": digest(path)}
+    write_json(path.with_suffix(".json"), facts)
+
+
+def test_a_report_of_nothing_is_refused(tmp_path):
+    assert "Name the sessions to report, or use --all." in refusal(
+        traction("report", "--data", tmp_path)
+    )
+    assert "There are no kept trials in" in refusal(
+        traction("report", "--all", "--data", tmp_path)
+    )
+
+
+def test_a_report_of_a_session_that_is_not_there_names_those_that_are(recorded):
+    done = traction("report", "S007", "--data", recorded.data)
+    assert "There is no session 'S007'" in refusal(done)
+    assert "Sessions: S001." in done.err
+
+
+def test_a_name_that_no_file_can_have_is_no_session(tmp_path):
+    done = traction("report", "S" * 400, "--data", tmp_path)
+    assert "There is no session" in refusal(done)
+
+
+def test_trials_that_changed_since_they_were_kept_are_not_reported(copied):
+    for path in only_session(copied).glob("trials/T0?.mcap"):
+        path.write_bytes(path.read_bytes()[:-1] + b"?")
+    done = traction("report", "S001", "--data", copied)
+    assert refusal(done) == "S001: no kept trials to report."
+    assert "There are no kept trials" in refusal(
+        traction("report", "--all", "--data", copied)
+    )
+
+
+def test_damaged_trials_are_left_out_and_named(copied):
+    """Even if somebody made the checksum right again."""
+    for path in only_session(copied).glob("trials/T0?.mcap"):
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 0x10
+        path.write_bytes(data)
+        vouch_for(path)
+    done = traction("report", "S001", "--data", copied)
+    assert refusal(done) == "S001: no kept trials to report."
+    assert done.out.count("▲ left out: ") == 2
+    assert "T01.mcap: " in done.out
+
+
+def test_a_foreign_file_among_the_trials_is_left_out_and_named(copied):
+    for path in only_session(copied).glob("trials/T0?.mcap"):
+        with path.open("wb") as file:
+            writer = Writer(file)
+            writer.start(profile="ros2", library="somebody")
+            writer.finish()
+        vouch_for(path)
+    done = traction("report", "S001", "--data", copied)
+    assert refusal(done) == "S001: no kept trials to report."
+    assert done.out.count("▲ left out: ") == 2
+
+
+def test_live_and_simulated_sessions_do_not_mix(copied):
+    folder = only_session(copied)
+    live = folder.with_name(folder.name.replace("S001_TF.fake", "S002_TF"))
+    shutil.copytree(folder, live)
+    for names in (("S001", "S002"), ("--all",)):
+        done = traction("report", *names, "--data", copied)
+        assert refusal(done).startswith("S001 is simulated. Reports do not mix")
+
+
+@pytest.mark.parametrize("seed", ["-1", "x", "1" * 30])
+def test_a_seed_that_is_no_number_is_a_usage_error(tmp_path, seed):
+    done = traction("report", "--all", "--seed", seed, "--data", tmp_path)
+    assert done.code == 2
+    assert "expected a whole number >= 0, e.g. 1" in done.err.splitlines()[-1]
+
+
+def test_a_damaged_sidecar_makes_a_trial_count_for_nothing(copied, config):
+    for path in only_session(copied).glob("trials/T0?.json"):
+        path.write_bytes(b"[" * 100_000)
+    done = traction("status", "--json", "--data", copied, "--config", config)
+    counts = [line["kept"] for line in json.loads(done.out)]
+    assert (done.code, sum(counts)) == (0, 0)
+
+
+# --- fit ------------------------------------------------------------------------------
+
+
+def table(path, rows=400):
+    rng = np.random.default_rng(1)
+    v_t = rng.uniform(0.01, 0.1, rows)
+    F_n = rng.uniform(3.0, 9.0, rows)
+    columns = (np.arange(rows) * 0.002, v_t, F_n, 0.6 * F_n + v_t)
+    np.savetxt(
+        path,
+        np.column_stack(columns),
+        delimiter=",",
+        header="t,v_t,F_n,F_t",
+        comments="",
+    )
+    return path
+
+
+def test_a_fit_of_a_missing_file_is_refused(tmp_path):
+    done = traction("fit", tmp_path / "no.csv", "--out", tmp_path / "out")
+    assert "no.csv: cannot be read (No such file or directory)." in refusal(done)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_fit_of_a_table_without_its_columns_names_them(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("time,speed\n0,1\n")
+    done = traction("fit", path, "--out", tmp_path / "out")
+    assert "no column t, v_t, F_n, F_t; it has time, speed" in refusal(done)
+
+
+def test_a_fit_into_a_folder_that_is_a_file_is_refused(tmp_path):
+    place = tmp_path / "occupied"
+    place.write_text("precious")
+    done = traction("fit", table(tmp_path / "t.csv"), "--out", place)
+    assert "cannot be written" in refusal(done)
+    assert place.read_text() == "precious"
+
+
+def test_a_fit_with_a_strange_list_of_columns_is_refused(tmp_path):
+    done = traction(
+        "fit", tmp_path / "t.csv", "--out", tmp_path, "--columns", "t=a,speed=b"
+    )
+    assert "'speed=b' does not name a column" in refusal(done)
+
+
+# --- a session that is empty ----------------------------------------------------------
+
+
+def test_a_session_without_trials_is_no_report(tmp_path):
+    create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
+    done = traction("report", "S001", "--data", tmp_path)
+    assert refusal(done) == "S001: no kept trials to report."

@@ -1,0 +1,92 @@
+import subprocess
+import sys
+
+import pytest
+
+from experiments.cli import COMMANDS, EXIT_CODES
+from experiments.messages import CATALOGUE
+from tests.experiments.program import traction
+
+
+@pytest.mark.parametrize("command", sorted(COMMANDS))
+def test_help_ends_with_two_examples_and_the_exit_codes(command):
+    done = traction(command, "--help")
+    assert done.code == 0
+    head, _, tail = done.out.partition("examples:\n")
+    assert f"traction {command}" in head
+    examples, _, codes = tail.partition("\n\n")
+    assert examples.count(f"  traction {command} ") == 2
+    assert codes.strip() == EXIT_CODES.strip()
+
+
+def test_help_of_the_program_names_every_command():
+    done = traction("--help")
+    assert done.code == 0
+    for command in COMMANDS:
+        assert f"\n    {command}" in done.out
+    assert done.out.rstrip().endswith(EXIT_CODES.rstrip())
+
+
+@pytest.mark.parametrize("arguments", [(), ("fly",), ("run",), ("fit", "a.csv")])
+def test_what_is_no_command_is_a_usage_error(arguments):
+    done = traction(*arguments)
+    assert done.code == 2
+    assert "usage: traction" in done.err
+
+
+def test_version_is_told():
+    done = traction("--version")
+    assert done.code == 0
+    assert done.out.startswith("traction ")
+
+
+def test_the_parser_is_built_without_a_slow_library():
+    slow = ("numpy", "pinocchio", "scipy", "matplotlib", "pydantic", "rich", "can")
+    code = (
+        "import sys; import experiments.cli; experiments.cli.build_parser(); "
+        f"print([name for name in {slow} if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", sorted(CATALOGUE))
+def test_every_message_can_be_explained(name):
+    message = CATALOGUE[name]
+    done = traction("check", "--explain", name)
+    assert done.code == 0
+    assert message.do in done.out
+    assert message.more in done.out
+    assert f"exit code {message.exit_code}" in done.out
+
+
+def test_a_message_that_does_not_exist_is_refused_with_those_that_do():
+    done = traction("check", "--explain", "rain")
+    assert done.code == 2
+    assert "There is no message called 'rain'." in done.err
+    assert "estop" in done.err
+
+
+def test_check_finds_the_simulated_rig_fit(config, tmp_path):
+    done = traction("check", "--fake", "--config", config, "--data", tmp_path)
+    assert (done.code, done.err) == (0, "")
+    assert done.out.splitlines()[0].endswith("SIMULATED")
+    assert done.out.count(" ✔ ") == 5
+    assert done.out.endswith("Fit to run.\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_of_the_settings_prints_every_section(config):
+    done = traction("check", "--config-only", "--config", config)
+    assert done.code == 0
+    for section in ("can", "ft_sensor", "feet", "control", "limits"):
+        assert f"   {section} = " in done.out
+
+
+def test_status_counts_kept_trials_of_simulations_apart(recorded, config):
+    done = traction("status", "--data", recorded.data, "--config", config)
+    lines = [line.split() for line in done.out.splitlines() if line.startswith("TF")]
+    assert [line[1:3] for line in lines] == [["live", "0/10"], ["simulated", "2/10"]]
+    assert lines[1][-1] == "S001"

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+
+from acquisition.recorder import seal
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from experiments.console import GOOD, WARNING
+from experiments.review import review_trial
+
+
+def rewrite(source, path, cycles):
+    """Write `cycles` with the metadata and attachments of another trial."""
+    reader = TrialReader(source)
+    clock = reader.metadata["clock"]
+    trial = {k: v for k, v in reader.metadata["trial"].items() if k != "format_version"}
+    header = TrialHeader(
+        trial=trial,
+        utc_offset_ns=int(clock["utc_offset_ns"]),
+        offset_uncertainty_ns=int(clock["offset_uncertainty_ns"]),
+        provenance={},
+        attachments=reader.attachments,
+        robot_description="",
+    )
+    writer = TrialWriter(path, header)
+    writer.write_cycles(cycles)
+    seal(writer, "key")
+    return path
+
+
+@pytest.fixture
+def cycles(first_trial):
+    return TrialReader(first_trial).cycles().data.copy()
+
+
+def test_a_good_trial_is_reviewed_with_its_numbers(first_trial):
+    review = review_trial(first_trial)
+    assert review.worst_gap == pytest.approx(0.002, abs=1e-6)
+    assert review.missed == 0
+    assert review.joint7 < 0.020
+    assert review.ratio == pytest.approx(0.8, abs=0.25)  # rubber on a plate
+    marks = [mark for mark, _ in review.lines()]
+    assert marks[:2] == [GOOD, GOOD]
+
+
+def test_missing_cycles_are_counted_and_marked(first_trial, cycles, tmp_path):
+    holes = np.delete(cycles, [700, 701, 1200])
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", holes))
+    assert review.missed == 3
+    assert review.worst_gap == pytest.approx(0.006, abs=1e-6)
+    assert review.lines()[0][0] == WARNING
+
+
+def test_a_foot_that_turned_is_marked(first_trial, cycles, tmp_path):
+    cycles["position"][1000:, 6] += 0.03
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
+    assert review.joint7 == pytest.approx(0.03, abs=0.005)
+    assert review.lines()[1][0] == WARNING
+
+
+def test_a_trial_of_a_foot_at_rest_can_be_reviewed(first_trial, cycles, tmp_path):
+    """A person may press [space] at once."""
+    path = rewrite(first_trial, tmp_path / "T.mcap", cycles[:300])
+    review = review_trial(path)
+    assert review.kept < 250
+    assert review.lines()[2][0] == WARNING
+
+
+def test_a_trial_in_the_air_has_no_friction(first_trial, cycles, tmp_path):
+    cycles["wrench_raw"][:] = cycles["wrench_raw"][:1]
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles[:1000]))
+    assert np.isnan(review.ratio)
+    assert review.lines()[2][1].endswith("median F_t/F_n -")

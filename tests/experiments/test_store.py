@@ -1,0 +1,160 @@
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError, TrialFileError
+from experiments import store
+from experiments.console import Console
+from experiments.store import (
+    create_session,
+    find_session,
+    iso_utc,
+    list_sessions,
+    move_file,
+    read_json,
+    write_json,
+)
+from experiments.trial import EndWatch, TrialName
+
+DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
+
+
+def create(data, terrain="S0", *, is_simulated=True):
+    return create_session(data, terrain, is_simulated=is_simulated, utc_ns=DAY_NS)
+
+
+def test_sessions_are_numbered_and_dated(tmp_path):
+    names = [create(tmp_path).path.name, create(tmp_path, "B10").path.name]
+    assert names == ["2027-01-15_S001_S0.fake", "2027-01-15_S002_B10.fake"]
+    assert create(tmp_path, is_simulated=False).path.name == "2027-01-15_S003_S0"
+
+
+def test_a_number_is_never_used_twice_even_after_a_gap(tmp_path):
+    (tmp_path / "sessions" / "2026-12-31_S041_TF").mkdir(parents=True)
+    assert create(tmp_path).id == "S042"
+
+
+def test_what_is_no_session_is_not_listed(tmp_path):
+    create(tmp_path)
+    for name in ("notes", "2027-01-15_S1_S0", "2027-01-15_S002_S0.fakes", "S003"):
+        (tmp_path / "sessions" / name).mkdir()
+    assert [session.id for session in list_sessions(tmp_path)] == ["S001"]
+
+
+def test_a_session_is_found_by_id_name_and_path(tmp_path):
+    session = create(tmp_path)
+    for name in ("S001", session.path.name, str(session.path), f"{session.path}/"):
+        assert find_session(tmp_path, name).path.name == session.path.name
+
+
+def test_a_torn_last_line_of_the_journal_is_left_out(tmp_path):
+    session = create(tmp_path)
+    session.append_event({"event": "session-started", "terrain": "S0", "trials": 1})
+    with (session.path / "events.jsonl").open("ab") as file:
+        file.write(b'{"event": "trial-sta')
+    assert [event["event"] for event in session.events()] == ["session-started"]
+
+
+def test_only_trials_with_verdict_and_right_checksum_count(tmp_path):
+    session = create(tmp_path)
+    for number, (verdict, is_sound) in enumerate(
+        [("keep", True), ("keep", False), ("reject", True)], 1
+    ):
+        path = session.trials / f"T{number:02d}.mcap"
+        path.write_bytes(b"trial %d" % number)
+        checksum = store.sha256_of(path) if is_sound else "0" * 64
+        write_json(path.with_suffix(".json"), {"verdict": verdict, "sha256": checksum})
+    write_json(session.trials / "T04.json", {"verdict": "keep", "sha256": ""})
+    assert [path.name for path in session.kept_trials()] == ["T01.mcap"]
+
+
+def test_json_is_replaced_whole_or_not_at_all(tmp_path, monkeypatch):
+    path = tmp_path / "session.json"
+    write_json(path, {"kept": 1})
+
+    def fail(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", fail)
+    with pytest.raises(TrialFileError, match=r"cannot be written \(No space left"):
+        write_json(path, {"kept": 2})
+    assert read_json(path) == {"kept": 1}
+
+
+def test_a_full_disk_at_the_journal_is_a_message_not_a_crash(tmp_path):
+    session = create(tmp_path)
+    (session.path / "events.jsonl").mkdir()
+    with pytest.raises(TrialFileError, match="cannot be written"):
+        session.append_event({"event": "tared"})
+
+
+def test_a_moved_trial_never_replaces_another(tmp_path):
+    source, target = tmp_path / "T01.mcap", tmp_path / "T01a.mcap"
+    source.write_text("new")
+    target.write_text("old")
+    with pytest.raises(TrialFileError, match="File exists"):
+        move_file(source, target)
+    assert (source.read_text(), target.read_text()) == ("new", "old")
+
+
+@given(st.binary(max_size=60))
+def test_a_damaged_json_file_reads_as_empty(tmp_path_factory, content):
+    path = tmp_path_factory.getbasetemp() / "damaged.json"
+    path.write_bytes(content)
+    facts = read_json(path)
+    assert facts == {} or json.loads(content) == facts
+
+
+def test_a_data_folder_below_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SettingsError, match="cannot be written"):
+        create(tmp_path / "file")
+
+
+def test_utc_is_written_in_whole_seconds():
+    assert iso_utc(DAY_NS + 999_999_999) == "2027-01-15T08:00:00Z"
+
+
+@pytest.mark.parametrize(
+    ("attempt", "name"), [(1, "T04a"), (26, "T04z"), (27, "T04aa"), (53, "T04ba")]
+)
+def test_rejected_attempts_are_lettered_like_columns(attempt, name):
+    assert TrialName(4, attempt).rejected == name
+    assert TrialName(4, attempt).kept == "T04"
+
+
+def test_a_trial_ends_a_moment_after_the_container_was_crossed():
+    watch = EndWatch(0.45)
+    assert watch.reason(5.0, 0.449) == ""
+    assert watch.reason(6.0, 0.45) == ""
+    assert watch.reason(6.39, 0.30) == ""  # even if the foot is lifted back
+    assert watch.reason(6.4, 0.30) == "travel"
+
+
+def test_a_trial_that_never_crosses_ends_at_the_time_limit():
+    watch = EndWatch(0.45)
+    assert watch.reason(29.99, 0.2) == ""
+    assert watch.reason(30.0, 0.2) == "time-limit"
+
+
+def test_a_console_that_nobody_reads_any_more_is_noticed(monkeypatch):
+    class Closed:
+        def write(self, _):
+            raise BrokenPipeError
+
+        def flush(self):
+            raise BrokenPipeError
+
+        def isatty(self):
+            return False
+
+    monkeypatch.setattr("sys.stdout", Closed())
+    monkeypatch.setattr("experiments.console._discard_output", lambda: None)
+    console = Console()
+    assert not console.is_lost
+    console.say("anybody?")
+    assert console.is_lost
+    console.say("nobody")

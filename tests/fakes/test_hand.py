@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from fakes.hand import LIFT, Hand, HandView, Pace, Phase
+from fakes.terrain import PLATES, Plate
+from tests.fakes.scenes import float_for, make_plant, release, sole
+
+AT_REST = HandView((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
+
+
+@pytest.fixture
+def plant():
+    plant = make_plant(height=0.05)
+    plant.terrain = Plate(PLATES["tread"], np.random.default_rng(1))
+    release(plant)
+    return plant
+
+
+def test_the_hand_lifts_the_foot_and_holds_it_still(plant):
+    plant.hand.lift_to_start()
+    for _ in float_for(plant, 1.5):
+        pass
+    assert plant.hand.is_done
+    assert sole(plant) == pytest.approx([0.0, 0.0, LIFT], abs=2e-3)
+    assert plant.foot_speed < 1e-3
+    assert not plant.is_touching
+
+
+def test_the_hand_puts_the_foot_down_and_lets_it_rest(plant):
+    plant.hand.put_down(plant.terrain.surface(0.0))
+    forces = []
+    for _ in float_for(plant, 2.0, virtual_mass=0.3):
+        forces.append(plant.is_touching)
+    assert plant.hand.phase is Phase.REST
+    assert plant.is_touching
+    assert forces.index(True) > 100  # it was carried first
+    assert abs(sole(plant)[0]) < 5e-3
+    assert plant.foot_speed < 5e-3
+
+
+def test_the_hand_pushes_the_foot_across(plant):
+    plant.hand.put_down(plant.terrain.surface(0.0))
+    for _ in float_for(plant, 1.5, virtual_mass=0.3):
+        pass
+    plant.hand.push(Pace(), np.random.default_rng(2))
+    x = [sole(p)[0] for p in float_for(plant, 3.0, virtual_mass=0.3)]
+    assert x[-1] > 0.03
+    assert max(np.abs(np.diff(x))) / 0.002 < 0.8  # slower than the guard allows
+    assert abs(sole(plant)[1]) < 0.02
+
+
+def test_a_hand_that_let_go_does_nothing(plant):
+    plant.hand.let_go()
+    assert plant.hand.step(AT_REST) == (0.0, 0.0, 0.0)
+    assert not plant.hand.is_holding
+
+
+def test_a_carrying_hand_goes_through_its_points_in_order():
+    hand = Hand(0.002)
+    hand.carry((0.1, 0.0, 0.0), (0.1, 0.0, 0.1))
+    assert not hand.is_done
+    first = [hand.step(AT_REST) for _ in range(200)]
+    assert first[100][0] > 1.0  # pulled toward x
+    assert all(force[2] == 0.0 for force in first)
+    for _ in range(200):
+        last = hand.step(AT_REST)
+    assert last[2] > 1.0
+    hand.step(AT_REST)
+    assert hand.is_done
+
+
+def test_a_path_begins_and_ends_without_a_jerk():
+    hand = Hand(0.002)
+    hand.carry((0.2, 0.0, 0.0))
+    pulls = [hand.step(AT_REST)[0] for _ in range(450)]
+    # 800 N/m and 100 N s/m on a path of 0.8 s: the force grows from nothing
+    assert pulls[0] < 0.1
+    assert max(np.abs(np.diff(pulls))) < 2.0
+    assert pulls[-1] == pytest.approx(800.0 * 0.2)
+
+
+def test_the_same_generator_gives_the_same_push():
+    def forces(seed):
+        hand = Hand(0.0005)
+        hand.push(Pace(), np.random.default_rng(seed))
+        return [hand.step(AT_REST) for _ in range(4000)]
+
+    assert forces(1) == forces(1)
+    assert forces(1) != forces(2)
+
+
+def test_a_push_grows_but_stays_within_what_a_person_exerts():
+    hand = Hand(0.0005)
+    hand.push(Pace(), np.random.default_rng(4))
+    along = np.array([hand.step(AT_REST)[0] for _ in range(8000)])
+    assert abs(along[:1000]).max() < 3.0  # half a second before it begins
+    assert along[-2000:].mean() > 10.0
+    assert along.max() < 40.0

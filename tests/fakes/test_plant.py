@@ -1,0 +1,183 @@
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
+import pytest
+
+from tests.fakes.scenes import (
+    CONSTANTS,
+    CYCLE_NS,
+    MODEL,
+    TOOL,
+    float_for,
+    make_plant,
+    release,
+    send,
+    sole,
+)
+from wam.constants import GRAVITY
+from wam.model import build_pinocchio, drive_inertia_matrix
+
+S = 1_000_000_000
+
+
+def total_inertia(plant):
+    """Return M with the drives, and with the inertia of the person's forearm."""
+    M = MODEL.mass_matrix(plant.q, with_drive=False) + forearm_inertia(plant.q)
+    return M + np.diag(np.diag(drive_inertia_matrix(CONSTANTS)))
+
+
+def energies(plant):
+    """Return kinetic and potential energy [J]; the person carries the forearm."""
+    bare = build_pinocchio(CONSTANTS, (TOOL.sensor, TOOL.foot))
+    potential = pin.computePotentialEnergy(bare, bare.createData(), plant.q)
+    return 0.5 * plant.qd @ total_inertia(plant) @ plant.qd, potential
+
+
+def forearm_inertia(q):
+    """Return what a point mass of 1 kg, 30 mm above the tool plate, adds to M."""
+    h = 1e-6
+    steps = h * np.eye(7)
+    columns = [
+        (hand_point(q + step) - hand_point(q - step)) / (2 * h) for step in steps
+    ]
+    return np.array(columns) @ np.array(columns).T
+
+
+def hand_point(q):
+    position, rotation = MODEL.plate_pose(q)
+    return position - 0.030 * rotation[:, 2]
+
+
+def test_a_braked_arm_stays_where_it_is():
+    plant = make_plant()
+    q = plant.q.copy()
+    plant.set_braking(is_braked=True, is_powered=True)
+    plant.set_torques([4000] * 7)
+    plant.advance(S // 2)
+    assert plant.q.tolist() == q.tolist()
+
+
+@pytest.mark.parametrize("is_braked", [True, False])
+def test_an_arm_without_power_falls(is_braked):
+    plant = make_plant(height=0.15)
+    plant.hand.let_go()
+    plant.set_braking(is_braked=is_braked, is_powered=False)
+    plant.advance(S // 5)
+    # 0.2 s of free fall would be 0.2 m; drives and links hold it back
+    assert sole(plant)[2] < 0.15 - 0.03
+
+
+def test_a_compensated_arm_without_friction_floats():
+    plant = make_plant()
+    release(plant)
+    plant.hand.let_go()
+    before = sole(plant)
+    for _ in float_for(plant, 0.5):
+        pass
+    # torques in whole puck units would drift; these are not rounded
+    assert sole(plant) == pytest.approx(before, abs=1e-6)
+
+
+def swing(plant, seconds):
+    """Let the arm swing by its own weight; return energies after every 20 ms."""
+    release(plant)
+    plant.hand.let_go()
+    send(plant, np.zeros(7))
+    found = [energies(plant)]
+    for _ in range(round(seconds * 50)):
+        plant.advance(plant.t_ns + 10 * CYCLE_NS)
+        found.append(energies(plant))
+    return np.array(found)
+
+
+def test_a_free_swing_keeps_its_energy():
+    far = np.full(7, 100.0)
+    endless = replace(CONSTANTS, q_lower=-far, q_upper=far)
+    kinetic, potential = swing(make_plant(constants=endless), 1.0).T
+    assert kinetic.max() > 20.0
+    # first order in the step of 0.5 ms
+    assert kinetic + potential == pytest.approx(potential[0], abs=0.01 * kinetic.max())
+
+
+def test_friction_takes_energy_away():
+    loss = []
+    for friction in (0.05, 0.5):
+        kinetic, potential = swing(make_plant(friction=friction), 0.3).T
+        loss.append(potential[0] - kinetic[-1] - potential[-1])
+    assert loss[1] > 5.0 * loss[0] > 0.0
+
+
+@pytest.mark.parametrize("joint", [1, 3, 5])
+def test_a_joint_stop_stops_a_joint(joint):
+    plant = make_plant()
+    release(plant)
+    plant.hand.let_go()
+    plant.q[joint] = CONSTANTS.q_upper[joint] - 0.02
+    push = np.zeros(7)
+    push[joint] = 3.0
+    for _ in range(150):
+        send(plant, MODEL.gravity(plant.q) + push)
+        plant.advance(plant.t_ns + CYCLE_NS)
+    beyond = plant.q[joint] - CONSTANTS.q_upper[joint]
+    assert abs(beyond) < 0.05  # 3 N m against 2000 N m/rad, and a bounce
+
+
+def test_a_torque_moves_the_joint_that_it_acts_on_by_its_inertia():
+    plant = make_plant()
+    release(plant)
+    plant.hand.let_go()
+    tau = np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    send(plant, MODEL.gravity(plant.q) + tau)
+    wanted = np.linalg.solve(total_inertia(plant), tau)
+    plant.advance(CYCLE_NS)
+    assert plant.qd / 0.002 == pytest.approx(wanted, rel=0.02, abs=0.05)
+
+
+def test_the_sensor_feels_the_weight_of_the_foot():
+    plant = make_plant()
+    plant.set_braking(is_braked=True, is_powered=True)
+    load = plant.sensor_load(10 * CYCLE_NS)
+    # the foot points down: the sensor's z axis too, so the weight pulls along it
+    assert load[2] == pytest.approx(TOOL.foot.mass * GRAVITY, rel=1e-6)
+    assert np.hypot(load[0], load[1]) < 1e-6
+
+
+def test_time_goes_on_in_whole_substeps_only():
+    plant = make_plant()
+    plant.advance(CYCLE_NS - 1)
+    assert plant.t_ns == 3 * CYCLE_NS // 4
+    plant.advance(CYCLE_NS)
+    assert plant.t_ns == CYCLE_NS
+
+
+def test_counts_are_what_encoders_on_the_motors_show():
+    plant = make_plant()
+    angle = CONSTANTS.j2mp @ plant.q
+    counts = angle * np.array(CONSTANTS.cts) / (2.0 * np.pi)
+    assert (counts - plant.counts() >= 0.0).all()
+    assert (counts - plant.counts() < 1.0).all()
+
+
+def test_the_truth_is_one_row_per_cycle_from_when_it_was_asked_for():
+    plant = make_plant()
+    plant.advance(5 * CYCLE_NS)
+    assert plant.take_truth().t_ns == []
+    plant.start_truth()
+    plant.advance(8 * CYCLE_NS)
+    truth = plant.take_truth()
+    assert truth.t_ns == [6 * CYCLE_NS, 7 * CYCLE_NS, 8 * CYCLE_NS]
+    assert truth.table()[0, :7].tolist() == plant.q.tolist()
+    assert truth.table()[0, 7:10] == pytest.approx(sole(plant), abs=1e-12)
+
+
+def test_smaller_steps_give_the_same_motion():
+    ends = []
+    for substeps in (4, 16):
+        plant = make_plant(height=0.15, substeps=substeps)
+        release(plant)
+        plant.hand.let_go()
+        send(plant, np.zeros(7))
+        plant.advance(S // 10)
+        ends.append(plant.q)
+    assert ends[0] == pytest.approx(ends[1], abs=2e-3)

@@ -1,0 +1,166 @@
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import SettingsError
+from fakes.hand import Phase
+from fakes.randomness import NormalStream, OrnsteinUhlenbeck, Tremor, trial_generator
+from fakes.rig import Rehearsal, solve_start
+from ft_sensor.payload import TerrainFrame
+from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
+
+S = 1_000_000_000
+
+
+@pytest.fixture
+def rig_and_clock():
+    rig, clock = make_rig()
+    yield rig, clock
+    rig.bus.shutdown()
+
+
+@pytest.mark.parametrize("incline", [0.0, 0.17, 0.26])
+def test_the_arm_starts_above_the_far_end_with_a_level_sole(incline):
+    frame = TerrainFrame(incline, 0.0, (0.70, 0.0, 0.2), 0.45)
+    q = solve_start(MODEL, frame, START_Q, 0.05)
+    position, rotation = MODEL.sole_pose(q)
+    assert frame.displacement(position) == pytest.approx(0.0, abs=1e-8)
+    assert frame.height(position) == pytest.approx(0.05, abs=1e-8)
+    assert rotation[:, 2] == pytest.approx(-frame.axes()[2], abs=1e-8)
+
+
+@pytest.mark.parametrize("far_end", [(9.7, 0.0, 0.12), (0.0, 0.0, 3.0)])
+def test_a_far_end_out_of_reach_is_refused(far_end):
+    frame = TerrainFrame(0.0, 0.0, far_end, 0.45)
+    with pytest.raises(SettingsError, match="the foot cannot stand at far_end"):
+        solve_start(MODEL, frame, START_Q, 0.05)
+
+
+def drive(seed):
+    """Activate a rig, let the hand lift, and return joints and sensor bytes."""
+    rig, clock = make_rig(seed)
+    port = rig.open_port()
+    hand = Rehearsal(rig)
+    hand.prepare(1)
+    hand.push()
+    clock.sleep_until(clock.now_ns() + S // 20)
+    data = port.read(4096)
+    truth = hand.take_truth()
+    rig.bus.shutdown()
+    return data, truth.tobytes(), hand.parameters()
+
+
+def test_the_same_seed_gives_the_same_rig_and_another_does_not():
+    assert drive(1) == drive(1)
+    one, two = drive(1), drive(2)
+    assert all(a != b for a, b in zip(one[::2], two[::2], strict=True))
+
+
+def test_every_trial_is_raked_anew_and_again_the_same(rig_and_clock):
+    rig, _ = rig_and_clock
+    hand = Rehearsal(rig)
+
+    def bed(trial):
+        hand.prepare(trial)
+        return [rig.ground.surface(x) for x in np.linspace(0.0, 0.4, 20)]
+
+    first, second = bed(1), bed(2)
+    assert first != second
+    assert bed(1) == first
+    assert rig.plant.terrain is rig.ground
+
+
+def test_the_pendant_is_pressed_through_the_rehearsal(rig_and_clock):
+    rig, clock = rig_and_clock
+    hand = Rehearsal(rig)
+    assert rig.network.safety_mode is SafetyMode.IDLE
+    hand.inject("estop")
+    clock.sleep_until(clock.now_ns() + S // 10)
+    assert rig.network.safety_mode is SafetyMode.E_STOP
+
+
+def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
+    rig, clock = rig_and_clock
+    hand = Rehearsal(rig)
+    hand.lift()
+    assert not hand.is_hand_done()
+    assert rig.plant.hand.phase is Phase.CARRY
+    hand.push()
+    clock.sleep_until(clock.now_ns() + CYCLE_NS)
+    assert rig.plant.hand.phase is Phase.PUSH
+
+
+@pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
+def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
+    rig, clock = rig_and_clock
+    port = rig.open_port()
+    hand = Rehearsal(rig)
+
+    def said():
+        clock.sleep_until(clock.now_ns() + S // 20)
+        return port.read(65536)
+
+    assert said()
+    hand.inject(fault)
+    said()  # what was on the wire already
+    assert said() == b""
+    hand.mend()
+    assert said()
+
+
+def test_every_known_fault_can_be_injected(rig_and_clock):
+    rig, _ = rig_and_clock
+    hand = Rehearsal(rig)
+    for fault in hand.fault_names:
+        hand.inject(fault)
+
+
+def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
+    rig, clock = rig_and_clock
+    hand = Rehearsal(rig)
+    hand.push()
+    clock.sleep_until(clock.now_ns() + 10 * CYCLE_NS)
+    truth = hand.take_truth()
+    assert len(truth) == 10
+    position = MODEL.sole_pose(truth["position"][-1])[0]
+    assert truth["sole_position"][-1] == pytest.approx(position, abs=1e-9)
+    assert FRAME.height(truth["sole_position"][-1]) == pytest.approx(0.05, abs=1e-6)
+    assert not truth["contact_force"].any()  # the foot hangs in the air
+    assert len(hand.take_truth()) == 0
+
+
+def test_parameters_of_the_ground_are_told_as_text(rig_and_clock):
+    rig, _ = rig_and_clock
+    parameters = Rehearsal(rig).parameters()
+    assert float(parameters["d50"]) == 0.019
+    assert all(isinstance(value, str) for value in parameters.values())
+
+
+# --- randomness -----------------------------------------------------------------------
+
+
+def test_an_ornstein_uhlenbeck_process_has_its_spread_and_memory():
+    normals = NormalStream(np.random.default_rng(1))
+    process = OrnsteinUhlenbeck(2.0, 0.1, 0.01, normals)
+    x = np.array([process.step() for _ in range(40_000)])
+    assert x.std() == pytest.approx(2.0, rel=0.05)
+    lag = np.mean(x[:-10] * x[10:]) / x.var()
+    assert lag == pytest.approx(np.exp(-1.0), abs=0.05)
+
+
+def test_tremor_has_unit_strength_at_nine_and_a_half_hertz():
+    tremor = Tremor(0.0005, NormalStream(np.random.default_rng(1)))
+    x = np.array([tremor.step() for _ in range(60_000)])
+    assert x.std() == pytest.approx(1.0, rel=0.15)
+    spectrum = np.abs(np.fft.rfft(x)) ** 2
+    frequency = np.fft.rfftfreq(x.size, 0.0005)
+    assert 8.0 < np.average(frequency, weights=spectrum) < 12.0
+
+
+def test_trials_of_other_terrains_or_numbers_have_other_generators():
+    draws = {
+        trial_generator(*key).random()
+        for key in ((1, "S0", 1), (1, "S0", 2), (1, "B0", 1), (2, "S0", 1))
+    }
+    assert len(draws) == 4
+    assert trial_generator(1, "S0", 1).random() in draws
