@@ -34,7 +34,9 @@ def build_parser() -> argparse.ArgumentParser:
     group.add_argument(
         "--data", type=Path, default=Path("data"), metavar="DIR", help="data folder"
     )
-    group.add_argument("-v", "--verbose", action="store_true", help="say more")
+    group.add_argument(
+        "-v", "--verbose", action="store_true", help="name the cause of an error"
+    )
     group.add_argument("--no-color", action="store_true", help="plain text")
     parser = argparse.ArgumentParser(
         prog="traction",
@@ -74,6 +76,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = args.run(args)
     except TractionError as error:
         print(error, file=sys.stderr)  # noqa: T201
+        if args.verbose and error.__cause__ is not None:
+            print(f"cause: {error.__cause__!r}", file=sys.stderr)  # noqa: T201
         return error.exit_code
     except KeyboardInterrupt:
         print("Interrupted. Nothing that was recorded is lost.", file=sys.stderr)  # noqa: T201

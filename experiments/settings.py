@@ -11,14 +11,17 @@ from pydantic.fields import FieldInfo
 
 from acquisition.errors import SettingsError
 
-_Near = Annotated[float, Field(ge=-10, le=10)]  # metres and radians of this room
+# strict: a number in quotes, or `true`, is a mistake and no number
+Number = Annotated[float, Field(strict=True)]
+Whole = Annotated[int, Field(strict=True)]
+_Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
 _Vector3 = tuple[_Near, _Near, _Near]
 _Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
 _KINDS: dict[object, str] = {int: "a whole number", float: "a number"}
 _BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 _M = TypeVar("_M", bound=BaseModel)
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Mass = Annotated[float, Field(gt=0, le=20)]
+Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
+Mass = Annotated[Number, Field(gt=0, le=20)]
 _Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
 
 
@@ -31,7 +34,7 @@ class CanSettings(_Section):
 
     interface: str = Field(examples=["socketcan"])
     channel: str = Field(examples=["can0"])
-    bitrate: int = Field(gt=0, examples=[1000000])
+    bitrate: Whole = Field(gt=0, examples=[1000000])
 
 
 class SensorSection(_Section):
@@ -39,11 +42,11 @@ class SensorSection(_Section):
 
     kind: Literal["bota"] = Field(examples=["bota"])
     port: str = Field(examples=["/dev/ttyUSB0"])
-    baudrate: int = Field(gt=0, examples=[460800])
-    sinc: int = Field(ge=51, le=512, examples=[64])
+    baudrate: Whole = Field(gt=0, examples=[460800])
+    sinc: Whole = Field(ge=51, le=512, examples=[64])
     mass: Mass = Field(examples=[0.136])
-    height: float = Field(ge=0, le=0.2, examples=[0.012])
-    angle_deg: float = Field(ge=-360, le=360, examples=[0.0])
+    height: Number = Field(ge=0, le=0.2, examples=[0.012])
+    angle_deg: Number = Field(ge=-360, le=360, examples=[0.0])
     sign: Literal[1, -1] = Field(examples=[1])
 
 
@@ -68,9 +71,9 @@ class Feet(_Section):
 class ControlSection(_Section):
     """The control law's numbers."""
 
-    virtual_mass: float = Field(ge=0, le=2, examples=[0.30])
-    lock_kp: float = Field(ge=0, le=30, examples=[20.0])
-    lock_kd: float = Field(ge=0, le=0.25, examples=[0.2])
+    virtual_mass: Number = Field(ge=0, le=2, examples=[0.30])
+    lock_kp: Number = Field(ge=0, le=30, examples=[20.0])
+    lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
 
 
 class LimitSection(_Section):
@@ -82,9 +85,9 @@ class LimitSection(_Section):
     joint7_mrad: Positive = Field(examples=[50.0])
     ft_stale_ms: Positive = Field(examples=[6.0])
     ft_stop_ms: Positive = Field(examples=[20.0])
-    late_per_second: int = Field(ge=1, le=500, examples=[10])
+    late_per_second: Whole = Field(ge=1, le=500, examples=[10])
     tare_spread: Positive = Field(examples=[0.5])
-    free_disk_gb: float = Field(ge=0, examples=[5.0])
+    free_disk_gb: Number = Field(ge=0, examples=[5.0])
 
 
 class RigSettings(_Section):
@@ -102,12 +105,12 @@ class TerrainRow(_Section):
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
     stones: Literal["small", "big", "none"] = Field(examples=["small"])
-    incline_deg: float = Field(ge=0, le=30, examples=[10.0])
+    incline_deg: Number = Field(ge=0, le=30, examples=[10.0])
     foot: Literal["tread", "bare"] = Field(examples=["tread"])
     far_end: _Vector3 = Field(examples=[[0.70, 0.0, 0.12]])
-    heading_deg: float = Field(ge=-180, le=180, examples=[0.0])
-    travel: float = Field(gt=0.05, le=1.0, examples=[0.45])
-    trials: int = Field(ge=1, le=99, examples=[10])
+    heading_deg: Number = Field(ge=-180, le=180, examples=[0.0])
+    travel: Number = Field(gt=0.05, le=1.0, examples=[0.45])
+    trials: Whole = Field(ge=1, le=99, examples=[10])
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
 
 

@@ -195,11 +195,6 @@ class ArmPlant:
         """Speed of the sole [m/s]."""
         return float(np.linalg.norm(self._cycle_v))
 
-    def hold_orientation(self) -> None:
-        """Take the present orientation of the forearm as the one to keep."""
-        pin.computeJointJacobians(self._model, self._data, self.q)
-        self._wanted = self._hand_rotation()
-
     def start_truth(self) -> None:
         """Begin to write down what really happens."""
         self.truth = Truth()

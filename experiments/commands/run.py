@@ -76,6 +76,11 @@ def run(args: argparse.Namespace) -> int:
             code = SessionRunner(stage, facts).run(args.trials or row.trials)
     finally:
         rig.arm.close()
+    if company.fault is not None:
+        console.say(
+            f"▲ The fault {company.fault.name} was planned for "
+            f"T{company.fault.trial:02d} + {company.fault.seconds} s, which never came."
+        )
     if code == 0:
         data = f" --data {args.data}" if str(args.data) != "data" else ""
         console.say(f"Complete. Next: traction report {facts.folder.id}{data}")

@@ -119,6 +119,16 @@ SETTINGS = [
     ),
     (
         "matrix",
+        ("trials = 10", "trials = true"),
+        "matrix.toml: terrains[0].trials = True - expected a whole number",
+    ),
+    (
+        "matrix",
+        ("travel = 0.07", 'travel = "0.07"'),
+        'matrix.toml: terrains[0].travel = "0.07" - expected a number',
+    ),
+    (
+        "matrix",
         ("trials = 10\n", ""),
         "matrix.toml: terrains[0].trials is missing, e.g. 10. Nothing was started.",
     ),
