@@ -12,7 +12,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.files import write_atomic
-from analysis.fits import to_csv
+from analysis.fits import to_csv, to_fits
 from analysis.gallery import Exhibit, exhibits
 from analysis.report_content import (
     ReportTable,
@@ -67,7 +67,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    fits = json.dumps(study.to_fits(), allow_nan=False, indent=1)
+    fits = json.dumps(to_fits(study), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
     write_atomic(out_dir / "fits.csv", to_csv(study).encode())
     shown = exhibits(study)

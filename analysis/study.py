@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -117,12 +116,6 @@ class Study:
             for name, result in self.terrains.items()
             if result.models(model)
         }
-
-    def to_fits(self) -> dict[str, Any]:
-        """Return every number of the study as plain values with units."""
-        from analysis.fits import to_fits
-
-        return to_fits(self)
 
 
 def run_study(

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from fakes.contact import NO_CONTACT, Contact, Motion
 from fakes.hand import Hand, HandView
-from fakes.terrain import NO_CONTACT, Contact, Motion, Terrain
+from fakes.terrain import Terrain
 from ft_sensor.payload import Payload, TerrainFrame, cross_matrix, payload_of
 from wam.constants import GRAVITY, ArmConstants, Array, Body
 from wam.model import add_point, build_pinocchio, drive_inertia_matrix

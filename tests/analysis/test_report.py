@@ -9,6 +9,7 @@ from analysis.curve_figures import draw_excerpts
 from analysis.error_figures import draw_cross_map, draw_errors
 from analysis.figures import render, styled
 from analysis.files import write_atomic
+from analysis.fits import to_fits
 from analysis.models import FitOptions
 from analysis.report import ReportContext, ReportTable, render_page, write_report
 from analysis.report_content import choices, summary, table_one, verdicts
@@ -87,7 +88,7 @@ def test_page_says_simulated_and_carries_further_tables(written):
 def test_every_number_and_figure_lies_beside_the_page(written, small_study):
     folder, path, _ = written
     assert path == folder / "report" / "index.html"
-    assert json.loads((folder / "fits.json").read_text()) == small_study.to_fits()
+    assert json.loads((folder / "fits.json").read_text()) == to_fits(small_study)
     assert (folder / "fits.csv").read_text().startswith("terrain,model,fold")
     figures = sorted(file.suffix for file in (folder / "figures").iterdir())
     assert figures == [".pdf"] * 6 + [".png"] * 6

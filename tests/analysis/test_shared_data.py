@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from analysis.fits import to_fits
 from analysis.models import GP_SE, TUSTIN
 from analysis.prepare import PrepareOptions
 from analysis.series import TractionSeries
@@ -24,7 +25,7 @@ def expected(shared_data):
 @pytest.fixture(scope="module")
 def fits(shared_data):
     trials = load_tables([shared_data / "rehearsal_trials.npz"])
-    return run_study(trials, StudyOptions(), simulated=True).to_fits()
+    return to_fits(run_study(trials, StudyOptions(), simulated=True))
 
 
 @pytest.fixture(scope="module")

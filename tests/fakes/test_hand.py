@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from fakes.hand import LIFT, Hand, HandView, Pace, Phase
-from fakes.terrain import PLATES, Plate
+from fakes.plate import PLATES, Plate
 from tests.fakes.scenes import float_for, make_plant, release, sole
 
 AT_REST = HandView((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)

@@ -3,17 +3,11 @@ import math
 import numpy as np
 import pytest
 
+from fakes.contact import LateralBristle, Motion
+from fakes.plate import PLATES, Plate
 from fakes.randomness import trial_generator
-from fakes.terrain import (
-    PLATES,
-    STONES,
-    LateralBristle,
-    Motion,
-    Plate,
-    StoneBed,
-    make_terrain,
-    slope_factor,
-)
+from fakes.stones import STONES, StoneBed, slope_factor
+from fakes.terrain import make_terrain
 
 DT = 0.0005
 SPEED = 0.04

@@ -1,0 +1,82 @@
+"""Flat plates: LuGre friction per newton of normal force."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fakes.contact import (
+    DAMPING_MASS,
+    NO_CONTACT,
+    Contact,
+    LateralBristle,
+    Motion,
+    height_at,
+    smooth_profile,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class PlateParameters:
+    """LuGre friction of a flat plate: the surface and the foot's tread."""
+
+    mu_s: float
+    mu_k: float
+    v_S: float
+    b: float
+    s0: float = 1500.0
+    s1: float = 4.0
+    k_n: float = 12000.0
+    zeta: float = 0.4
+
+
+PLATES = {
+    "tread": PlateParameters(mu_s=0.88, mu_k=0.76, v_S=0.02, b=5.0),
+    "bare": PlateParameters(mu_s=0.36, mu_k=0.32, v_S=0.02, b=0.3),
+}
+
+
+class Plate:
+    """A flat plate with LuGre friction per newton of normal force."""
+
+    def __init__(self, parameters: PlateParameters, rng: np.random.Generator) -> None:
+        self._p = parameters
+        self._bristle = 0.0
+        self._c_n = 2.0 * parameters.zeta * math.sqrt(parameters.k_n * DAMPING_MASS)
+        self._level = math.exp(0.02 * float(rng.standard_normal()))
+        self._texture = smooth_profile(rng, 0.03)
+        self._lateral = LateralBristle(2200.0)
+
+    @property
+    def stiffness(self) -> float:
+        """Normal stiffness [N/m]."""
+        return self._p.k_n
+
+    def surface(self, x: float) -> float:
+        """Return 0: a plate is flat."""
+        del x
+        return 0.0
+
+    def truth(self) -> dict[str, float]:
+        """Return the parameters in force [SI]."""
+        return {"mu_k": self._p.mu_k * self._level, "b": self._p.b}
+
+    def step(self, dt: float, motion: Motion) -> Contact:
+        """Advance the bristle by `dt` and return the force."""
+        p = self._p
+        if motion.z >= 0.0:
+            self._bristle = 0.0
+            self._lateral.release()
+            return NO_CONTACT
+        F_n = max(0.0, -p.k_n * motion.z - self._c_n * motion.vz)
+        v = motion.vx
+        m = self._level * (1.0 + 0.03 * height_at(self._texture, motion.x))
+        g = (p.mu_k + (p.mu_s - p.mu_k) * math.exp(-((v / p.v_S) ** 2))) * m
+        # backward Euler in z: the bristle is stiff at high speed
+        z = (self._bristle + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
+        limit = p.mu_s * m / p.s0
+        z = min(max(z, -limit), limit)
+        dz = (z - self._bristle) / dt
+        self._bristle = z
+        F_t = F_n * (p.s0 * z + p.s1 * dz) + p.b * v * min(1.0, F_n)
+        return Contact(F_t, self._lateral.step(motion.y, p.mu_k * F_n), F_n)
