@@ -90,6 +90,11 @@ class _Control(_Model):
     kd: _Vector7
 
 
+class _Gravity(_Model):
+    mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
+    poses: tuple[_Vector7, ...]
+
+
 class _File(_Model):
     kinematics: _Kinematics
     joint_limits: _Limits
@@ -98,6 +103,7 @@ class _File(_Model):
     pucks: _Pucks
     motors: _Motors
     links: tuple[_Link, ...] = Field(min_length=7, max_length=7)
+    gravity: _Gravity
     friction: _Friction
     control: _Control
 
@@ -129,6 +135,8 @@ class ArmConstants:
         mt: torque clamp of each puck [puck units].
         drive_inertia: at the rotors [kg m^2].
         links: the seven links in their own distal frames.
+        mus: first moments of another arm, frames 1..7 [kg m], shape (7, 3).
+        gravity_poses: poses of a gravity calibration [rad], shape (n, 7).
         coulomb: Coulomb friction of another arm [N m].
         viscous: viscous friction of another arm [N m s/rad].
         kp: joint position gains [N m/rad].
@@ -149,6 +157,8 @@ class ArmConstants:
     mt: tuple[int, ...]
     drive_inertia: Array
     links: tuple[Body, ...]
+    mus: Array
+    gravity_poses: Array
     coulomb: Array
     viscous: Array
     kp: Array
@@ -189,6 +199,8 @@ def load_constants(text: str | None = None) -> ArmConstants:
         mt=file.pucks.mt,
         drive_inertia=np.array(file.motors.drive_inertia),
         links=links,
+        mus=np.array(file.gravity.mus),
+        gravity_poses=np.array(file.gravity.poses),
         coulomb=np.array(file.friction.coulomb),
         viscous=np.array(file.friction.viscous),
         kp=np.array(file.control.kp),

@@ -1,0 +1,104 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from wam.constants import Body, load_constants
+from wam.first_moments import fit_moments, gravity_torque, moments_of_links
+from wam.model import ArmModel
+
+CONSTANTS = load_constants()
+
+
+def random_poses(count, seed):
+    rng = np.random.default_rng(seed)
+    return rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (count, 7))
+
+
+def torques(constants, poses):
+    model = ArmModel(constants)
+    return np.array([model.gravity(q) for q in poses])
+
+
+def test_shipped_moments_give_the_reference_torques(arm_vectors):
+    for vector in arm_vectors["vectors"]:
+        tau = gravity_torque(CONSTANTS, CONSTANTS.mus, np.array(vector["q"]), 9.805)
+        # the vectors are printed to double precision
+        assert tau == pytest.approx(vector["gravity_mus_g9805"], abs=1e-9)
+
+
+def test_masses_and_moments_agree_exactly():
+    mus = moments_of_links(CONSTANTS)
+    model = ArmModel(CONSTANTS)
+    for q in random_poses(20, seed=1):
+        assert gravity_torque(CONSTANTS, mus, q) == pytest.approx(
+            model.gravity(q), abs=1e-12
+        )
+
+
+def test_a_body_on_the_plate_adds_its_moments(example_tool):
+    mus = moments_of_links(CONSTANTS, (example_tool.sensor, example_tool.foot))
+    model = ArmModel(CONSTANTS, example_tool)
+    for q in random_poses(20, seed=2):
+        assert gravity_torque(CONSTANTS, mus, q) == pytest.approx(
+            model.gravity(q), abs=1e-12
+        )
+
+
+def test_a_virtual_mass_is_a_body_of_negative_mass(example_tool):
+    mass = 0.3
+    pull = Body(-mass, example_tool.foot.com, np.zeros((3, 3)))
+    bare = moments_of_links(CONSTANTS)
+    with_pull = moments_of_links(CONSTANTS, (pull,))
+    model = ArmModel(CONSTANTS, example_tool)
+    for q in random_poses(10, seed=3):
+        added = gravity_torque(CONSTANTS, with_pull - bare, q)
+        assert added == pytest.approx(model.weight_torque(q, mass), abs=1e-12)
+
+
+def perturbed():
+    rng = np.random.default_rng(4)
+    links = tuple(
+        dataclasses.replace(
+            link,
+            mass=link.mass * float(rng.uniform(0.8, 1.2)),
+            com=link.com + rng.normal(0.0, 0.01, 3),
+        )
+        for link in CONSTANTS.links
+    )
+    return dataclasses.replace(CONSTANTS, links=links)
+
+
+def test_calibration_recovers_the_torques_of_a_perturbed_arm():
+    arm = perturbed()
+    poses = CONSTANTS.gravity_poses
+    rng = np.random.default_rng(5)
+    measured = torques(arm, poses) + rng.normal(0.0, 0.02, (len(poses), 7))
+    fit = fit_moments(CONSTANTS, poses, measured)
+    assert fit.rank == 12
+    others = random_poses(50, seed=6)
+    found = np.array([gravity_torque(CONSTANTS, fit.mus, q) for q in others])
+    error = np.sqrt(np.mean((found - torques(arm, others)) ** 2))
+    assert error < 0.1
+    untouched = np.sqrt(np.mean((torques(CONSTANTS, others) - found) ** 2))
+    assert untouched > 0.3  # the perturbation was worth a calibration
+
+
+def test_too_few_poses_are_refused():
+    poses = CONSTANTS.gravity_poses[:2]
+    with pytest.raises(SettingsError, match="of 12 directions"):
+        fit_moments(CONSTANTS, poses, torques(CONSTANTS, poses))
+
+
+def test_torques_that_gravity_cannot_explain_are_refused():
+    poses = CONSTANTS.gravity_poses
+    spoiled = torques(CONSTANTS, poses)
+    spoiled[::2, 1] += 6.0
+    with pytest.raises(SettingsError, match="unexplained"):
+        fit_moments(CONSTANTS, poses, spoiled)
+
+
+def test_shapes_must_agree():
+    with pytest.raises(ValueError, match=r"\(n, 7\)"):
+        fit_moments(CONSTANTS, np.zeros((3, 7)), np.zeros((2, 7)))

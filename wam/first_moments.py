@@ -1,0 +1,128 @@
+"""Gravity from seven first moments, and their calibration by least squares.
+
+Without masses, the holding torque is linear in mu_j (kg m, frame j), from the tip:
+
+    t_j = g_j x mu_j + R_{j+1} t_{j+1},   tau_j = (R_j t_j)_z
+
+g_j is gravity in frame j, R_j turns frame j into frame j - 1. Only 12 of the 21 numbers
+can be seen in the torques: compare torques, never moments.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError
+from wam.constants import GRAVITY, ArmConstants, Array, Body
+
+OBSERVABLE = 12  # numbers of the 21 that show in the torques
+LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
+_SINGULAR = 1e-3  # of the largest singular value: below it a direction is not seen
+
+
+def regressor(constants: ArmConstants, q: Array, gravity: float = GRAVITY) -> Array:
+    """Return Y with tau = Y mus.ravel() for joint positions `q`, shape (7, 21)."""
+    rotations = [_rotation(constants, joint, float(q[joint])) for joint in range(7)]
+    down = np.array([0.0, 0.0, -gravity])
+    Y = np.zeros((7, 21))
+    to_base = np.eye(3)
+    columns: list[Array] = []
+    for joint in range(7):
+        to_base = to_base @ rotations[joint]
+        x, y, z = to_base.T @ down
+        columns.append(np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]))
+    for joint in range(7):
+        block = columns[joint]
+        for above in range(joint, -1, -1):
+            block = rotations[above] @ block
+            Y[above, 3 * joint : 3 * joint + 3] = block[2]
+    return Y
+
+
+def gravity_torque(
+    constants: ArmConstants, mus: Array, q: Array, gravity: float = GRAVITY
+) -> Array:
+    """Return the torques that hold an arm of first moments `mus` [N m], shape (7,)."""
+    return regressor(constants, q, gravity) @ mus.ravel()
+
+
+def moments_of_links(constants: ArmConstants, bodies: tuple[Body, ...] = ()) -> Array:
+    """Return the first moments of the links by their masses [kg m], shape (7, 3).
+
+    mu_j = m_j com_j + (m_j + ... + m_7) r_j with r_j the step from frame j - 1 to
+    frame j, in frame j. `bodies` hang on the tool plate, in frame 7.
+    """
+    mus = np.zeros((7, 3))
+    carried = 0.0
+    for body in bodies:
+        mus[6] += body.mass * body.com
+        carried += body.mass
+    for joint in range(6, -1, -1):
+        link = constants.links[joint]
+        carried += link.mass
+        mus[joint] += link.mass * link.com + carried * _step(constants, joint)
+    return mus
+
+
+@dataclass(frozen=True, slots=True)
+class MomentFit:
+    """Outcome of a gravity calibration.
+
+    Attributes:
+        mus: first moments of least norm [kg m], shape (7, 3); with the tool that was
+            fitted.
+        rank: directions that the poses showed, 12 at best.
+        residual: rms of torque over all joints and poses [N m].
+    """
+
+    mus: Array
+    rank: int
+    residual: float
+
+
+def fit_moments(
+    constants: ArmConstants, q: NDArray[np.float64], tau: NDArray[np.float64]
+) -> MomentFit:
+    """Fit first moments to holding torques.
+
+    Args:
+        constants: of the arm.
+        q: joint positions at rest [rad], shape (n, 7).
+        tau: holding torques there, free of friction [N m], shape (n, 7).
+
+    Raises:
+        SettingsError: the poses show fewer than 12 directions, or no moments explain
+            the torques to 0.5 N m.
+    """
+    if q.shape != tau.shape or q.ndim != 2 or q.shape[1] != 7:
+        raise ValueError(f"q and tau must be (n, 7), got {q.shape} and {tau.shape}")
+    Y = np.vstack([regressor(constants, row) for row in q])
+    mus, _, _, values = np.linalg.lstsq(Y, tau.ravel(), rcond=_SINGULAR)
+    rank = int(np.count_nonzero(values > _SINGULAR * values[0]))
+    residual = float(np.sqrt(np.mean((Y @ mus - tau.ravel()) ** 2)))
+    if rank < OBSERVABLE:
+        raise SettingsError(
+            f"The poses show {rank} of {OBSERVABLE} directions of gravity.",
+            hint="Use more poses, or more different ones.",
+        )
+    if residual > LARGEST_RESIDUAL:
+        raise SettingsError(
+            f"The torques leave {residual:.2f} N m unexplained "
+            f"(limit {LARGEST_RESIDUAL}).",
+            hint="Was the arm touched, or the tool changed meanwhile?",
+        )
+    return MomentFit(np.asarray(mus, np.float64).reshape(7, 3), rank, residual)
+
+
+def _rotation(constants: ArmConstants, joint: int, angle: float) -> Array:
+    """Return R_j = Rz(q) Rx(alpha) of joint `joint` (0-6)."""
+    c, s = np.cos(angle), np.sin(angle)
+    ca, sa = np.cos(constants.alpha[joint]), np.sin(constants.alpha[joint])
+    return np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0.0, sa, ca]])
+
+
+def _step(constants: ArmConstants, joint: int) -> Array:
+    """Return r_j = (a, d sin alpha, d cos alpha) [m]."""
+    alpha, d = constants.alpha[joint], constants.d[joint]
+    return np.array([constants.a[joint], d * np.sin(alpha), d * np.cos(alpha)])
