@@ -65,6 +65,19 @@ def moments_of_links(constants: ArmConstants, bodies: tuple[Body, ...] = ()) -> 
     return mus
 
 
+def links_of_moments(constants: ArmConstants, mus: Array) -> tuple[Body, ...]:
+    """Return links of 1 kg each whose first moments are `mus` [kg m], shape (7, 3).
+
+    They weigh what the arm weighs in every pose, so a rigid-body library evaluates
+    `mus` at its own speed; their inertia means nothing.
+    """
+    none = np.zeros((3, 3))
+    return tuple(
+        Body(1.0, mus[joint] - (7 - joint) * _step(constants, joint), none)
+        for joint in range(7)
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class MomentFit:
     """Outcome of a gravity calibration.

@@ -1,7 +1,13 @@
 """Gravity compensation and the weight of a virtual mass at the foot."""
 
-from wam.constants import Array
+from dataclasses import replace
+
+import numpy as np
+
+from wam.constants import ArmConstants, Array, Body
+from wam.first_moments import links_of_moments
 from wam.model import ArmModel
+from wam.tool import Tool
 
 RAMP = 2.0  # the virtual mass comes and goes within this time [s]
 MAX_VIRTUAL_MASS = 2.0  # kg
@@ -47,3 +53,25 @@ def compensation(model: ArmModel, q: Array, virtual_mass: float) -> Array:
     if virtual_mass:
         tau += model.weight_torque(q, virtual_mass)
     return tau
+
+
+def gravity_model(
+    constants: ArmConstants, tool: Tool, mus: Array, *, is_tool_included: bool
+) -> ArmModel:
+    """Return a model whose gravity is that of first moments instead of masses.
+
+    Only its gravity and its frames mean something; its inertia does not.
+
+    Args:
+        constants: of the arm.
+        tool: sensor and foot.
+        mus: first moments [kg m], shape (7, 3): shipped ones of the links alone, or
+            calibrated ones.
+        is_tool_included: `mus` were fitted with this tool on; it is not added again.
+    """
+    weighed = replace(constants, links=links_of_moments(constants, mus))
+    if not is_tool_included:
+        return ArmModel(weighed, tool)
+    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    foot = replace(nothing, com=tool.foot.com)
+    return ArmModel(weighed, replace(tool, sensor=nothing, foot=foot))

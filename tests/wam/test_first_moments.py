@@ -6,6 +6,7 @@ import pytest
 from acquisition.errors import SettingsError
 from wam.constants import Body, load_constants
 from wam.first_moments import fit_moments, gravity_torque, moments_of_links
+from wam.gravity import gravity_model
 from wam.model import ArmModel
 
 CONSTANTS = load_constants()
@@ -102,3 +103,27 @@ def test_torques_that_gravity_cannot_explain_are_refused():
 def test_shapes_must_agree():
     with pytest.raises(ValueError, match=r"\(n, 7\)"):
         fit_moments(CONSTANTS, np.zeros((3, 7)), np.zeros((2, 7)))
+
+
+def test_a_model_of_shipped_moments_weighs_what_they_say(example_tool):
+    model = gravity_model(
+        CONSTANTS, example_tool, CONSTANTS.mus, is_tool_included=False
+    )
+    bare = ArmModel(CONSTANTS)
+    loaded = ArmModel(CONSTANTS, example_tool)
+    for q in random_poses(10, seed=7):
+        tool_alone = loaded.gravity(q) - bare.gravity(q)
+        expected = gravity_torque(CONSTANTS, CONSTANTS.mus, q) + tool_alone
+        assert model.gravity(q) == pytest.approx(expected, abs=1e-11)
+
+
+def test_moments_fitted_with_the_tool_do_not_carry_it_twice(example_tool):
+    mus = moments_of_links(CONSTANTS, (example_tool.sensor, example_tool.foot))
+    model = gravity_model(CONSTANTS, example_tool, mus, is_tool_included=True)
+    loaded = ArmModel(CONSTANTS, example_tool)
+    for q in random_poses(10, seed=8):
+        assert model.gravity(q) == pytest.approx(loaded.gravity(q), abs=1e-11)
+        # the virtual mass still pulls at the foot's own centre
+        assert model.weight_torque(q, 0.3) == pytest.approx(
+            loaded.weight_torque(q, 0.3), abs=1e-12
+        )
