@@ -111,6 +111,7 @@ class ArmPlant:
         self._to_units = np.array(constants.ipnm, dtype=float)
         self._tau = np.zeros(7)
         self._is_held = True
+        self.disturbance = np.zeros(7)  # joint torques from outside [N m]
         self.terrain: Terrain | None = None
         self.hand = Hand(self._dt)
         self.t_ns = 0
@@ -238,7 +239,7 @@ class ArmPlant:
                     k * ez - b * wz,
                 )
             )
-            self._integrate(self._tau + wrench @ self._A)
+            self._integrate(self._tau + self.disturbance + wrench @ self._A)
             px, py, pz = self._hand_at
             self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
             self._hand_at = (px + dt * hx, py + dt * hy, pz + dt * hz)
