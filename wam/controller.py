@@ -5,6 +5,7 @@ from acquisition.devices import ArmReading, Vector
 from wam.gravity import VirtualMass, compensation
 from wam.joint_lock import JointLock, LockGains
 from wam.model import ArmModel
+from wam.move import JointMove, joint_pd
 
 _JOINT7 = 6
 
@@ -14,7 +15,8 @@ class FootController:
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
     their bounce. hold and damp: gravity plus joint damping, virtual mass ramped to 0.
-    Joint 7 is locked in all three.
+    Joint 7 is locked in all three. In hold the arm can be sent somewhere; joint PD then
+    follows the move and keeps the goal until another state is entered.
     """
 
     def __init__(
@@ -26,10 +28,13 @@ class FootController:
         self._lock = JointLock(gains)
         self._damping = model.constants.kd
         self._is_damped = True
+        self._move: JointMove | None = None
+        self._move_ns = 0
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Begin `state`; torques change continuously except for the damping."""
         now = reading.host_ns
+        self._move = None
         self._is_damped = state is not ArmState.FLOAT
         self._mass.aim(0.0 if self._is_damped else self._target_mass, now)
         if state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
@@ -37,10 +42,35 @@ class FootController:
         else:
             self._lock.release()
 
+    def move_to(self, goal: Vector, reading: ArmReading) -> float:
+        """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
+
+        Joint 7 is released for the move. Only in hold.
+
+        Raises:
+            ValueError: the arm floats, or `goal` is beyond a stop or not finite.
+        """
+        constants = self._model.constants
+        inside = (goal >= constants.q_lower) & (goal <= constants.q_upper)
+        if not self._is_damped:
+            raise ValueError("the arm moves in hold only")
+        if goal.shape != (7,) or not bool(inside.all()):
+            raise ValueError(f"{goal} is no pose within the joint stops")
+        self._lock.release()
+        self._move = JointMove(reading.q.copy(), goal.copy())
+        self._move_ns = reading.host_ns
+        return self._move.duration
+
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         """Return (tau, gravity part) [N m], shapes (7,)."""
         now = reading.host_ns
         gravity = compensation(self._model, reading.q, self._mass.at(now))
+        if self._move is not None:
+            q, qd = self._move.at((now - self._move_ns) * 1e-9)
+            constants = self._model.constants
+            rate = qd - reading.qd
+            pd = joint_pd(constants.kp, constants.kd, q - reading.q, rate)
+            return gravity + pd, gravity
         tau = gravity.copy()
         if self._is_damped:
             tau -= self._damping * reading.qd

@@ -131,3 +131,17 @@ def test_joint_7_gives_way_by_no_more_than_12_mrad(build):
     loop.step(1000, is_commanded=True)
     moved = abs(loop.rig.plant.q[6] - before)
     assert 0.005 < moved <= 0.012
+
+
+def test_the_arm_goes_where_it_is_sent(build):
+    loop = build(POSES[0])
+    loop.start(ArmState.HOLD)
+    loop.step(100, is_commanded=True)
+    goal = loop.reading.q + np.array([0.2, -0.1, 0.1, -0.2, 0.2, -0.1, 0.2])
+    duration = loop.law.move_to(goal, loop.reading)
+    fastest = 0.0
+    for _ in range(round((duration + 1.0) * 500)):
+        loop.step(1, is_commanded=True)
+        fastest = max(fastest, float(np.abs(loop.rig.plant.qd).max()))
+    assert np.abs(loop.rig.plant.q - goal).max() < 0.001
+    assert fastest < 0.6  # the cap of 0.5 rad/s and a little overshoot

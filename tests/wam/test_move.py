@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wam.move import TORQUE_LIMIT, JointMove, joint_pd
+
+ANGLES = st.lists(st.floats(-2.5, 2.5), min_size=7, max_size=7).map(np.array)
+
+
+@given(ANGLES, ANGLES, st.floats(0.1, 2.0), st.floats(0.1, 5.0))
+def test_a_move_starts_and_ends_at_rest_where_it_should(start, goal, speed, acc):
+    move = JointMove(start, goal, speed, acc)
+    for t, where in ((0.0, start), (move.duration, goal), (1e6, goal)):
+        q, qd = move.at(t)
+        assert q == pytest.approx(where, abs=1e-9)
+        assert qd == pytest.approx(np.zeros(7), abs=1e-6)
+
+
+@given(ANGLES, ANGLES, st.floats(0.0, 1.0))
+def test_no_joint_is_faster_than_the_cap(start, goal, share):
+    move = JointMove(start, goal)
+    _, qd = move.at(share * move.duration)
+    assert np.abs(qd).max() <= move.speed + 1e-9
+
+
+@given(ANGLES, ANGLES, st.floats(0.01, 0.99))
+def test_velocity_is_the_derivative_of_position(start, goal, share):
+    move = JointMove(start, goal)
+    h = 1e-6
+    t = share * move.duration
+    later, earlier = move.at(t + h)[0], move.at(t - h)[0]
+    # at the corners of the trapezoid the difference straddles two slopes
+    assert move.at(t)[1] == pytest.approx((later - earlier) / (2 * h), abs=1e-3)
+
+
+@given(ANGLES, ANGLES, st.floats(0.0, 1.0))
+def test_the_line_is_straight(start, goal, share):
+    move = JointMove(start, goal)
+    q = move.at(share * move.duration)[0]
+    way, whole = q - start, goal - start
+    longest = int(np.abs(whole).argmax())
+    if abs(whole[longest]) > 1e-6:
+        assert way == pytest.approx(way[longest] / whole[longest] * whole, abs=1e-9)
+
+
+def test_a_long_move_takes_length_over_speed_and_one_ramp():
+    goal = np.zeros(7)
+    goal[3] = 2.0
+    assert JointMove(np.zeros(7), goal).duration == pytest.approx(2.0 / 0.5 + 1.0)
+
+
+def test_the_pd_part_is_clipped_joint_by_joint():
+    error = np.full(7, 1.0)
+    tau = joint_pd(np.full(7, 1e4), np.zeros(7), error, np.zeros(7))
+    assert tau == pytest.approx(TORQUE_LIMIT)
+    assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), error, error) == pytest.approx(
+        np.full(7, 5.0)
+    )
