@@ -1,7 +1,7 @@
 """One cycle: read, check, command, sample. It has no waiting of its own."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Protocol
 
@@ -21,6 +21,7 @@ from acquisition.sample import MOTOR_FRESH_SHIFT, Flag, Sample
 
 _ZERO = np.zeros(7)
 CLIPPED = 0.05  # sent differs from wanted by more than rounding [N m]
+_OF_CIRCUIT = frozenset({"estop", "pendant-idle"})  # verdicts that may have a cause
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 
 
@@ -126,6 +127,7 @@ class Cycle:
         is_new = self._take_wrench(tick.now_ns)
         status = self.status
         status.safety = self._arm.safety_mode()
+        self._confirm_idle(reading)
         self._enter_requested(reading)
         tau, tau_gravity = self._torque(reading)
         sample = self._sample
@@ -175,6 +177,13 @@ class Cycle:
             self._sample.torque_command[:] = 0.0
         self._enter(ArmState.IDLE if is_confirmed else ArmState.UNKNOWN, reading)
 
+    def _confirm_idle(self, reading: ArmReading) -> None:
+        """Believe the safety circuit when it confirms later what it was asked for."""
+        is_braked = self.status.safety in {SafetyMode.IDLE, SafetyMode.E_STOP}
+        if is_braked and self.status.state is ArmState.UNKNOWN:
+            self._sample.torque_command[:] = 0.0
+            self._enter(ArmState.IDLE, reading)
+
     def _enter(self, state: ArmState, reading: ArmReading) -> None:
         self.status.state = state
         self._was_active = self.status.safety is SafetyMode.ACTIVE
@@ -210,6 +219,8 @@ class Cycle:
         state = self.status.state
         if verdict.action is Action.IDLE:
             self._idle(reading)
+            if verdict.reason in _OF_CIRCUIT:
+                verdict = replace(verdict, causes=self._arm.safety_faults())
         elif verdict.action is Action.DAMP and state is not ArmState.DAMP:
             self._enter(ArmState.DAMP, reading)
         elif verdict.action is Action.HOLD and state is ArmState.FLOAT:
@@ -242,6 +253,10 @@ class Cycle:
                 flags |= Flag.FT_SATURATED
         if tick.is_late:
             flags |= Flag.DEADLINE_MISSED
+        if self._arm.safety_warnings():
+            flags |= Flag.SAFETY_WARNING
+        if self._arm.safety_faults():
+            flags |= Flag.SAFETY_FAULT
         if self.status.state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
             flags |= Flag.JOINT7_LOCKED
         if reading.is_complete and np.abs(sent - tau).max() > CLIPPED:

@@ -85,6 +85,17 @@ class Arm(Protocol):
         """Return the last known state of the safety circuit; does not wait."""
         ...
 
+    def safety_warnings(self) -> tuple[str, ...]:
+        """Return the monitors that warn, such as "velocity"; does not wait."""
+        ...
+
+    def safety_faults(self) -> tuple[str, ...]:
+        """Return the monitors in fault, such as "torque"; does not wait.
+
+        After `idle` they say why the safety circuit stopped the arm, if it did.
+        """
+        ...
+
     def idle(self) -> bool:
         """Brake the arm, then send zero torque; return whether it is confirmed."""
         ...

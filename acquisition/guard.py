@@ -31,11 +31,13 @@ class Verdict:
         action: what the arm does from this cycle on.
         reason: name of the failure as in the message catalogue; empty for none.
         facts: numbers for the message.
+        causes: monitors that the safety circuit names as the cause; often empty.
     """
 
     action: Action
     reason: str = ""
     facts: tuple[tuple[str, float], ...] = ()
+    causes: tuple[str, ...] = ()
 
     @property
     def severity(self) -> int:

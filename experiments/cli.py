@@ -13,6 +13,9 @@ COMMANDS = {
     "check": "is the rig fit to run? one graded page",
     "run": "record a session of trials on one terrain",
     "status": "the matrix board, counted from verified files",
+    "zero": "set the home position after confirmation",
+    "fake": "serve the simulated arm to other programs over CAN",
+    "replay": "what was said on the bus, in words",
     "report": "fit and compare models of recorded sessions, write the report",
     "fit": "the same for tables that Traction did not record",
 }

@@ -1,5 +1,8 @@
 """Who takes part in a session beside the rig, and how they end it."""
 
+import signal
+from collections.abc import Generator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from acquisition.clock import NS_PER_S, Clock, SystemClock
@@ -48,6 +51,18 @@ class StopFlag:
         self.is_urgent |= self.count > 0 and now - self._asked_ns <= TWICE_NS
         self.count += 1
         self._asked_ns = now
+
+
+@contextmanager
+def signals_ask(stop: StopFlag) -> Generator[None]:
+    """Let Ctrl-C, SIGTERM and a lost terminal ask for a stop while this lasts."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, stop.ask) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)
 
 
 @dataclass(slots=True)

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from acquisition.guard import Verdict
+
 
 @dataclass(frozen=True, slots=True)
 class Message:
@@ -145,6 +147,23 @@ CATALOGUE: dict[str, Message] = {
         4,
         "Shift-idle was pressed or a safety limit was exceeded.",
     ),
+    "safety-idle": Message(
+        "The safety module put the arm to idle: {causes}.",
+        "idle, braked",
+        "Press Shift-idle to clear it, then: traction run again.",
+        4,
+        "The module supervises speed, commanded torque, bus voltage and the traffic of "
+        "the loop; its limits are in [safety] of rig.toml.",
+    ),
+    "safety-stop": Message(
+        "The safety module stopped the arm: {causes}.",
+        "stopped by its hardware",
+        "Check the arm's power supply, press Shift-idle, zero the arm, then: traction "
+        "run again.",
+        4,
+        "A voltage fault, or a speed above the limit for half a second, takes the "
+        "power away; positions have to be defined anew.",
+    ),
     "tare-moved": Message(
         "Force varied {spread:.1f} N during tare (0.2 s means, limit {limit:.1f}).",
         "holding",
@@ -181,3 +200,17 @@ CATALOGUE: dict[str, Message] = {
         "Ctrl-C ends a session on purpose, after closing the running trial.",
     ),
 }
+
+_BY_CAUSE = {"pendant-idle": "safety-idle", "estop": "safety-stop"}
+_BUTTON = "other"  # the monitor that a pressed E-stop button shows
+
+
+def fault_text(verdict: Verdict, facts: Mapping[str, object], saved: str = "") -> str:
+    """Return the message of a verdict; `facts` are added to its own.
+
+    A verdict of the safety circuit is the pendant's unless a monitor is its cause.
+    """
+    words = [f"{c} fault" for c in verdict.causes if c != _BUTTON]
+    name = _BY_CAUSE.get(verdict.reason, verdict.reason) if words else verdict.reason
+    known = {**facts, **dict(verdict.facts), "causes": ", ".join(words)}
+    return CATALOGUE[name].text(known, saved)

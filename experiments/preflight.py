@@ -12,6 +12,7 @@ from experiments.messages import CATALOGUE
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, TerrainRow
 from ft_sensor.sensor import BotaSensor
+from wam.health import temperature_range
 
 Add = Callable[[str, str, str], None]
 SESSION_GB = 0.9
@@ -79,14 +80,19 @@ def _check_arm(rig: Rig, add: Add) -> None:
         raise _as_preflight(error, "not touched") from error
     versions = sorted({puck.vers for puck in info.pucks})
     woken = sum(puck.was_asleep for puck in info.pucks)
-    text = f"firmware {', '.join(map(str, versions))}"
-    add(GOOD, "pucks 1-7", text + (f", {woken} woken" if woken else ""))
+    parts = [f"firmware {', '.join(map(str, versions))}"]
+    parts += [f"{woken} woken"] if woken else []
+    parts += ["zeroed"] if info.is_zeroed else []
+    parts += [temperature_range(rig.arm.health())]
+    add(GOOD, "pucks 1-7", ", ".join(parts))
     if not info.is_zeroed:
         add(BAD, "zero", "not zeroed")
         raise _named("not-zeroed")
-    mark = GOOD if info.safety_mode is SafetyMode.IDLE else WARNING
+    faults = [f"{fault} fault: press Shift-idle" for fault in info.pendant.faults]
+    is_calm = info.safety_mode is SafetyMode.IDLE and not faults
     name = info.safety_mode.name.lower().replace("_", "-")
-    add(mark, "safety", f"{name}, firmware {info.safety_vers}")
+    parts = [name, f"firmware {info.safety_vers}", *faults]
+    add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
 
 
 def _check_sensor(rig: Rig, add: Add) -> BotaSensor:

@@ -32,11 +32,13 @@ from wam.constants import ArmConstants, Body, load_constants
 from wam.controller import FootController
 from wam.joint_lock import LockGains
 from wam.model import ArmModel
+from wam.safety_limits import WARNING_SHARE, SafetyLimits
 from wam.tapped_link import TappedLink
 from wam.tool import Tool, sensor_body
 
 if TYPE_CHECKING:
     from fakes.rig import FakeRig
+    from fakes.serve import PuckServer
 
 MS = 1_000_000
 # A simulation shares its thread with plant and recorder; only real arms need cadence.
@@ -70,6 +72,7 @@ class Rig:
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
+        can_link: the arm's bus, for those who listen in.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """
@@ -85,6 +88,7 @@ class Rig:
     frame: TerrainFrame
     row: TerrainRow
     settings: Settings
+    can_link: CanLink
     rehearsal: Rehearsing | None
     is_stepped: bool
 
@@ -181,6 +185,17 @@ def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
     )
 
 
+def build_safety_limits(rig: RigSettings) -> SafetyLimits:
+    """Return what the safety module is told; see [safety] of rig.toml."""
+    safety = rig.safety
+    speed, torque = safety.speed_warning, safety.torque_warning_units
+    if speed is None:
+        speed = WARNING_SHARE * safety.speed_fault
+    if torque is None:
+        torque = int(WARNING_SHARE * safety.torque_fault_units)
+    return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
+
+
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
     """Return the rig for one session.
 
@@ -207,12 +222,16 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     tape = FrameTape()
     model = ArmModel(constants, tool)
     payload = payload_of(tool)
+    can_link = CanLink(bus)
     return Rig(
         clock=clock,
         arm=WamArm(
-            TappedLink(CanLink(bus), tape, clock),
+            TappedLink(can_link, tape, clock),
             clock,
-            ArmSettings(j2mp=constants.j2mp),
+            ArmSettings(
+                j2mp=constants.j2mp,
+                safety_limits=build_safety_limits(settings.rig),
+            ),
         ),
         open_sensor_port=open_sensor_port,
         foot=LiveFoot(model, payload, frame),
@@ -223,6 +242,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         frame=frame,
         row=row,
         settings=settings,
+        can_link=can_link,
         rehearsal=rehearsal,
         is_stepped=fake is not None and fake.is_fast,
     )
@@ -257,3 +277,30 @@ def _simulate(
     rig = FakeRig(scene, constants, tool, stepped)
     stepped.world = rig
     return stepped, rig, Rehearsal(rig)
+
+
+def build_server(
+    settings: Settings, interface: str, channel: str, *, is_idle_first: bool
+) -> PuckServer:
+    """Return a simulated arm that serves its pucks to other programs.
+
+    The arm is at its home position, where an operator puts it before zeroing.
+
+    Args:
+        settings: all settings; the first terrain of the matrix names the foot.
+        interface: "traction-fake" or an interface of python-can.
+        channel: path of the socket, or the interface's channel.
+        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
+
+    Raises:
+        SettingsError: the socket's path is in use or cannot be one.
+        LinkError: the bus cannot be opened.
+    """
+    from fakes.serve import build_home_server, open_can_port
+
+    row = settings.matrix.terrains[0]
+    port = open_can_port(interface, channel, settings.rig.can.bitrate)
+    tool = build_tool(settings.rig, row.foot)
+    return build_home_server(
+        port, tool, terrain_frame(row), SystemClock(), is_idle_first=is_idle_first
+    )

@@ -12,7 +12,7 @@ from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from experiments.archive import ENOUGH, Archive, Outcome
 from experiments.book import Book
 from experiments.company import FaultedError, StopAskedError
-from experiments.messages import CATALOGUE
+from experiments.messages import CATALOGUE, fault_text
 from experiments.operator import REJECT_REASONS, Prompt
 from experiments.review import Review, review_trial
 from experiments.stage import TICK, Stage
@@ -292,9 +292,8 @@ class SessionRunner:
     def _tell_fault(self, verdict: Verdict) -> None:
         trial, seconds = self._place
         facts: dict[str, object] = {"trial": trial, "seconds": seconds}
-        facts.update(dict(verdict.facts))
-        message = CATALOGUE[verdict.reason]
-        self.stage.company.console.problem(message.text(facts, self.book.saved()))
+        text = fault_text(verdict, facts, self.book.saved())
+        self.stage.company.console.problem(text)
 
     def _tell_bug(self, text: str) -> None:
         log = self.facts.folder.path / "log.txt"

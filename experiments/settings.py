@@ -90,6 +90,28 @@ class LimitSection(_Section):
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
 
 
+class SafetySection(_Section):
+    """What the safety module tolerates; a warning left out is 0.9 of its fault."""
+
+    speed_warning: Annotated[Number, Field(gt=0, le=2)] | None = Field(
+        default=None, examples=[0.5]
+    )
+    speed_fault: Number = Field(gt=0, le=2, examples=[1.0])
+    torque_warning_units: Annotated[Whole, Field(gt=0, le=8191)] | None = Field(
+        default=None, examples=[4731]
+    )
+    torque_fault_units: Whole = Field(gt=0, le=8191, examples=[5204])
+
+
+# What the module does by itself after power-up.
+_POWER_UP = SafetySection(
+    speed_warning=0.5,
+    speed_fault=1.0,
+    torque_warning_units=4731,
+    torque_fault_units=5204,
+)
+
+
 class RigSettings(_Section):
     """Everything in rig.toml."""
 
@@ -98,6 +120,7 @@ class RigSettings(_Section):
     feet: Feet
     control: ControlSection
     limits: LimitSection
+    safety: SafetySection = _POWER_UP
 
 
 class TerrainRow(_Section):

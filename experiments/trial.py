@@ -18,6 +18,7 @@ from experiments import provenance
 from experiments.rigs import Rig
 from experiments.store import SessionFolder, iso_utc
 from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
+from wam.health import health_facts
 from wam.urdf import urdf
 
 TIME_LIMIT = 30.0  # s
@@ -104,7 +105,7 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         trial=trial,
         utc_offset_ns=offset,
         offset_uncertainty_ns=uncertainty,
-        provenance=facts.provenance,
+        provenance={**facts.provenance, **health_facts(rig.arm.health())},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
     )

@@ -13,7 +13,9 @@ from wam.pucks import (
     property_number,
 )
 
-READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM"))
+READ_ONLY = frozenset(
+    ("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM", "VBUS")
+)
 
 
 class Power(Enum):
@@ -55,7 +57,8 @@ class MotorPuck:
         self.properties = {
             "ROLE": MAGNETIC_ENCODER | Role.TATER,
             **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
-            **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33, "VBUS": 48},
+            **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33},
+            **{"VBUS": 48},
             **{"GRPA": 0, "GRPB": 1 if node <= 4 else 2, "GRPC": 4},
             **{"CTS": options.cts[i], "IPNM": options.ipnm[i], "MT": options.mt[i]},
             **{"POLES": options.poles[i], "ECMIN": 0, "ECMAX": 0},

@@ -1,6 +1,6 @@
 """The seven simulated motor pucks of an arm, and the motors behind them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from acquisition.devices import SafetyMode
@@ -11,6 +11,7 @@ from fakes.schedule import Schedule
 from wam.frames import (
     MOTOR_NODES,
     Property,
+    decode_position,
     encode_position,
     position_reply_id,
 )
@@ -41,7 +42,8 @@ class PuckBank:
     """Motor pucks 1 to 7: they are told, asked, driven, and lose their power.
 
     Motors are advanced to the instants at which pucks touch them and no further.
-    `on_position` is called for each position report.
+    `on_positions` is called with the positions [counts] by node that are reported at
+    one instant.
     """
 
     def __init__(
@@ -49,12 +51,12 @@ class PuckBank:
         motors: MotorSide,
         options: NetworkOptions,
         schedule: Schedule,
-        on_position: Callable[[], None],
+        on_positions: Callable[[Mapping[int, int]], None],
     ) -> None:
         self._motors = motors
         self._options = options
         self._schedule = schedule
-        self._on_position = on_position
+        self._on_positions = on_positions
         self._mode = options.safety_mode
         self._pucks = [MotorPuck(node, options) for node in MOTOR_NODES]
         self._members: dict[int, list[MotorPuck]] = {}
@@ -74,6 +76,11 @@ class PuckBank:
     def silence(self, node: int, *, is_mute: bool) -> None:
         """Cut the transmit wire of a puck, or mend it."""
         self._pucks[node - 1].is_mute = is_mute
+
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the pucks measure `voltage` [V]."""
+        for puck in self._pucks:
+            puck.properties["VBUS"] = round(voltage)
 
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor."""
@@ -136,11 +143,14 @@ class PuckBank:
     def _report(self, pucks: list[MotorPuck]) -> None:
         """Latch the positions of `pucks` and hand them to the wire."""
         counts = self._encoder_counts()
+        reported: dict[int, int] = {}
         for puck in pucks:
             if puck.power is Power.AWAKE and not puck.is_mute:
                 position = encode_position(counts[puck.node - 1] + puck.offset)
                 self._schedule.emit(position_reply_id(puck.node), position)
-                self._on_position()
+                reported[puck.node] = decode_position(position)
+        if reported:
+            self._on_positions(reported)
 
     def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
         name = puck.name_of(number)

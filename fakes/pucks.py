@@ -38,7 +38,7 @@ class PuckNetwork:
             self.options, self._schedule, self._mode_changed
         )
         self._bank = PuckBank(
-            motors, self.options, self._schedule, self._safety.hear_position
+            motors, self.options, self._schedule, self._safety.hear_positions
         )
 
     @property
@@ -97,6 +97,11 @@ class PuckNetwork:
             self._safety.is_mute = is_mute
         else:
             self._bank.silence(node, is_mute=is_mute)
+
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the arm's power bus have `voltage` [V], at the last `advance`."""
+        self._bank.set_bus_voltage(voltage)
+        self._safety.set_bus_voltage(voltage)
 
     def reboot(self, node: int) -> None:
         """Let a motor puck fall into its monitor: no torque, position lost."""

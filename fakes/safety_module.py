@@ -4,22 +4,29 @@ Neither the heartbeat's limit nor the content of the broadcast is known outside 
 the one is an option, the other the mode that the pucks go to.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from acquisition.devices import SafetyMode
 from fakes.network_options import NetworkOptions
 from fakes.schedule import Schedule
+from fakes.speed_watch import SpeedWatch
 from wam.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
 from wam.pucks import Device, PuckMode, Role, Stat, names
 from wam.safety import MONITORS, Button, Level, PendantWord, encode_pendant
+from wam.safety_limits import COUNTS_PER_SPEED
 
 PendantAction = Literal["activate", "idle", "estop"]
 TORQUE_GROUPS = (Group.LOWER_TORQUE, Group.WRIST_TORQUE)
 _MODE = 8  # number of the property in every firmware
 _BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "STAT"))
-_POWER_UP_LIMITS = {"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204}
+_POWER_UP_LIMITS = {
+    **{"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204},
+    **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57},
+}
+NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
+_PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
 
 
@@ -53,13 +60,19 @@ class FakeSafetyModule:
         self._levels: dict[str, Level] = dict.fromkeys(MONITORS, Level.SAFE)
         if not options.has_power:
             self._levels["other"] = Level.FAULT
+        self._speeds = SpeedWatch(options.cts)
+        self._too_fast_since_ns: int | None = None
+        self._bus_voltage = NOMINAL_VOLTAGE
         self._largest_command: dict[Group, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
             **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
             **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0, "STAT": int(Stat.READY)},
             **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
-            **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57, "VNOM": 48},
-            **{"ZERO": int(options.has_positions), **_POWER_UP_LIMITS},
+            **{
+                "VNOM": round(NOMINAL_VOLTAGE),
+                "ZERO": int(options.has_positions),
+                **_POWER_UP_LIMITS,
+            },
         }
 
     @property
@@ -83,6 +96,7 @@ class FakeSafetyModule:
             self._levels = dict.fromkeys(self._levels, Level.SAFE)
             self._enter(SafetyMode.IDLE)
             self._judge_torque()
+            self._judge_voltage()
         elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
             self._enter(SafetyMode.ACTIVE)
 
@@ -97,9 +111,16 @@ class FakeSafetyModule:
                 self._options.latch_ns, lambda: self._answer(number, name)
             )
 
-    def hear_position(self) -> None:
-        """Note a position on the bus: the heartbeat of the arm."""
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the power bus have `voltage` [V] from now on."""
+        self._bus_voltage = voltage
+        self._judge_voltage()
+
+    def hear_positions(self, positions: Mapping[int, int]) -> None:
+        """Take positions [counts] by node: heartbeat of the arm, and its speed."""
         self._last_position_ns = self._schedule.now_ns
+        self._speeds.hear(self._schedule.now_ns, positions)
+        self._judge_speed()
 
     def hear_torques(self, group: Group, units: Sequence[int]) -> None:
         """Judge a torque command as it stands on the bus, before a puck clips it."""
@@ -132,19 +153,57 @@ class FakeSafetyModule:
                 self._properties[limit] = _POWER_UP_LIMITS[limit]
         elif name in self._properties and name not in _READ_ONLY:
             self._properties[name] = value
+            self._judge_voltage()
+
+    def _judge_speed(self) -> None:
+        """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
+        is_zeroed = self._properties["ZERO"] == 1
+        speed = self._speeds.tip_speed() if is_zeroed else self._speeds.joint_speed()
+        counts = speed * COUNTS_PER_SPEED
+        if counts <= self._properties["VL2"] or self._properties["VL2"] <= 0:
+            self._too_fast_since_ns = None
+            self._warn("velocity", counts > self._properties["VL1"] > 0)
+        elif self._properties["IFAULT"] > 0:
+            self._properties["IFAULT"] -= 1
+        else:
+            self._fault("velocity")
+            self._stop_if_still_too_fast()
+
+    def _stop_if_still_too_fast(self) -> None:
+        now_ns = self._schedule.now_ns
+        if self._too_fast_since_ns is None:
+            self._too_fast_since_ns = now_ns
+        if now_ns - self._too_fast_since_ns >= _PATIENCE_NS:
+            self._enter(SafetyMode.E_STOP)
+
+    def _judge_voltage(self) -> None:
+        limits, voltage = self._properties, self._bus_voltage
+        if self.mode is SafetyMode.E_STOP:
+            return  # the bus has no power, and nothing to judge
+        if not limits["VOLTL2"] <= voltage <= limits["VOLTH2"]:
+            self._levels["voltage"] = Level.FAULT
+            self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
+        else:
+            is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
+            self._warn("voltage", is_odd)
+
+    def _warn(self, monitor: str, is_warning: bool) -> None:
+        """Light or put out a warning; a fault stays until Shift-idle."""
+        if self._levels[monitor] is not Level.FAULT:
+            self._levels[monitor] = Level.WARNING if is_warning else Level.SAFE
 
     def _judge_torque(self) -> None:
         largest = max(self._largest_command.values())
         if self.mode is SafetyMode.ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
-        elif self._levels["torque"] is not Level.FAULT:
-            is_high = largest > self._properties["TL1"]
-            self._levels["torque"] = Level.WARNING if is_high else Level.SAFE
+        else:
+            self._warn("torque", largest > self._properties["TL1"])
 
     def _fault(self, monitor: str) -> None:
         """Note a fault until Shift-idle and stop the arm."""
         self._levels[monitor] = Level.FAULT
-        self._enter(SafetyMode.IDLE)
+        if self.mode is SafetyMode.ACTIVE:
+            self._enter(SafetyMode.IDLE)
 
     def _enter(self, mode: SafetyMode) -> None:
         if mode is self.mode:
@@ -152,6 +211,8 @@ class FakeSafetyModule:
         before, self.mode = self.mode, mode
         if mode is SafetyMode.E_STOP:
             self._properties["ZERO"] = 0
+            self._speeds.forget()
+            self._too_fast_since_ns = None
         self._last_position_ns = self._schedule.now_ns
         told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
         self._schedule.emit(_BROADCAST_ID, told)

@@ -15,11 +15,13 @@ from wam.arm_settings import ArmSettings
 from wam.can_link import Link
 from wam.dialogue import Dialogue
 from wam.frames import MOTOR_NODES
+from wam.health import PuckHealth
 from wam.motion import Motion
 from wam.safety import SafetyModule
 from wam.startup import ArmInfo, StartUp, pucks_do
 from wam.traffic import CycleTraffic
 from wam.transmission import MOTORS, Transmission
+from wam.watch import BRAKED
 
 _MS = 1_000_000
 _ALL_FRESH = (1 << MOTORS) - 1
@@ -27,7 +29,6 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
-_BRAKED = (SafetyMode.IDLE, SafetyMode.E_STOP)
 
 
 class WamArm:
@@ -47,11 +48,13 @@ class WamArm:
         self._clock = clock
         self._settings = settings or ArmSettings()
         self._traffic = CycleTraffic(link, clock, self._settings)
+        self._watch = self._traffic.watch
         self.counters = self._traffic.counters
         self._dialogue = Dialogue(link, clock)
         self._safety = SafetyModule(self._dialogue, clock, vers=0)
         self._motion: Motion | None = None
         self._missing_cycles = 0
+        self._is_commanded = True
         self._is_closed = False
 
     @property
@@ -74,9 +77,13 @@ class WamArm:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        info = StartUp(self._dialogue, self._clock, self._settings.boot_ns).run()
+        info = StartUp(self._dialogue, self._clock, self._settings).run()
         self._safety = SafetyModule(self._dialogue, self._clock, info.safety_vers)
-        self._traffic.mode = info.safety_mode
+        self._watch.set_firmware(info.safety_vers)
+        self._watch.note_mode(info.safety_mode)
+        self._watch.is_lowering = False
+        self._watch.note_pendant(info.pendant)
+        self._watch.health.pucks[:] = [puck.health for puck in info.pucks]
         self._traffic.set_firmware(info.pucks[0].vers)
         transmission = Transmission(
             self._settings.j2mp,
@@ -102,9 +109,11 @@ class WamArm:
         self.counters.rejected += arrived - fresh.bit_count()
         is_complete = fresh == _ALL_FRESH
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
-        if not is_complete:
+        if not (is_complete and self._is_commanded):
             # No torque frame may follow to carry the question.
-            traffic.watch_mode(is_urgent=self._missing_cycles <= _URGENT_CYCLES)
+            is_urgent = 0 < self._missing_cycles <= _URGENT_CYCLES
+            traffic.ask(is_urgent=is_urgent)
+        self._is_commanded = False
         return ArmReading(
             host_ns=now_ns,
             arm_ns=traffic.arm_ns,
@@ -129,12 +138,25 @@ class WamArm:
         transmission = (self._motion or self._started()).transmission
         command = transmission.command(tau, tau_gravity)
         is_sent = self._traffic.transmit(command.units)
-        self._traffic.watch_mode()
+        self._traffic.ask()
+        self._is_commanded = True
         return command.tau if is_sent else transmission.tau(self._traffic.sent)
 
     def safety_mode(self) -> SafetyMode:
         """Return the last known mode; UNKNOWN when the module stopped answering."""
-        return self._traffic.mode
+        return self._watch.mode
+
+    def safety_warnings(self) -> tuple[str, ...]:
+        """Return the monitors of the safety module that warn, as last heard."""
+        return self._watch.warnings
+
+    def safety_faults(self) -> tuple[str, ...]:
+        """Return the monitors of the safety module in fault, as last heard."""
+        return self._watch.faults
+
+    def health(self) -> tuple[PuckHealth, ...]:
+        """Return what pucks 1 to 7 said last about themselves; does not wait."""
+        return tuple(self._watch.health.pucks)
 
     def idle(self) -> bool:
         """Brake the arm: module to IDLE, confirmed, then zero torque.
@@ -144,15 +166,17 @@ class WamArm:
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
-            return self._traffic.mode in _BRAKED
+            return self._watch.mode in BRAKED
         try:
-            self._traffic.mode = self._safety.lower_to_idle(self._settings.idle_ns)
+            self._watch.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
         except LinkError:
             self.counters.link_errors += 1
-            self._traffic.mode = SafetyMode.UNKNOWN
-        if self._traffic.mode not in _BRAKED:
+            self._watch.note_mode(SafetyMode.UNKNOWN)
+        if self._watch.mode not in BRAKED:
+            self._watch.is_lowering = True
             return False
         self._traffic.transmit([0] * MOTORS)
+        self._look_at_pendant()
         return True
 
     def close(self) -> None:
@@ -186,6 +210,17 @@ class WamArm:
         self._begin_at_rest()
         self._check_taken(counts, motion.counts)
         self._safety.mark_zeroed()
+
+    def _look_at_pendant(self) -> None:
+        """Learn why the arm is idle; without an answer the last one stands."""
+        if self._motion is None:
+            return
+        try:
+            self._watch.note_pendant(self._safety.pendant())
+        except LinkError:
+            self.counters.link_errors += 1
+        except DeviceFaultError:
+            self.counters.malformed += 1
 
     def _check_taken(self, wanted: Sequence[int], found: Sequence[int]) -> None:
         worst = max(abs(w - f) for w, f in zip(wanted, found, strict=True))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from wam.safety_limits import SafetyLimits
 from wam.transmission import HOST_TORQUE_LIMITS, Matrix, coupled_ratios
 
 _MS = 1_000_000
@@ -22,7 +23,10 @@ class ArmSettings:
         first_look_ns: from request to the first look at the bus [ns].
         give_up_ns: from request to the end of waiting for replies [ns].
         jump_counts: a motor cannot move further in a cycle [counts].
-        safety_poll_cycles: cycles between questions for the safety mode.
+        safety_poll_cycles: cycles between questions for the safety mode, and between
+            those for the pendant's word.
+        health_poll_cycles: cycles between questions for the health of a puck.
+        safety_limits: what the safety module is told to tolerate.
         boot_ns: silence while pucks boot [ns].
         idle_ns: longest wait for the safety module to confirm IDLE [ns].
     """
@@ -34,5 +38,7 @@ class ArmSettings:
     give_up_ns: int = 1_500_000
     jump_counts: int = 1000
     safety_poll_cycles: int = 25
+    health_poll_cycles: int = 50
+    safety_limits: SafetyLimits = field(default_factory=SafetyLimits)
     boot_ns: int = 1_000 * _MS
     idle_ns: int = 100 * _MS

@@ -1,12 +1,12 @@
 """A bus log in words: who asked what, who answered, how late, who stayed silent.
 
 A GET is answered once by each device that it addresses, a SET by nobody. The protocol
-has no sequence numbers: an answer belongs to the oldest open question of its kind, and a
-question asked again after the answer's time limit replaces the one before.
+has no sequence numbers: an answer belongs to the oldest open question of its kind, and
+a question asked again after the answer's time limit replaces the one before.
 """
 
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from acquisition.devices import SafetyMode
@@ -99,10 +99,7 @@ class Tally:
     late: int = 0
     slowest_ns: int = 0
     unasked: int = 0
-    silent: Counter[str] = None  # pyright: ignore[reportAssignmentType]
-
-    def __post_init__(self) -> None:
-        self.silent = Counter()
+    silent: Counter[str] = field(default_factory=Counter[str])
 
 
 def node_name(node: int) -> str:
@@ -176,6 +173,9 @@ class BusReader:
         name = self._name(nodes[0], request.number)
         if request.value is not None:
             value = self._value(nodes[0], name, request.value)
+            if name == "STAT":  # a puck that is woken says nothing of it
+                for node in nodes:
+                    self._learn(node, name, request.value)
             return f"host sets {name} of {whom} to {value}"
         for node in nodes:
             for kind in self._answers_to(node, request.number):
@@ -188,7 +188,8 @@ class BusReader:
         delay = self._answered((node, reply.number), frame.utc_ns)
         name = self._name(node, reply.number)
         self._learn(node, name, value)
-        return f"{node_name(node)} answers {name} = {self._value(node, name, value)}{delay}"
+        shown = self._value(node, name, value)
+        return f"{node_name(node)} answers {name} = {shown}{delay}"
 
     def _learn(self, node: int, name: str, value: int) -> None:
         if name == "STAT":
@@ -246,7 +247,9 @@ class BusReader:
         self.tally.slowest_ns = max(self.tally.slowest_ns, delay_ns)
         is_late = delay_ns > LIMIT_NS
         self.tally.late += is_late
-        return f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
+        return (
+            f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
+        )
 
     def _give_up(self, before_ns: int) -> list[Spoken]:
         """Drop the questions asked until `before_ns`."""
@@ -260,12 +263,14 @@ class BusReader:
 
     def _drop(self, key: _Key) -> list[Spoken]:
         node, kind = key
-        name = kind.name if isinstance(kind, Answer) else self._name(node, kind)
-        what = f"{node_name(node)}: {name.lower().replace('_', ' ')}"
-        if not isinstance(kind, Answer):
-            what = f"{node_name(node)}: {name}"
+        if isinstance(kind, Answer):
+            name = kind.name.lower().replace("_", " ")
+        else:
+            name = self._name(node, kind)
+        what = f"{node_name(node)}: {name}"
         asked = self._open.pop(key, [])
-        self.tally.silent[what] += len(asked)
+        if asked:
+            self.tally.silent[what] += len(asked)
         return [Spoken(t, f"UNANSWERED {what}") for t in asked]
 
 

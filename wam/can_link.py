@@ -1,6 +1,7 @@
 """The one door to python-can: a bus that is sent to and drained, never waited on."""
 
 import errno
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import can
@@ -10,6 +11,10 @@ from wam.frames import SAFETY_NODE, SENDER_MASK, Group, Payload, compose_id
 
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
+
+
+# identifier, payload, time by the bus's own clock [s] or 0.0
+Tap = Callable[[int, bytes, float], None]
 
 
 class Frame(NamedTuple):
@@ -87,9 +92,11 @@ class CanLink:
     Attributes:
         mode_hints: broadcasts of the safety module so far.
         error_frames: error frames of the controller so far.
+        tap: told of every data frame with an 11-bit identifier, sent or received.
     """
 
     def __init__(self, bus: can.BusABC) -> None:
+        self.tap: Tap | None = None
         self.mode_hints = 0
         self.error_frames = 0
         self._bus = bus
@@ -113,6 +120,8 @@ class CanLink:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
+        if self.tap is not None:
+            self.tap(can_id, data, 0.0)
 
     def receive(self) -> list[Frame]:
         """Return the device frames that have arrived, oldest first.
@@ -160,11 +169,14 @@ class CanLink:
         can_id = message.arbitration_id
         if message.is_error_frame:
             self.error_frames += 1
-        elif can_id == MODE_BROADCAST_ID:
+            return
+        if message.is_extended_id or message.is_remote_frame:
+            return
+        if self.tap is not None:
+            self.tap(can_id, bytes(message.data), message.timestamp)
+        if can_id == MODE_BROADCAST_ID:
             self.mode_hints += 1
-        elif not (message.is_extended_id or message.is_remote_frame) and (
-            can_id & SENDER_MASK
-        ):
+        elif can_id & SENDER_MASK:
             self._inbox.append(Frame(can_id, message.data, message.timestamp))
 
 

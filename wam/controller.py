@@ -40,7 +40,7 @@ class FootController:
         if state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
             self._lock.engage(float(reading.q[_JOINT7]), now)
         else:
-            self._lock.release()
+            self._lock.release(now)
 
     def move_to(self, goal: Vector, reading: ArmReading) -> float:
         """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
@@ -56,7 +56,7 @@ class FootController:
             raise ValueError("the arm moves in hold only")
         if goal.shape != (7,) or not bool(inside.all()):
             raise ValueError(f"{goal} is no pose within the joint stops")
-        self._lock.release()
+        self._lock.release(reading.host_ns)
         self._move = JointMove(reading.q.copy(), goal.copy())
         self._move_ns = reading.host_ns
         return self._move.duration
@@ -65,20 +65,20 @@ class FootController:
         """Return (tau, gravity part) [N m], shapes (7,)."""
         now = reading.host_ns
         gravity = compensation(self._model, reading.q, self._mass.at(now))
+        lock = self._lock.torque(float(reading.q[_JOINT7]), reading.qd7_raw, now)
         if self._move is not None:
             q, qd = self._move.at((now - self._move_ns) * 1e-9)
             constants = self._model.constants
             rate = qd - reading.qd
             pd = joint_pd(constants.kp, constants.kd, q - reading.q, rate)
+            pd[_JOINT7] += lock  # fades from the moment of its release
             return gravity + pd, gravity
         tau = gravity.copy()
         if self._is_damped:
             tau -= self._damping * reading.qd
-        tau[_JOINT7] = gravity[_JOINT7] + self._lock.torque(
-            float(reading.q[_JOINT7]), reading.qd7_raw, now
-        )
+        tau[_JOINT7] = gravity[_JOINT7] + lock
         return tau, gravity
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
-        return self._lock.offset(float(reading.q[_JOINT7]))
+        return self._lock.offset(float(reading.q[_JOINT7]), reading.host_ns)

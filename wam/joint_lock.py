@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-RAMP = 0.5  # the stiffness grows to its full value within this time [s]
+RAMP = 0.5  # the lock takes hold and lets go within this time [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,45 +14,80 @@ class LockGains:
         kd: damping [N m s/rad], on the unfiltered one-cycle difference of q7: on the
             filtered velocity the lock oscillates by several degrees.
         limit: largest torque [N m]; puck 7 cannot deliver more than 1.36.
+        speed: largest speed of a reference that is moved [rad/s].
     """
 
     kp: float = 20.0
     kd: float = 0.2
     limit: float = 1.3
+    speed: float = 0.3
 
 
 class JointLock:
-    """Keeps joint 7 where it was when the lock was engaged."""
+    """Keeps joint 7 where it was when the lock was engaged, or where it is moved to."""
 
     def __init__(self, gains: LockGains | None = None) -> None:
         self._gains = gains or LockGains()
-        self._reference: float | None = None
+        self._is_engaged = False
+        self._from = 0.0  # where the reference was at `_moved_ns`
+        self._goal = 0.0
+        self._moved_ns = 0
+        self._share = 0.0  # of the lock's strength at `_since_ns`
         self._since_ns = 0
 
     @property
     def is_engaged(self) -> bool:
         """Whether the lock holds."""
-        return self._reference is not None
+        return self._is_engaged
 
     def engage(self, q7: float, now_ns: int) -> None:
-        """Lock at `q7` [rad]; does nothing if the lock holds already."""
-        if self._reference is None:
-            self._reference = q7
+        """Lock at `q7` [rad]; does nothing if the lock holds already.
+
+        A lock that is still letting go takes hold anew, from no stiffness at all.
+        """
+        if self._is_engaged:
+            return
+        self._is_engaged = True
+        self._from = self._goal = q7
+        self._moved_ns = self._since_ns = now_ns
+        self._share = 0.0
+
+    def move(self, q7: float, now_ns: int) -> None:
+        """Let the reference go to `q7` [rad] at its largest speed, if engaged."""
+        if self._is_engaged:
+            self._from = self.reference(now_ns)
+            self._goal = q7
+            self._moved_ns = now_ns
+
+    def release(self, now_ns: int) -> None:
+        """Let joint 7 go: spring and damper fade within `RAMP`."""
+        if self._is_engaged:
+            self._share = self._stiffness_share(now_ns)
+            self._is_engaged = False
+            self._goal = self._from = self.reference(now_ns)
             self._since_ns = now_ns
 
-    def release(self) -> None:
-        """Let joint 7 go."""
-        self._reference = None
+    def reference(self, now_ns: int) -> float:
+        """Return where the lock holds joint 7 at `now_ns` [rad]."""
+        way = self._gains.speed * (now_ns - self._moved_ns) * 1e-9
+        return self._from + min(max(self._goal - self._from, -way), way)
 
-    def offset(self, q7: float) -> float:
+    def offset(self, q7: float, now_ns: int) -> float:
         """Return how far joint 7 is from its reference [rad]; 0 when released."""
-        return 0.0 if self._reference is None else q7 - self._reference
+        return q7 - self.reference(now_ns) if self._is_engaged else 0.0
 
     def torque(self, q7: float, qd7_raw: float, now_ns: int) -> float:
         """Return the torque about joint 7 [N m] without gravity, clipped."""
-        if self._reference is None:
-            return 0.0
+        share = self._stiffness_share(now_ns)
+        # The damper is there from the start, and fades with the spring at the end.
+        damping = 1.0 if self._is_engaged else share
         gains = self._gains
-        share = min((now_ns - self._since_ns) * 1e-9 / RAMP, 1.0)
-        tau = share * gains.kp * (self._reference - q7) - gains.kd * qd7_raw
+        tau = share * gains.kp * (self.reference(now_ns) - q7)
+        tau -= damping * gains.kd * qd7_raw
         return min(max(tau, -gains.limit), gains.limit)
+
+    def _stiffness_share(self, now_ns: int) -> float:
+        grown = (now_ns - self._since_ns) * 1e-9 / RAMP
+        if self._is_engaged:
+            return min(grown, 1.0)
+        return max(self._share - grown, 0.0)

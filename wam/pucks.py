@@ -12,6 +12,7 @@ from acquisition.errors import SettingsError
 
 MODERN = 61  # from here on motor and safety firmware have tables of their own
 FIRST_RELEASED = 32
+OLDEST_DRIVEN = 65  # from here on all that the driver asks a motor for has its place
 POLES_OF_WRIST = 6
 POLES_OF_GIMBALS = 8
 MAGNETIC_ENCODER = 0x0100

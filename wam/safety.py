@@ -12,6 +12,7 @@ from acquisition.errors import DeviceFaultError
 from wam.dialogue import Dialogue
 from wam.frames import SAFETY_NODE
 from wam.pucks import Device, property_number
+from wam.safety_limits import SafetyLimits
 
 _MODE = 8  # the same in every firmware
 _RETRY_NS = 10_000_000
@@ -61,6 +62,11 @@ class PendantWord:
     def faults(self) -> tuple[str, ...]:
         """Names of the monitors that report a fault."""
         return tuple(name for name in MONITORS if getattr(self, name) is Level.FAULT)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Names of the monitors that warn."""
+        return tuple(name for name in MONITORS if getattr(self, name) is Level.WARNING)
 
 
 MONITORS = ("velocity", "torque", "voltage", "heartbeat", "other")
@@ -160,6 +166,28 @@ class SafetyModule:
     def ignore_speed_faults(self, count: int) -> None:
         """Let the module ignore `count` samples before something makes a jump."""
         self._set("IFAULT", count)
+
+    def set_limits(self, limits: SafetyLimits) -> None:
+        """Bring VL and TL to their power-up values, then to `limits`, and read back.
+
+        Raises:
+            DeviceFaultError: the module keeps another value.
+            LinkTimeoutError: the module is silent.
+        """
+        wanted = limits.words()
+        for name in wanted:
+            number = property_number(Device.SAFETY, name, self._vers)
+            self._set("DEF", number)
+            self._set("LOAD", number)
+        for name, value in wanted.items():
+            self._set(name, value)
+        for name, value in wanted.items():
+            found = self._get(name)
+            if found != value:
+                raise DeviceFaultError(
+                    f"The safety module has {name} = {found}, expected {value}.",
+                    hint="Switch the arm off and on, then start again.",
+                )
 
     def pendant(self) -> PendantWord:
         """Return pendant and monitors; DeviceFaultError if they make no sense."""

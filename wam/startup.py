@@ -6,9 +6,13 @@ from dataclasses import dataclass
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, PreflightError
+from wam.arm_settings import ArmSettings
 from wam.dialogue import Dialogue
 from wam.frames import MOTOR_NODES, SAFETY_NODE, Group
+from wam.health import PuckHealth, ask_health
 from wam.pucks import (
+    MODERN,
+    OLDEST_DRIVEN,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
     Device,
@@ -17,7 +21,7 @@ from wam.pucks import (
     device_of,
     property_number,
 )
-from wam.safety import SafetyModule
+from wam.safety import PendantWord, SafetyModule
 
 _VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
 _MS = 1_000_000
@@ -34,6 +38,7 @@ class PuckInfo:
         cts: encoder counts per motor turn.
         ipnm: torque units per N m at the motor.
         was_asleep: the puck had to be woken.
+        health: temperatures, voltage and error.
     """
 
     node: int
@@ -42,6 +47,7 @@ class PuckInfo:
     cts: int
     ipnm: int
     was_asleep: bool
+    health: PuckHealth
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +59,7 @@ class ArmInfo:
         nodes: every node that answered.
         safety_vers: firmware of the safety module.
         safety_mode: its mode at the end of start-up.
+        pendant: what the pendant shows.
         is_zeroed: positions have been defined since power-up.
         late_replies: replies that came after their question was given up.
     """
@@ -61,6 +68,7 @@ class ArmInfo:
     nodes: tuple[int, ...]
     safety_vers: int
     safety_mode: SafetyMode
+    pendant: PendantWord
     is_zeroed: bool
     late_replies: int
 
@@ -68,14 +76,14 @@ class ArmInfo:
 class StartUp:
     """The questions to a WAM before it is driven.
 
-    It follows libbarrett's start-up, without its waits for a person. `boot_ns` is the
-    silence kept while pucks boot [ns].
+    It follows libbarrett's start-up, without its waits for a person.
     """
 
-    def __init__(self, dialogue: Dialogue, clock: Clock, boot_ns: int) -> None:
+    def __init__(self, dialogue: Dialogue, clock: Clock, settings: ArmSettings) -> None:
         self._dialogue = dialogue
         self._clock = clock
-        self._boot_ns = boot_ns
+        self._boot_ns = settings.boot_ns
+        self._limits = settings.safety_limits
 
     def run(self) -> ArmInfo:
         """Return what is there, awake and idle.
@@ -88,21 +96,23 @@ class StartUp:
             LinkError: the bus is down.
         """
         stats = self._enumerate()
-        safety = self._find_safety(stats)
+        safety_vers = self._find_safety(stats)
+        safety = SafetyModule(self._dialogue, self._clock, safety_vers)
         mode = safety.mode()
         _check_present(stats, mode)
+        safety.set_limits(self._limits)
         asleep = [node for node, stat in stats.items() if stat == Stat.RESET]
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
-        _check_same_numbers(pucks)
         self._check_wrist(pucks[-1])
         if mode is not SafetyMode.ACTIVE:
             self._dialogue.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
-            safety_vers=self._dialogue.require(SAFETY_NODE, _VERS, "VERS"),
+            safety_vers=safety_vers,
             safety_mode=safety.mode(),
+            pendant=safety.pendant(),
             is_zeroed=safety.is_zeroed(),
             late_replies=self._dialogue.late_replies,
         )
@@ -116,7 +126,8 @@ class StartUp:
                 found[node] = stat
         return found
 
-    def _find_safety(self, stats: dict[int, int]) -> SafetyModule:
+    def _find_safety(self, stats: dict[int, int]) -> int:
+        """Return the firmware of the safety module."""
         if SAFETY_NODE not in stats:
             others = ",".join(map(str, stats)) or "nobody"
             raise PreflightError(
@@ -124,7 +135,8 @@ class StartUp:
                 hint="Check the arm's power, the CAN cable and its terminators.",
             )
         vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
-        return SafetyModule(self._dialogue, self._clock, vers)
+        _check_firmware("The safety module", vers, MODERN)
+        return vers
 
     def _wake(self, asleep: list[int]) -> None:
         """Wake nodes, keep silent while they boot, and see that they are there.
@@ -148,6 +160,7 @@ class StartUp:
     def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
         # Asleep, VERS is the monitor's; only now does it select the right table.
         vers = self._dialogue.require(node, _VERS, "VERS")
+        _check_firmware(f"Puck {node}", vers, OLDEST_DRIVEN)
         role = self._dialogue.require(node, _ROLE, "ROLE")
         if device_of(role) is not Device.MOTOR:
             raise PreflightError(
@@ -160,7 +173,8 @@ class StartUp:
                 f"Puck {node} reports CTS {cts}, IPNM {ipnm}; both must be positive.",
                 hint="The puck has lost its configuration; see Barrett's manual.",
             )
-        return PuckInfo(node, vers, role, cts, ipnm, was_asleep)
+        health = ask_health(lambda number: self._dialogue.ask(node, number))
+        return PuckInfo(node, vers, role, cts, ipnm, was_asleep, health)
 
     def _check_wrist(self, puck: PuckInfo) -> None:
         poles = self._get(puck.node, "POLES", puck.vers)
@@ -199,16 +213,13 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
         )
 
 
-def _check_same_numbers(pucks: tuple[PuckInfo, ...]) -> None:
-    """Raise PreflightError when one group frame would not mean the same to all."""
-    for name in ("P", "T"):
-        found = {property_number(Device.MOTOR, name, p.vers) for p in pucks}
-        if len(found) > 1:
-            versions = ",".join(str(p.vers) for p in pucks)
-            raise PreflightError(
-                f"The pucks disagree on the number of {name} (firmware {versions}).",
-                hint="Bring all pucks to the same firmware.",
-            )
+def _check_firmware(who: str, found: int, needed: int) -> None:
+    """Raise DeviceFaultError for firmware whose properties have other numbers."""
+    if found < needed:
+        raise DeviceFaultError(
+            f"{who} has firmware {found}; {needed} or later is needed.",
+            hint="Ask Barrett for newer firmware.",
+        )
 
 
 def pucks_do(nodes: Sequence[int]) -> str:

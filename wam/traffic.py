@@ -1,4 +1,4 @@
-"""The frames of one cycle: positions asked for, torques sent, the safety mode watched.
+"""The frames of one cycle: positions asked for, torques sent, devices watched.
 
 Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
 """
@@ -7,35 +7,25 @@ from dataclasses import dataclass
 from typing import Final
 
 from acquisition.clock import Clock
-from acquisition.devices import SafetyMode
-from acquisition.errors import LinkError
+from acquisition.errors import DeviceFaultError, LinkError
 from wam.arm_settings import ArmSettings
 from wam.can_link import Link
 from wam.frames import (
     MOTOR_NODES,
-    SAFETY_NODE,
-    FrameError,
     Group,
-    Payload,
     decode_position,
-    decode_reply,
     encode_get,
     encode_torques,
     group_id,
     position_reply_id,
-    property_reply_id,
 )
 from wam.pucks import MODERN, Device, property_number
-from wam.safety import decode_mode
 from wam.transmission import MOTORS
+from wam.watch import Watch
 
-_MODE = 8  # the same in every firmware
-_GET_MODE = encode_get(_MODE)
-_SAFETY_REPLY_ID = property_reply_id(SAFETY_NODE)
 _ARM_ID = group_id(Group.ARM)
 _LOWER_ID, _WRIST_ID = group_id(Group.LOWER_TORQUE), group_id(Group.WRIST_TORQUE)
 _POSITION_INDEX: Final = {position_reply_id(n): n - 1 for n in MOTOR_NODES}
-_UNANSWERED_POLLS = 4  # this many questions without an answer: mode unknown
 
 
 @dataclass(slots=True)
@@ -62,7 +52,7 @@ class CycleTraffic:
         received: positions of this cycle [counts], motors 1 to 7, None = no reply.
         arm_ns: when the last of them arrived [ns], 0 = none did.
         sent: torques that the bus took last [puck units], motors 1 to 7.
-        mode: last known mode of the safety module.
+        watch: safety module and pucks, asked in the free bus time.
         p_number: number of the property that holds a puck's position.
         counters: what was dropped so far.
     """
@@ -71,14 +61,11 @@ class CycleTraffic:
         self.received: list[int | None] = [None] * MOTORS
         self.arm_ns = 0
         self.sent = [0] * MOTORS
-        self.mode = SafetyMode.UNKNOWN
+        self.watch = Watch(link, settings)
         self.counters = LinkCounters()
         self._link = link
         self._clock = clock
         self._settings = settings
-        self._until_poll = 0
-        self._unanswered = 0
-        self._hints_seen = 0
         self.set_firmware(MODERN)
 
     def set_firmware(self, vers: int) -> None:
@@ -89,7 +76,7 @@ class CycleTraffic:
 
     def exchange(self, now_ns: int) -> None:
         """Ask for all positions at `now_ns`; waits until `give_up_ns` at most."""
-        self._until_poll -= 1
+        self.watch.begin_cycle()
         self.arm_ns = 0
         self.received = [None] * MOTORS
         try:
@@ -112,24 +99,10 @@ class CycleTraffic:
             return False
         return True
 
-    def watch_mode(self, *, is_urgent: bool = False) -> None:
-        """Ask for the safety mode if it is time, `is_urgent`, or said to change.
-
-        Only questions asked in their time count as unanswered: a burst of urgent ones
-        on a dead bus must not turn the last known mode into UNKNOWN at once.
-        """
-        is_due = self._until_poll <= 0
-        is_hinted = self._link.mode_hints != self._hints_seen
-        if not (is_due or is_hinted or is_urgent):
-            return
-        self._hints_seen = self._link.mode_hints
-        if is_due:
-            self._until_poll = self._settings.safety_poll_cycles
-            if self._unanswered >= _UNANSWERED_POLLS:
-                self.mode = SafetyMode.UNKNOWN
-            self._unanswered += 1
+    def ask(self, *, is_urgent: bool = False) -> None:
+        """Use the free bus time for the question that is due; see `Watch.ask`."""
         try:
-            self._link.send(SAFETY_NODE, _GET_MODE)
+            self.watch.ask(is_urgent=is_urgent)
         except LinkError:
             self.counters.link_errors += 1
 
@@ -153,14 +126,8 @@ class CycleTraffic:
                 if index is not None:
                     self.received[index] = decode_position(data)
                     found += 1
-                elif can_id == _SAFETY_REPLY_ID:
-                    self._note_mode(data)
-            except FrameError:
+                else:
+                    self.watch.hear(can_id, data)
+            except DeviceFaultError:
                 self.counters.malformed += 1
         return found
-
-    def _note_mode(self, data: Payload) -> None:
-        reply = decode_reply(data)
-        if reply.number == _MODE and reply.value is not None:
-            self.mode = decode_mode(reply.value)
-            self._unanswered = 0

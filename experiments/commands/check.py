@@ -22,10 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--config-only", action="store_true", help="check the settings, no device"
     )
     parser.add_argument("--explain", metavar="NAME", help="more about a message")
+    parser.add_argument(
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
+    from experiments.bus_log import logging_bus
     from experiments.console import GOOD, Console
     from experiments.preflight import connect_rig, run_preflight
     from experiments.rigs import FakeOptions
@@ -45,11 +49,9 @@ def run(args: argparse.Namespace) -> int:
     fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
-    try:
+    with logging_bus(rig, args.can_log, console):
         page = run_preflight(rig, Path(args.data), console)
         page.sensor.close()
-    finally:
-        rig.arm.close()
     console.say("Fit to run.")
     return 0
 

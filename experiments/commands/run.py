@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import signal
-from collections.abc import Generator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.company import StopFlag
     from experiments.console import Console
     from experiments.preflight import Preflight
     from experiments.rigs import Rig
@@ -41,11 +38,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE|auto",
         help="answers to the reviews, one per line: keep, redo 1..5, quit",
     )
+    parser.add_argument(
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    from experiments.company import Company, StopFlag
+    from experiments.bus_log import logging_bus
+    from experiments.company import Company, StopFlag, signals_ask
     from experiments.console import Console
     from experiments.faults import plan_fault
     from experiments.operator import RehearsedHand, choose_keys
@@ -63,19 +64,17 @@ def run(args: argparse.Namespace) -> int:
     fake = FakeOptions(args.fast, args.seed) if args.fake else None
     rig = connect_rig(settings, row, fake)
     stop = StopFlag()
-    try:
+    with logging_bus(rig, args.can_log, console):
         fault = plan_fault(args.fault, rig.rehearsal) if args.fault else None
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {row.name}        {kind}")
         page = run_preflight(rig, Path(args.data), console)
-        with closing(page.sensor), _signals_ask(stop):
+        with closing(page.sensor), signals_ask(stop):
             facts = _open_session(args, rig, page, console)
             hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
             company = Company(keys, console, stop, hand, fault)
             stage = Stage(rig, rig.connect(page.sensor), company)
             code = SessionRunner(stage, facts).run(args.trials or row.trials)
-    finally:
-        rig.arm.close()
     if company.fault is not None:
         console.say(
             f"▲ The fault {company.fault.name} was planned for "
@@ -85,18 +84,6 @@ def run(args: argparse.Namespace) -> int:
         data = f" --data {args.data}" if str(args.data) != "data" else ""
         console.say(f"Complete. Next: traction report {facts.folder.id}{data}")
     return code
-
-
-@contextmanager
-def _signals_ask(stop: StopFlag) -> Generator[None]:
-    """Let Ctrl-C, SIGTERM and a lost terminal ask for a stop while a session runs."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-    before = [signal.signal(number, stop.ask) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            signal.signal(number, handler)
 
 
 def _check_arguments(args: argparse.Namespace) -> None:

@@ -34,6 +34,7 @@ class Arm:
         self.q, self.qd = np.zeros(7), np.zeros(7)
         self.missing = 0
         self.clip = 100.0
+        self.warnings, self.faults = (), ()
         self.sent = []
         self.idled = 0
 
@@ -57,6 +58,12 @@ class Arm:
 
     def safety_mode(self):
         return self.mode
+
+    def safety_warnings(self):
+        return self.warnings
+
+    def safety_faults(self):
+        return self.faults
 
     def idle(self):
         self.idled += 1
@@ -497,6 +504,51 @@ def test_idle_on_request_is_confirmed_or_unknown(bench, is_confirmed, state):
     bench.arm.is_confirmed = is_confirmed
     bench.enter(ArmState.IDLE)
     assert bench.state is state
+
+
+@pytest.mark.parametrize("mode", [SafetyMode.IDLE, SafetyMode.E_STOP])
+def test_an_unknown_arm_is_idle_when_the_module_confirms_later(bench, mode):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.IDLE)
+    bench.arm.mode = SafetyMode.UNKNOWN
+    bench.run(10)
+    assert bench.state is ArmState.UNKNOWN
+    bench.arm.mode = mode
+    record = bench.run()
+    assert bench.state is ArmState.IDLE
+    assert bench.arm.sent[-1].tolist() == [0.0] * 7
+    assert not record["torque_command"].any()
+
+
+def test_a_velocity_warning_is_flagged_and_changes_nothing(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    assert not has(bench.run(), Flag.SAFETY_WARNING)
+    bench.arm.warnings = ("velocity",)
+    record = bench.run(10)
+    assert has(record, Flag.SAFETY_WARNING)
+    assert not has(record, Flag.SAFETY_FAULT)
+    assert (bench.state, bench.reason) == (ArmState.FLOAT, "")
+    assert bench.cycle.is_recording
+
+
+def test_a_fault_of_the_safety_module_is_flagged_and_named_as_the_cause(bench):
+    bench.enter(ArmState.FLOAT)
+    assert not has(bench.run(), Flag.SAFETY_FAULT)
+    bench.arm.mode, bench.arm.faults = SafetyMode.IDLE, ("velocity",)
+    assert has(bench.run(), Flag.SAFETY_FAULT)
+    assert bench.reason == "pendant-idle"
+    assert bench.cycle.status.verdict.causes == ("velocity",)
+
+
+def test_what_the_guard_stops_itself_has_no_cause_in_the_module(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.faults = ("heartbeat",)
+    bench.arm.missing = 25
+    bench.run()
+    assert bench.reason == "can-silence"
+    assert bench.cycle.status.verdict.causes == ()
 
 
 def test_an_unknown_arm_can_be_held_again(bench):

@@ -50,13 +50,16 @@ def twice(tmp_path_factory, config):
 
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory, config):
-    """Return a session with an elbow pushed in one review, a stop in the next."""
+    """Return a session with the wrist hit in one review, a stop in the next.
+
+    The safety module does not count the wrist, so the guard is the first to act.
+    """
     pushed = []
 
     def press(asked, rig):
         if asked.prompt is Prompt.REVIEW and asked.trial == 1 and not pushed:
             pushed.append(True)
-            rig.plant.qd[3] = 6.0
+            rig.plant.qd[4] = 20.0
             return ""
         if asked.prompt is Prompt.REVIEW and asked.trial == 2:
             rig.network.pendant("estop")
@@ -105,7 +108,7 @@ def test_signals_are_given_back_after_a_session(once, twice):
 
 
 def test_a_fault_during_the_review_does_not_cost_the_trial(disturbed):
-    assert "Joint 4 " in disturbed.done.err
+    assert "Joint 5 " in disturbed.done.err
     assert "ARM: damping, then holding." in disturbed.done.err
     assert (disturbed.folder / "trials" / "T01.mcap").exists()
     assert sidecar(disturbed.folder / "trials" / "T01.mcap")["verdict"] == "keep"

@@ -110,7 +110,6 @@ def test_a_missing_safety_module_is_an_error_of_its_own():
     ("options", "words"),
     [
         (NetworkOptions(poles=(12, 12, 12, 12, 8, 8, 8)), "8 poles: gimbals"),
-        (NetworkOptions(vers=(200,) * 6 + (60,)), "disagree on the number of P"),
         (NetworkOptions(are_asleep=True, boot_ns=2_000_000_000), "not wake up"),
     ],
 )

@@ -165,3 +165,23 @@ def test_a_link_has_the_descriptor_of_its_bus():
     assert isinstance(link, Readable)
     assert Rig().link.fileno() == -1
     link.close()
+
+
+def test_a_tap_hears_all_plain_frames_sent_and_received():
+    link = CanLink(
+        ScriptedBus(
+            [
+                message(0x426),
+                message(0x540),
+                message(0x404),
+                message(1, is_error_frame=True),
+            ]
+        )
+    )
+    heard = []
+    link.tap = lambda can_id, data, stamp: heard.append((can_id, data, stamp))
+    link.send(1, b"\x05")
+    assert [frame.can_id for frame in link.receive()] == [0x426]
+    assert [can_id for can_id, _, _ in heard] == [1, 0x426, 0x540, 0x404]
+    assert heard[0] == (1, b"\x05", 0.0)
+    link.close()

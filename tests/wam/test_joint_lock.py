@@ -65,18 +65,64 @@ def test_no_motion_makes_more_torque_than_the_limit(q7, qd7, after_ns):
 def test_a_second_engage_keeps_the_first_reference(lock):
     lock.engage(1.0, FULL)
     assert lock.torque(0.41, 0.0, FULL) == pytest.approx(-0.2, abs=1e-12)
-    assert lock.offset(0.41) == pytest.approx(0.01, abs=1e-12)
+    assert lock.offset(0.41, FULL) == pytest.approx(0.01, abs=1e-12)
 
 
 def test_a_released_lock_lets_go(lock):
-    lock.release()
+    lock.release(FULL)
     assert not lock.is_engaged
-    assert lock.torque(2.0, 5.0, FULL) == 0.0
-    assert lock.offset(2.0) == 0.0
+    assert lock.torque(2.0, 5.0, FULL + S // 2) == 0.0
+    assert lock.offset(2.0, FULL) == 0.0
+
+
+@pytest.mark.parametrize(("after", "share"), [(0.0, 1.0), (0.125, 0.75), (0.4, 0.2)])
+def test_a_released_lock_fades_within_half_a_second(lock, after, share):
+    before = lock.torque(0.41, 0.5, FULL)
+    lock.release(FULL)
+    tau = lock.torque(0.41, 0.5, FULL + int(after * S))
+    assert tau == pytest.approx(before * share, abs=1e-9)
+
+
+def test_a_lock_released_while_it_grows_fades_from_there(lock):
+    lock.release(START + S // 10)
+    # A fifth of the stiffness was there, and it takes a tenth of a second to go.
+    at_release = lock.torque(0.41, 0.0, START + S // 10)
+    assert at_release == pytest.approx(-0.04, abs=1e-9)
+    assert lock.torque(0.41, 0.0, START + 2 * S // 10) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_second_release_does_not_begin_again(lock):
+    lock.release(FULL)
+    lock.release(FULL + S // 4)
+    assert lock.torque(0.41, 0.0, FULL + S // 2) == 0.0
+
+
+@pytest.mark.parametrize("goal", [1.0, -0.2])
+def test_a_moved_reference_goes_at_most_300_mrad_per_second(lock, goal):
+    lock.move(goal, FULL)
+    way = 0.3 if goal > 0.4 else -0.3
+    for after in (0.0, 0.5, 1.0):
+        reference = lock.reference(FULL + int(after * S))
+        assert reference == pytest.approx(0.4 + way * after, abs=1e-9)
+    assert lock.reference(FULL + 3 * S) == pytest.approx(goal, abs=1e-9)
+
+
+def test_a_reference_moved_on_the_way_does_not_jump(lock):
+    lock.move(1.0, FULL)
+    lock.move(0.0, FULL + S)
+    assert lock.reference(FULL + S) == pytest.approx(0.7, abs=1e-9)
+    assert lock.reference(FULL + 2 * S) == pytest.approx(0.4, abs=1e-9)
+    assert lock.offset(0.75, FULL + S) == pytest.approx(0.05, abs=1e-9)
+
+
+def test_a_lock_that_does_not_hold_cannot_be_moved(lock):
+    lock.release(FULL)
+    lock.move(1.0, FULL)
+    assert lock.reference(FULL + S) == 0.4
 
 
 def test_a_lock_engaged_again_grows_again_at_its_new_place(lock):
-    lock.release()
+    lock.release(FULL)
     lock.engage(1.0, FULL)
     assert lock.is_engaged
     assert lock.torque(1.1, 0.0, FULL) == 0.0

@@ -1,0 +1,123 @@
+"""traction fake: serve the simulated arm to other programs."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.pendant import Press, Pressable, TimedPress
+
+EXAMPLES = """\
+  traction fake --can traction-fake:/tmp/wam.sock --idle-first
+  traction fake --can socketcan:vcan0 --script presses.txt"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `fake`."""
+    parser.add_argument(
+        "--can",
+        required=True,
+        metavar="INTERFACE:CHANNEL",
+        help="where: traction-fake:PATH, or any bus of python-can",
+    )
+    parser.add_argument(
+        "--idle-first",
+        action="store_true",
+        help="begin powered and idle, pucks asleep; otherwise in E-STOP",
+    )
+    parser.add_argument(
+        "--script",
+        type=Path,
+        metavar="FILE",
+        help="lines that press the pendant, as on stdin: "
+        "[SECONDS] activate|idle|estop|quit",
+    )
+    parser.add_argument(
+        "--can-log", type=Path, metavar="FILE", help="write every frame there"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Serve until told to stop and return the exit code."""
+    from acquisition.clock import SystemClock
+    from experiments.bus_log import open_bus_log
+    from experiments.company import StopFlag, signals_ask
+    from experiments.console import Console
+    from experiments.pendant import PRESSES, Lines, Pendant
+    from experiments.rigs import build_server
+    from experiments.settings import load_settings
+
+    interface, channel = _split(args.can)
+    script = _read_script(args.script)
+    settings = load_settings(args.config)
+    console = Console(color=not args.no_color)
+    clock, stop = SystemClock(), StopFlag()
+    with (
+        signals_ask(stop),
+        open_bus_log(args.can_log, clock, "fake0", console) as log,
+        closing(
+            build_server(settings, interface, channel, is_idle_first=args.idle_first)
+        ) as server,
+    ):
+        console.say(f"ready: {server.name}, safety module in {server.state}")
+        pendant = Pendant(script, Lines(_stdin()), clock.now_ns())
+        is_on = True
+        while is_on and not stop.count:
+            server.step(log.add if log else None)
+            if log is not None:
+                log.flush()
+            is_on = _press(server, pendant.due(clock.now_ns()))
+            for line in pendant.take_unknown():
+                console.problem(f"{line[:60]!r} is none of {', '.join(PRESSES)}.")
+        if server.losses:
+            console.problem(server.losses)
+    return 0
+
+
+def _press(server: Pressable, presses: list[Press]) -> bool:
+    """Press the buttons in turn; return False once one of them is quit."""
+    for press in presses:
+        if press == "quit":
+            return False
+        server.press(press)
+    return True
+
+
+def _split(text: str) -> tuple[str, str]:
+    from acquisition.errors import SettingsError
+
+    interface, colon, channel = text.partition(":")
+    if not (interface and colon and channel):
+        raise SettingsError(
+            f"--can {text!r} - expected INTERFACE:CHANNEL, "
+            "e.g. traction-fake:/tmp/wam.sock.",
+            hint="Nothing was started.",
+        )
+    return interface, channel
+
+
+def _read_script(path: Path | None) -> tuple[TimedPress, ...] | None:
+    from acquisition.errors import SettingsError
+    from experiments.pendant import parse_script
+
+    if path is None:
+        return None
+    try:
+        return parse_script(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise SettingsError(
+            f"--script {path} cannot be read: {error}.", hint="Nothing was started."
+        ) from error
+
+
+def _stdin() -> int | None:
+    """Return the descriptor of stdin, None where there is none."""
+    import sys
+
+    try:
+        return sys.stdin.fileno()
+    except (AttributeError, OSError, ValueError):
+        return None

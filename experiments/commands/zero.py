@@ -1,0 +1,74 @@
+"""traction zero: tell the motor controllers that the arm stands at home."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.console import Console
+
+EXAMPLES = """\
+  traction zero                             asks, then defines the home position
+  traction zero --fake --yes                the same steps with simulated devices"""
+
+_CONFIRMATION = "home"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `zero`."""
+    parser.add_argument("--fake", action="store_true", help="simulated devices")
+    parser.add_argument(
+        "--yes", action="store_true", help="the arm is at home: do not ask"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Define the home position after confirmation and return the exit code."""
+    from acquisition.errors import PreflightError, TractionError
+    from experiments.console import GOOD, Console
+    from experiments.preflight import connect_rig
+    from experiments.rigs import FakeOptions
+    from experiments.settings import load_settings
+
+    console = Console(color=not args.no_color)
+    settings = load_settings(args.config)
+    fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
+    rig = connect_rig(settings, settings.matrix.terrains[0], fake)
+    try:
+        try:
+            info = rig.arm.start()
+        except TractionError as error:
+            raise PreflightError(
+                error.message, hint=error.hint, arm_state="not touched"
+            ) from error
+        home = rig.model.constants.home
+        mode = info.safety_mode.name.lower().replace("_", "-")
+        console.check(GOOD, "arm", f"pucks 1-7 answer, safety {mode}")
+        angles = "  ".join(f"J{i + 1} {angle:.2f}" for i, angle in enumerate(home))
+        console.say(f"Home position, rad: {angles}")
+        if not args.yes and not _is_confirmed(console):
+            console.say("Nothing was changed. ARM: idle, braked.")
+            return 5
+        rig.arm.define_position(home)
+        console.check(GOOD, "zero", "positions defined at home")
+    finally:
+        rig.arm.close()
+    return 0
+
+
+def _is_confirmed(console: Console) -> bool:
+    """Ask for the word itself: a stray Enter must not move the arm's zero."""
+    from acquisition.errors import SettingsError
+
+    if not sys.stdin.isatty():
+        raise SettingsError(
+            "Zeroing needs a person who confirms, and there is no terminal.",
+            hint="Run it in a terminal, or add --yes. Nothing was changed.",
+        )
+    console.say(
+        "Is the arm at home, folded against its stops, and held there? "
+        f"Type {_CONFIRMATION} and Enter:"
+    )
+    return sys.stdin.readline().strip().lower() == _CONFIRMATION

@@ -1,0 +1,186 @@
+"""What a person is told when the safety module acts, and what it is told to watch."""
+
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.guard import Action, Verdict
+from acquisition.sample import Flag
+from acquisition.trial_file.reader import TrialReader
+from experiments.messages import fault_text
+from experiments.operator import Prompt
+from experiments.rigs import build_safety_limits
+from experiments.settings import load_settings
+from tests.experiments.program import journal, run_watched, traction, write_config
+from wam.frames import encode_set
+from wam.safety_limits import SafetyLimits
+
+FACTS = {"seconds": 1.5, "trial": "T01"}
+SAFETY_TABLE = """
+speed_warning = 0.5       # m/s at elbow and forearm; left out: 0.9 of the fault
+speed_fault = 1.0  """
+VL2, TL2 = 46, 48
+
+
+@pytest.mark.parametrize(
+    ("reason", "causes", "text"),
+    [
+        ("pendant-idle", (), "The pendant or the safety module put the arm to idle at"),
+        (
+            "pendant-idle",
+            ("velocity",),
+            "The safety module put the arm to idle: velocity fault. ARM: idle, braked.",
+        ),
+        (
+            "pendant-idle",
+            ("torque", "heartbeat"),
+            "The safety module put the arm to idle: torque fault, heartbeat fault. ARM",
+        ),
+        ("estop", ("other",), "Stop pressed at 1.50 s."),
+        (
+            "estop",
+            ("voltage",),
+            "The safety module stopped the arm: voltage fault. ARM",
+        ),
+        (
+            "estop",
+            ("velocity", "other"),
+            "The safety module stopped the arm: velocity fault. ARM",
+        ),
+    ],
+)
+def test_a_stop_of_the_safety_circuit_is_told_with_its_cause(reason, causes, text):
+    verdict = Verdict(Action.IDLE, reason, causes=causes)
+    assert fault_text(verdict, FACTS).startswith(text)
+
+
+def in_recording(act):
+    """Return a `press` that lets `act(rig)` happen once, in the first recording."""
+    done = []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.RECORDING and asked.since > 0.3 and not done:
+            done.append(act(rig))
+
+    return press
+
+
+def tell(number, value):
+    def act(rig):
+        now_ns = rig.plant.t_ns
+        rig.network.receive(now_ns, 0x00A, encode_set(number, value))
+
+    return act
+
+
+@pytest.mark.parametrize(
+    ("act", "text", "mode"),
+    [
+        (
+            tell(VL2, 1),
+            "The safety module put the arm to idle: velocity fault.",
+            SafetyMode.IDLE,
+        ),
+        (
+            tell(TL2, 1),
+            "The safety module put the arm to idle: torque fault.",
+            SafetyMode.IDLE,
+        ),
+        (
+            lambda rig: rig.network.set_bus_voltage(20.0),
+            "The safety module stopped the arm: voltage fault.",
+            SafetyMode.E_STOP,
+        ),
+    ],
+    ids=["velocity", "torque", "voltage"],
+)
+def test_a_fault_in_a_trial_ends_the_session_with_its_cause(
+    config, tmp_path, act, text, mode
+):
+    done = run_watched(config, tmp_path, 1, press=in_recording(act))
+    assert done.done.code == 4
+    (line,) = done.done.err.splitlines()
+    assert line.startswith(text)
+    assert done.rig.network.safety_mode is mode
+    assert journal(done.folder)[-1]["event"] == "session-ended"
+    flight = TrialReader(done.folder / "faults" / "T01a.flight.mcap").cycles().data
+    assert flight["flags"][-1] & Flag.SAFETY_FAULT
+    assert not flight["flags"][0] & Flag.SAFETY_FAULT
+
+
+def test_a_velocity_warning_is_recorded_and_the_trial_is_kept(config, tmp_path):
+    done = run_watched(config, tmp_path, 1, press=in_recording(tell(45, 1)))
+    assert done.done.code == 0
+    flags = TrialReader(done.folder / "trials" / "T01.mcap").cycles().data["flags"]
+    assert (flags & Flag.SAFETY_WARNING).any()
+    assert not (flags & Flag.SAFETY_FAULT).any()
+
+
+def test_a_trial_says_how_the_pucks_felt_when_it_began(first_trial):
+    facts = TrialReader(first_trial).metadata["provenance"]
+    assert facts["pucks:temperature_degc"] == "35 35 35 35 35 35 35"
+    assert facts["pucks:error"] == "0 0 0 0 0 0 0"
+
+
+def test_slips_of_a_usual_trial_neither_warn_nor_fault(first_trial):
+    flags = TrialReader(first_trial).cycles().data["flags"]
+    assert not (flags & (Flag.SAFETY_WARNING | Flag.SAFETY_FAULT)).any()
+
+
+def test_the_page_shows_firmware_zero_and_temperatures(tmp_path):
+    done = traction("check", "--fake", "--data", tmp_path)
+    assert "firmware 200, zeroed, 33-35 °C" in done.out
+    assert "idle, firmware 200" in done.out
+
+
+def limits_of(folder, old="", new=""):
+    path = write_config(folder, rig=(old, new) if old else None)
+    return build_safety_limits(load_settings(path).rig)
+
+
+def test_the_shipped_limits_are_the_power_up_values(tmp_path):
+    assert limits_of(tmp_path) == SafetyLimits()
+
+
+def test_a_table_without_safety_keeps_the_power_up_values(tmp_path):
+    path = write_config(tmp_path)
+    text = path.read_text()
+    path.write_text(text[: text.index("[safety]")])
+    assert build_safety_limits(load_settings(path).rig) == SafetyLimits()
+
+
+def test_a_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
+    limits = limits_of(tmp_path, SAFETY_TABLE, "\nspeed_fault = 1.5")
+    assert (limits.speed_fault, limits.speed_warning) == (1.5, pytest.approx(1.35))
+    assert limits.words()["VL1"] == 0x1599
+
+
+def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
+    line = "torque_warning_units = 4731"
+    assert limits_of(tmp_path, line, "#").torque_warning_units == 4683
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        (
+            "speed_fault = 1.0",
+            "speed_fault = 0",
+            "rig.toml: safety.speed_fault = 0 - expected a number > 0 and <= 2, e.g. 1",
+        ),
+        (
+            "torque_fault_units = 5204",
+            "torque_fault_units = 9000",
+            "rig.toml: safety.torque_fault_units = 9000 - expected a whole number > 0",
+        ),
+        (
+            "speed_warning = 0.5",
+            "speed_warning = -1",
+            "rig.toml: safety.speed_warning = -1 - expected greater than 0, e.g. 0.5.",
+        ),
+    ],
+)
+def test_limits_that_would_switch_the_module_off_are_refused(tmp_path, old, new, text):
+    path = write_config(tmp_path, rig=(old, new))
+    done = traction("check", "--config-only", "--config", path)
+    assert done.code == 2
+    assert done.err.startswith(text)

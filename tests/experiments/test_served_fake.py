@@ -1,0 +1,174 @@
+"""The served arm as another program meets it, in real time with generous limits."""
+
+import signal
+import subprocess
+import sys
+
+import can
+import pytest
+
+from fakes.can_socket import SocketBus, open_socket
+from tests.experiments.program import run_short, traction
+
+ABSENT = "23 never came"  # of 31 ids asked for, seven pucks and the module are there
+PATIENCE = 30.0  # s, for a machine that stalls; met at once on one that does not
+
+
+@pytest.fixture
+def serve(tmp_path):
+    """Return a function that starts `traction fake` on the socket `tmp_path`/bus."""
+    running = []
+
+    def start(*arguments):
+        command = [sys.executable, "-m", "experiments", "fake"]
+        command += ["--can", f"traction-fake:{tmp_path}/bus", *map(str, arguments)]
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        running.append(process)
+        return process, process.stdout.readline()
+
+    yield start
+    for process in running:
+        process.kill()
+        process.communicate()
+
+
+def ask(bus, can_id, data):
+    bus.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
+    reply = bus.recv(PATIENCE)
+    return reply.arbitration_id, bytes(reply.data).hex(" ")
+
+
+def test_another_program_finds_the_arm_and_stdin_is_its_pendant(serve, tmp_path):
+    log = tmp_path / "bus.log"
+    process, ready = serve("--idle-first", "--can-log", log)
+    assert ready == f"ready: traction-fake:{tmp_path}/bus, safety module in idle\n"
+    with SocketBus(f"{tmp_path}/bus") as bus:
+        assert ask(bus, 1, b"\x05") == (0x426, "85 00 00 00")
+        assert ask(bus, 10, b"\x08") == (0x546, "88 00 01 00")
+        process.stdin.write("fly\nestop\n")
+        process.stdin.flush()
+        assert bus.recv(PATIENCE).arbitration_id == 0x540
+        assert ask(bus, 10, b"\x08") == (0x546, "88 00 00 00")
+    out, err = process.communicate("quit\n", timeout=PATIENCE)
+    assert (process.returncode, out) == (0, "")
+    assert "'fly' is none of activate, idle, estop, quit" in err
+    assert not (tmp_path / "bus").exists()
+    words = traction("replay", "--can", log)
+    assert words.code == 0
+    assert "host asks puck 1 for STAT" in words.out
+    assert "puck 1 answers STAT = 0 (reset)" in words.out
+    assert "3 answers asked for: 3 came" in words.out
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_service_cleanly(serve, tmp_path, number):
+    process, ready = serve()
+    assert "safety module in e-stop" in ready
+    process.send_signal(number)
+    assert process.wait(PATIENCE) == 0
+    assert not (tmp_path / "bus").exists()
+
+
+def test_a_script_presses_and_quits_though_stdin_has_ended(tmp_path):
+    script = tmp_path / "script"
+    script.write_text("idle\n0.01 quit\n")
+    log = tmp_path / "bus.log"
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "experiments", "fake", "--script", script),
+            *("--can", f"traction-fake:{tmp_path}/bus", "--can-log", log),
+        ],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert " fake0 540#" in log.read_text()  # the safety module told of the change
+
+
+@pytest.mark.parametrize("where", ["can0", ":can0", "socketcan:"])
+def test_a_bus_is_named_by_interface_and_channel(where):
+    done = traction("fake", "--can", where)
+    assert done.code == 2
+    assert "INTERFACE:CHANNEL" in done.err
+
+
+def test_a_path_in_use_is_a_clear_error(tmp_path):
+    with open_socket() as other:
+        other.bind(f"{tmp_path}/bus")
+        other.listen()
+        done = traction("fake", "--can", f"traction-fake:{tmp_path}/bus")
+    assert done.code == 2
+    assert "in use" in done.err
+
+
+def test_an_interface_that_does_not_exist_is_a_link_error():
+    done = traction("fake", "--can", "nothing:can0")
+    assert done.code == 4
+    assert "nothing:can0 cannot be opened" in done.err
+
+
+def test_a_script_that_makes_no_sense_starts_nothing(tmp_path):
+    script = tmp_path / "script"
+    script.write_text("idle\njump\n")
+    where = f"traction-fake:{tmp_path}/bus"
+    done = traction("fake", "--can", where, "--script", script)
+    assert done.code == 2
+    assert "line 2" in done.err
+    assert not (tmp_path / "bus").exists()
+
+
+def test_check_logs_its_bus_and_replay_finds_every_answer(config, tmp_path):
+    log = tmp_path / "bus.log"
+    options = ("--config", config, "--data", tmp_path)
+    assert traction("check", "--fake", "--can-log", log, *options).code == 0
+    done = traction("replay", "--can", log)
+    assert done.code == 0
+    assert "host asks puck 7 for IPNM" in done.out
+    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came unasked" in done.out
+    summary = traction("replay", "--can", log, "--summary")
+    assert done.out.endswith(summary.out)
+    assert "host asks" not in summary.out
+
+
+def test_a_session_logs_its_cycles(config, tmp_path):
+    log = tmp_path / "bus.log"
+    done = run_short(config, tmp_path, "TF", 1, "--can-log", log)
+    assert done.code == 0
+    text = log.read_text()
+    assert text.count(" fake0 404#30\n") > 500
+    assert text.count(" fake0 402#AA") > 500
+    told = traction("replay", "--can", log, "--summary").out
+    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came unasked" in told
+
+
+def test_a_log_is_never_written_over_a_file(config, tmp_path):
+    log = tmp_path / "bus.log"
+    log.write_text("precious")
+    done = traction("check", "--fake", "--can-log", log, "--config", config)
+    assert done.code == 2
+    assert "not empty" in done.err
+    assert log.read_text() == "precious"
+
+
+def test_a_malformed_log_names_its_line(tmp_path):
+    log = tmp_path / "bus.log"
+    log.write_text("(1.000000) can0 404#30\n\x00\x01nonsense\n")
+    done = traction("replay", "--can", log)
+    assert done.code == 6
+    assert "Line 2 of the bus log" in done.err
+    assert "host asks the arm for P" in done.out
+
+
+def test_a_log_that_is_not_there_is_a_usage_error(tmp_path):
+    done = traction("replay", "--can", tmp_path / "none")
+    assert done.code == 2
+    assert "cannot be read" in done.err

@@ -1,0 +1,178 @@
+from collections import deque
+
+import can
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import LinkError
+from fakes.can_port import CanPort
+from fakes.network_options import NetworkOptions
+from fakes.pucks import PuckNetwork
+from fakes.serve import PuckServer, Supported, build_home_server
+from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
+from tests.fakes.stepped import Motors, SteppedClock
+
+MS = 1_000_000
+
+
+class Hosts:
+    """A port whose frames are put in by hand."""
+
+    name = "hosts"
+
+    def __init__(self):
+        self.coming, self.gone = deque(), []
+        self.ignored = self.lost = 0
+
+    def fileno(self):
+        return -1
+
+    def is_readable(self):
+        return bool(self.coming)
+
+    def receive(self):
+        frames = list(self.coming)
+        self.coming.clear()
+        return frames
+
+    def send(self, can_id, data):
+        self.gone.append((can_id, data))
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def hosts():
+    return Hosts()
+
+
+@pytest.fixture
+def clock():
+    return SteppedClock()
+
+
+def serve(hosts, clock, **options):
+    motors = Motors()
+    network = PuckNetwork(motors, NetworkOptions(**options), clock.t_ns)
+    return PuckServer(network, motors, hosts, clock), motors
+
+
+def test_an_answer_leaves_within_a_millisecond(hosts, clock):
+    server, _ = serve(hosts, clock)
+    hosts.coming.append((1, b"\x05"))
+    begin_ns = clock.t_ns
+    while not hosts.gone:
+        server.step()
+    assert clock.t_ns - begin_ns < MS
+    assert hosts.gone == [(0x426, b"\x85\x00\x02\x00")]
+
+
+def test_every_frame_of_the_bus_is_tapped(hosts, clock):
+    server, _ = serve(hosts, clock)
+    hosts.coming.append((1, b"\x05"))
+    heard = []
+    for _ in range(3):
+        server.step(lambda can_id, _: heard.append(can_id))
+    assert heard == [1, 0x426]
+
+
+def test_a_host_that_falls_silent_loses_an_active_arm(hosts, clock):
+    server, _ = serve(hosts, clock)
+    server.press("activate")
+    for _ in range(60):  # 2 ms each, the heartbeat's limit is 100 ms
+        server.step()
+    assert server.network.safety_mode is SafetyMode.IDLE
+
+
+def test_a_stall_of_the_server_is_no_lost_heartbeat(hosts, clock):
+    server, _ = serve(hosts, clock)
+    server.press("activate")
+    clock.sleep_until(clock.t_ns + 5_000 * MS)
+    server.step()
+    assert server.state == "active"
+
+
+def test_the_arm_keeps_up_with_time_though_nobody_asks(hosts, clock):
+    server, motors = serve(hosts, clock)
+    for _ in range(50):
+        server.step()
+    assert clock.t_ns - motors.t_ns <= 2 * MS
+
+
+def test_what_was_not_carried_is_told(hosts, clock):
+    server, _ = serve(hosts, clock)
+    assert server.losses == ""
+    hosts.lost = 3
+    assert "3 frames were lost" in server.losses
+
+
+def test_an_arm_under_no_torque_is_carried():
+    motors = Motors()
+    arm = Supported(motors)
+    arm.set_braking(is_braked=False, is_powered=True)
+    arm.set_torques([0] * 7)
+    assert motors.is_braked
+    arm.set_torques([0, 0, 0, 1, 0, 0, 0])
+    assert not motors.is_braked
+    assert motors.units[3] == 1
+
+
+def test_an_arm_without_power_is_carried():
+    motors = Motors()
+    arm = Supported(motors)
+    arm.set_braking(is_braked=False, is_powered=False)
+    arm.set_torques([5] * 7)
+    assert motors.is_braked
+    assert motors.is_powered
+
+
+@pytest.mark.parametrize(
+    ("is_idle_first", "state"), [(True, "idle"), (False, "e-stop")]
+)
+def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
+    server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=is_idle_first)
+    assert server.state == state
+    hosts.coming += [(1, b"\x05"), (10, b"\x2a")]
+    for _ in range(3):
+        server.step()
+    asleep = [(0x426, b"\x85\0\0\0")] if is_idle_first else []
+    not_zeroed = [(0x546, b"\xaa\0\0\0")]
+    assert sorted(hosts.gone) == asleep + not_zeroed
+
+
+def test_the_served_arm_stands_at_home(hosts, clock):
+    server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=True)
+    hosts.coming += [(node, b"\x85\0\x02\0\0\0") for node in range(1, 8)]
+    for _ in range(400):  # 0.8 s, longer than a puck takes to boot
+        server.step()
+    hosts.coming.append((4, b"\x42"))  # MECH
+    server.step()
+    server.step()
+    counts = int(
+        np.floor((CONSTANTS.j2mp @ CONSTANTS.home)[3] * CONSTANTS.cts[3] / 2 / np.pi)
+    )
+    reply = b"\xc2\0" + (counts % CONSTANTS.cts[3]).to_bytes(4, "little")
+    assert hosts.gone == [(0x486, reply)]
+
+
+def test_a_port_on_another_bus_ignores_frames_of_other_kinds():
+    port = CanPort("virtual", "other-kinds", 1_000_000)
+    with can.Bus(interface="virtual", channel="other-kinds") as host:
+        host.send(can.Message(arbitration_id=0x404, is_extended_id=True, data=b"\x30"))
+        host.send(can.Message(arbitration_id=0x404, is_extended_id=False, data=b"\x30"))
+        assert port.is_readable()
+        assert port.receive() == [(0x404, b"\x30")]
+    assert port.ignored == 1
+    port.close()
+    port.close()
+
+
+def test_a_port_whose_bus_broke_says_so():
+    port = CanPort("virtual", "broken", 1_000_000)
+    port.close()
+    with pytest.raises(LinkError, match="virtual:broken broke"):
+        port.receive()
+    port.send(1, b"")
+    assert port.lost == 1

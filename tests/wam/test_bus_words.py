@@ -1,0 +1,152 @@
+import pytest
+
+from wam.bus_words import BusReader
+from wam.can_log import LoggedFrame
+
+US = 1000
+MS = 1_000_000
+
+
+class Log:
+    """Reads frames that come at given times."""
+
+    def __init__(self):
+        self.reader = BusReader()
+        self.said = []
+
+    def __call__(self, at_ns, frame, **kind):
+        can_id, _, data = frame.partition(" ")
+        logged = LoggedFrame(
+            at_ns, 1, "can0", int(can_id, 16), bytes.fromhex(data), **kind
+        )
+        spoken = [said.text for said in self.reader.read(logged)]
+        self.said += spoken
+        return spoken[-1]
+
+
+@pytest.fixture
+def log():
+    return Log()
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        ("001 05", "host asks puck 1 for STAT"),
+        ("404 30", "host asks the arm for P"),
+        ("007 5A", "host asks puck 7 for POLES"),
+        ("00A 2B", "host asks safety module for PEN"),
+        ("008 36", "host asks F/T sensor for FT"),
+        ("001 B0 00 1F 70 FF FF", "host sets P of puck 1 to -36833"),
+        ("00A 88 00 01 00 00 00", "host sets MODE of safety module to 1 (idle)"),
+        ("404 88 00 00 00 00 00", "host sets MODE of the arm to 0 (idle)"),
+        ("00A AA 00 01 00 00 00", "host sets ZERO of safety module to 1"),
+        (
+            "401 AA FE FF C9 20 8B 3D 12",
+            "host sets torques of pucks 1-4: -65 -878 556 -750",
+        ),
+        ("402 AA 02 9C 02 1F F1 40 00", "host sets torques of pucks 5-7: 167 33 -59"),
+        ("540 88 00 02 00", "safety module tells every puck: 88 00 02 00"),
+        ("546 AB 00 49 42 79 00", "safety module answers PEN = 00794249, UNASKED"),
+        ("443 3F 70 1F", "puck 2 is at -36833, UNASKED"),
+        (
+            "483 3F 70 88 02 80 00",
+            "puck 4 is at -36728, joint encoder 163840, UNASKED",
+        ),
+        ("50A 00 01 80 FD 31 F6", "F/T sensor feels the force (1, -2.5, -9.809) N"),
+        (
+            "50B 9A 01 00 FC 3D 00 84",
+            "F/T sensor feels the torque (0.1001, -0.25, 0.01489) N m, status 10000100",
+        ),
+        ("426 05", "puck 1: A property reply has 4 or 6 bytes: 05."),
+        ("7E1 01", "node 31 sends 7e1 01"),
+    ],
+)
+def test_a_frame_is_put_into_words(log, frame, words):
+    assert log(0, frame).removesuffix(", UNASKED") == words.removesuffix(", UNASKED")
+
+
+def test_an_answer_says_how_long_it_took(log):
+    log(0, "001 44")
+    assert log(187 * US, "426 C4 00 00 10 00 00") == (
+        "puck 1 answers CTS = 4096, 187 us after the question"
+    )
+    tally = log.reader.tally
+    assert (tally.questions, tally.answers, tally.late, tally.slowest_ns) == (
+        *(1, 1, 0),
+        187 * US,
+    )
+
+
+def test_an_answer_after_a_millisecond_is_late(log):
+    log(0, "001 05")
+    assert "LATE: 1001 us" in log(1001 * US, "426 85 00 02 00")
+    assert log.reader.tally.late == 1
+
+
+def test_an_answer_that_nobody_asked_for_is_told(log):
+    assert log(0, "426 85 00 02 00").endswith(", UNASKED")
+    log(MS, "001 05")
+    log(MS + 100 * US, "426 85 00 02 00")
+    assert log(MS + 110 * US, "426 85 00 02 00").endswith(", UNASKED")
+    assert log.reader.tally.unasked == 2
+
+
+def test_a_puck_that_misses_one_round_is_named(log):
+    for cycle in range(2):
+        log(cycle * 2 * MS, "404 30")
+        for node in (1, 2, 3, 4, 6, 7) if cycle == 0 else range(1, 8):
+            log(cycle * 2 * MS + 300 * US, f"{0x403 + 0x20 * node:x} 00 00 00")
+    assert log.said.count("UNANSWERED puck 5: position") == 1
+    assert log.reader.tally.silent == {"puck 5: position": 1}
+    assert log.reader.tally.late == 0
+    assert log.reader.finish() == []
+
+
+def test_a_question_is_given_up_after_a_second(log):
+    log(0, "00F 05")
+    log(999 * MS, "001 05")
+    assert "UNANSWERED node 15: STAT" not in log.said
+    log(1000 * MS, "001 44")
+    assert "UNANSWERED node 15: STAT" in log.said
+
+
+def test_questions_open_at_the_end_are_told_with_their_time(log):
+    log(5 * MS, "001 05")
+    ((utc_ns, text),) = [(s.utc_ns, s.text) for s in log.reader.finish()]
+    assert (utc_ns, text) == (5 * MS, "UNANSWERED puck 1: STAT")
+
+
+def test_two_questions_at_once_have_an_answer_each(log):
+    log(0, "001 05")
+    log(10 * US, "001 05")
+    assert "100 us" in log(100 * US, "426 85 00 02 00")
+    assert "190 us" in log(200 * US, "426 85 00 02 00")
+    assert log.reader.tally.silent == {}
+
+
+def test_the_names_follow_the_firmware_that_a_puck_tells(log):
+    assert log(0, "001 4D") == "host asks puck 1 for HOLD"
+    log(0, "001 00")
+    log(100 * US, "426 80 00 64 00")  # VERS 100
+    assert log(5 * MS, "001 4D") == "host asks puck 1 for EN"
+
+
+def test_a_sleeping_puck_has_the_names_of_its_monitor(log):
+    log(0, "426 85 00 00 00")
+    log(0, "426 80 00 C8 00")  # the monitor's revision, not the firmware's
+    assert log(MS, "001 09") == "host asks puck 1 for SAVE"
+    log(2 * MS, "001 85 00 02 00 00 00")
+    assert log(3 * MS, "001 09") == "host asks puck 1 for TEMP"
+
+
+def test_the_sensor_answers_a_question_with_two_frames(log):
+    log(0, "008 36")
+    assert "100 us" in log(100 * US, "50A 00 01 80 FD 31 F6")
+    assert "200 us" in log(200 * US, "50B 9A 01 00 FC 3D 00")
+    assert log.reader.tally.questions == 2
+
+
+def test_frames_of_other_kinds_are_counted(log):
+    assert "no WAM uses" in log(0, "1FFFFFFF", is_of_wam=False)
+    assert log.reader.tally.foreign == 1

@@ -1,0 +1,192 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tests.fakes.stepped import SteppedClock
+from wam.can_log import CanLog, CanLogError, format_frame, parse_frame, parse_log
+
+KNOWN = "(1699999999.123456) can0 404#30"
+KNOWN_NS = 1_699_999_999_123_456_000
+
+
+def test_a_frame_is_written_as_candump_writes_it():
+    assert format_frame(KNOWN_NS, "can0", 0x404, b"\x30") == KNOWN
+    assert format_frame(1_002_003, "can0", 1, b"\xaa\x0b") == (
+        "(0.001002) can0 001#AA0B"
+    )
+
+
+@given(
+    st.integers(0, 9_999_999_999_999_999),
+    st.integers(0, 0x7FF),
+    st.binary(max_size=8),
+)
+def test_a_frame_survives_the_text_to_the_microsecond(micros, can_id, data):
+    frame = parse_frame(format_frame(micros * 1000, "can0", can_id, data), 7)
+    assert (frame.utc_ns, frame.can_id, frame.data) == (micros * 1000, can_id, data)
+    assert (frame.channel, frame.line, frame.is_of_wam) == ("can0", 7, True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(1.000000) can0 00000404#30",
+        "(1.000000) can0 404#R",
+        "(1.000000) can0 404#R1",
+    ],
+)
+def test_frames_of_other_kinds_are_told_apart(text):
+    assert not parse_frame(text, 1).is_of_wam
+
+
+def test_the_direction_that_candump_adds_is_no_error():
+    assert parse_frame(KNOWN + " R", 1).data == b"\x30"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "nonsense",
+        "(1699999999.12345) can0 404#30",
+        "(1699999999.123456) can0 804#30",
+        "(1699999999.123456) can0 404#3",
+        "(1699999999.123456) can0 404#001122334455667788",
+        "(1699999999.123456) can0 404##130",
+        "(1699999999.123456) can0 404#30 trailing",
+        "(١٦٩.123456) can0 404#30",
+        "(-1.123456) can0 404#30",
+        KNOWN + KNOWN,
+    ],
+)
+def test_a_malformed_line_is_named(text):
+    with pytest.raises(CanLogError, match=r"Line 2 ") as caught:
+        list(parse_log([KNOWN, text]))
+    assert "candump" in caught.value.hint
+
+
+@given(st.text(max_size=100))
+def test_no_text_does_more_than_be_refused(text):
+    try:
+        frame = parse_frame(text, 1)
+    except CanLogError:
+        return
+    assert len(frame.data) <= 8
+
+
+def test_the_frames_above_a_malformed_line_are_read():
+    frames = parse_log([KNOWN, "cut (16"])
+    assert next(frames).can_id == 0x404
+    with pytest.raises(CanLogError):
+        next(frames)
+
+
+def test_empty_lines_are_skipped_and_counted():
+    (frame,) = parse_log(["\n", KNOWN + "\r\n"])
+    assert frame.line == 2
+
+
+def test_frames_are_read_in_the_order_of_their_times():
+    lines = [format_frame(t * 1000, "can0", t, b"") for t in (3, 1, 2, 2, 0)]
+    assert [frame.can_id for frame in parse_log(lines)] == [0, 1, 2, 2, 3]
+
+
+def test_a_long_log_is_read_as_it_comes():
+    def lines():
+        for t in range(300):
+            yield format_frame(t * 1000, "can0", t, b"")
+        pytest.fail("the first frame needed the whole log")
+
+    assert next(parse_log(lines())).can_id == 0
+
+
+class Sink:
+    def __init__(self, error=None):
+        self.text, self.error = "", error
+
+    def write(self, text):
+        if self.error:
+            raise self.error
+        self.text += text
+
+
+def test_a_log_is_written_after_the_last_torque_frame_of_a_cycle():
+    sink = Sink()
+    log = CanLog(sink.write, SteppedClock(), "can0")
+    log.add(0x404, b"\x30")
+    log.add(0x401, bytes(8))
+    assert sink.text == ""
+    log.add(0x402, bytes(8))
+    assert [frame.can_id for frame in parse_log(sink.text.splitlines())] == [
+        0x404,
+        0x401,
+        0x402,
+    ]
+
+
+def test_frames_without_torque_are_written_on_request():
+    sink = Sink()
+    log = CanLog(sink.write, SteppedClock(), "can0")
+    log.add(1, b"\x05")
+    log.flush()
+    log.flush()
+    assert sink.text == "(1.000000) can0 001#05\n"
+
+
+def test_the_memory_of_a_log_is_bounded():
+    sink = Sink()
+    log = CanLog(sink.write, SteppedClock(), "can0")
+    for _ in range(5000):
+        log.add(1, b"\x05")
+    assert len(sink.text.splitlines()) == 4096
+
+
+@pytest.mark.parametrize(
+    ("stamp", "expected"),
+    [
+        (0.0, 1.0),  # none: now
+        (0.999, 0.999),
+        (5000.0, 1.0),  # a clock of the adapter's own
+    ],
+)
+def test_a_stamp_counts_where_it_is_plausible(stamp, expected):
+    sink = Sink()
+    log = CanLog(sink.write, SteppedClock(), "can0")
+    log.add(1, b"", stamp)
+    log.flush()
+    (frame,) = parse_log(sink.text.splitlines())
+    # A microsecond of the text.
+    assert frame.utc_ns / 1e9 == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_monotonic_stamp_becomes_utc():
+    class Apart(SteppedClock):
+        def utc_ns(self):
+            return self.t_ns + KNOWN_NS
+
+    sink = Sink()
+    log = CanLog(sink.write, Apart(), "can0")
+    log.add(1, b"", 0.5)
+    log.flush()
+    (frame,) = parse_log(sink.text.splitlines())
+    assert frame.utc_ns - KNOWN_NS == 500_000_000
+
+
+def test_a_disk_that_fails_ends_the_log_and_nothing_else():
+    sink = Sink(OSError(28, "No space left on device"))
+    log = CanLog(sink.write, SteppedClock(), "can0")
+    log.add(1, b"")
+    log.flush()
+    assert log.failure == "No space left on device"
+    sink.error = None
+    log.add(1, b"")
+    log.flush()
+    assert sink.text == ""
+
+
+def test_a_channel_can_not_break_the_format():
+    sink = Sink()
+    log = CanLog(sink.write, SteppedClock(), "my bus\n")
+    log.add(1, b"")
+    log.flush()
+    (frame,) = parse_log(sink.text.splitlines())
+    assert frame.channel == "my_bus_"

@@ -1,0 +1,86 @@
+from itertools import pairwise
+
+import pytest
+
+from acquisition.errors import DeviceFaultError
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+from wam.arm_settings import ArmSettings
+from wam.frames import encode_set
+from wam.safety_limits import SafetyLimits
+
+RAISED = SafetyLimits(
+    speed_warning=1.35,
+    speed_fault=1.5,
+    torque_warning_units=7290,
+    torque_fault_units=8100,
+)
+
+
+def start(rig, limits):
+    WamArm(rig.link, rig.clock, ArmSettings(safety_limits=limits)).start()
+
+
+def told(rig):
+    """Return (time, data) of everything the safety module was told."""
+    return [(t, d) for t, i, d in rig.sent if i == 0x00A and len(d) == 6]
+
+
+def test_the_defaults_are_the_power_up_values():
+    assert SafetyLimits().words() == {
+        **{"VL1": 2048, "VL2": 4096},
+        **{"TL1": 4731, "TL2": 5204},
+    }
+
+
+def test_limits_are_written_with_the_known_bytes():
+    rig = Rig()
+    start(rig, RAISED)
+    assert [data.hex(" ") for _, data in told(rig)][8:] == [
+        "ad 00 99 15 00 00",
+        "ae 00 00 18 00 00",
+        "af 00 7a 1c 00 00",
+        "b0 00 a4 1f 00 00",
+    ]
+
+
+def test_before_that_each_is_reset_as_after_power_up():
+    rig = Rig()
+    start(rig, RAISED)
+    resets = [data.hex(" ") for _, data in told(rig)][:8]
+    assert resets == [
+        f"{what} 00 {number} 00 00 00"
+        for number in ("2d", "2e", "2f", "30")
+        for what in ("a0", "9f")
+    ]
+
+
+def test_configuration_frames_are_10_ms_apart():
+    rig = Rig()
+    start(rig, RAISED)
+    times = [t for t, _ in told(rig)]
+    assert len(times) == 12
+    assert min(b - a for a, b in pairwise(times)) >= 10_000_000
+
+
+def test_limits_another_program_left_behind_are_gone():
+    rig = Rig()
+    rig.link.send(0x00A, encode_set(46, 8192))
+    rig.rest(1_000_000)
+    start(rig, SafetyLimits())
+    rig.rest(1_000_000)
+    rig.link.receive()
+    rig.link.send(0x00A, b"\x2e")
+    rig.rest(1_000_000)
+    assert [f.data.hex(" ") for f in rig.link.receive()] == ["ae 00 00 10"]
+
+
+def test_a_module_that_keeps_its_limit_is_refused_with_both_values():
+    rig = Rig()
+    receive = rig.network.receive
+    set_vl2 = encode_set(46, 6144)
+    rig.network.receive = lambda t, i, d: (
+        None if (i, bytes(d)) == (0x00A, set_vl2) else receive(t, i, d)
+    )
+    with pytest.raises(DeviceFaultError, match=r"VL2 = 4096, expected 6144"):
+        start(rig, RAISED)

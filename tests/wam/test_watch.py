@@ -1,0 +1,175 @@
+"""What the arm's driver asks in the free bus time, and what it makes of the answers."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from fakes.network_options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+from wam.frames import encode_set
+from wam.health import PuckHealth, health_facts, temperature_range
+
+ZERO = np.zeros(7)
+CYCLE_NS = 2_000_000
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+GET_MODE, GET_PEN = (0x00A, b"\x08"), (0x00A, b"\x2b")
+SET_IDLE = (0x00A, bytes.fromhex("88 00 01 00 00 00"))
+POSITIONS_AND_TORQUES = {0x404, 0x401, 0x402}
+
+
+class Bench:
+    def __init__(self):
+        # Long enough that the cycles of a test are no lost heartbeat.
+        self.rig = Rig(NetworkOptions(heartbeat_ns=10_000_000_000), HOME_COUNTS)
+        self.arm = WamArm(self.rig.link, self.rig.clock)
+        self.arm.start()
+        self.rig.sent.clear()
+
+    def run(self, cycles, *, is_sending=True):
+        """Run; return the questions of each cycle."""
+        asked = []
+        for _ in range(cycles):
+            self.rig.sent.clear()
+            reading = self.arm.read(self.rig.clock.t_ns)
+            if is_sending:
+                self.arm.send(ZERO, ZERO)
+            self.rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+            asked.append(
+                [(i, d) for _, i, d in self.rig.sent if i not in POSITIONS_AND_TORQUES]
+            )
+        return asked
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+@pytest.mark.parametrize("is_sending", [True, False])
+def test_a_cycle_has_one_question_at_most(bench, is_sending):
+    asked = bench.run(1000, is_sending=is_sending)
+    assert max(map(len, asked)) == 1
+
+
+def test_mode_and_pendant_alternate_and_pucks_come_every_50_cycles(bench):
+    asked = [q for cycle in bench.run(1000) for q in cycle]
+    safety = [q for q in asked if q[0] == 0x00A]
+    assert safety == [GET_MODE, GET_PEN] * 40
+    assert len(asked) - len(safety) == 20
+
+
+def test_every_puck_is_asked_for_its_health_in_turn(bench):
+    asked = [q for cycle in bench.run(28 * 50) for q in cycle if q[0] != 0x00A]
+    expected = {(n, bytes((p,))) for n in range(1, 8) for p in (9, 20, 21, 4)}
+    assert Counter(asked) == Counter(expected)
+
+
+def test_the_newest_health_is_kept(bench):
+    assert bench.arm.health() == (PuckHealth(35, 33, 48, 0),) * 7
+    bench.rig.network.set_bus_voltage(41.0)
+    bench.run(28 * 50 + 1)
+    assert bench.arm.health() == (PuckHealth(35, 33, 41, 0),) * 7
+
+
+def test_warnings_and_faults_of_the_pendant_are_heard(bench):
+    bench.rig.network.pendant("activate")
+    bench.run(30)
+    assert (bench.arm.safety_warnings(), bench.arm.safety_faults()) == ((), ())
+    bench.rig.network.set_bus_voltage(33.0)
+    bench.run(30)
+    assert (bench.arm.safety_warnings(), bench.arm.safety_faults()) == (
+        ("voltage",),
+        (),
+    )
+
+
+def test_a_change_of_mode_is_explained_in_the_cycle_after_it_is_known(bench):
+    bench.rig.network.pendant("activate")
+    bench.run(3)
+    bench.rig.network.receive(bench.rig.clock.t_ns, 0x00A, encode_set(48, 0))  # TL2
+    bench.rig.network.receive(
+        bench.rig.clock.t_ns, 0x401, bytes.fromhex("aa 00 07 ff f0 00 bf fe")
+    )
+    bench.run(4)
+    assert bench.arm.safety_mode() is SafetyMode.IDLE
+    assert bench.arm.safety_faults() == ("torque",)
+
+
+def test_idle_knows_the_cause_at_once(bench):
+    bench.rig.network.pendant("activate")
+    bench.run(3)
+    bench.rig.network.pendant("estop")
+    assert bench.arm.idle()
+    assert bench.arm.safety_faults() == ("other",)
+
+
+def test_a_word_that_makes_no_sense_is_counted_and_ignored(bench, monkeypatch):
+    receive = bench.rig.link.receive
+
+    def garble():
+        return [
+            frame._replace(data=b"\xab\0\0\0\0\0") if frame.data[0] == 0xAB else frame
+            for frame in receive()
+        ]
+
+    monkeypatch.setattr(bench.rig.link, "receive", garble)
+    bench.run(100)
+    assert bench.arm.counters.malformed == 4
+    assert bench.arm.safety_faults() == ()
+    assert bench.arm.idle()
+
+
+def test_an_arm_that_is_only_read_is_watched_too(bench):
+    bench.run(5)
+    bench.rig.network.pendant("activate")
+    bench.run(60, is_sending=False)
+    assert bench.arm.safety_mode() is SafetyMode.ACTIVE
+
+
+def test_an_idle_that_was_not_confirmed_is_told_again_until_it_is(bench):
+    bench.rig.network.pendant("activate")
+    bench.run(3)
+    deaf = bench.rig.network.receive
+    bench.rig.network.receive = lambda t, i, d: None if i == 0x00A else deaf(t, i, d)
+    assert not bench.arm.idle()
+    assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
+    bench.run(200, is_sending=False)
+    assert bench.rig.network.safety_mode is SafetyMode.ACTIVE
+    bench.rig.network.receive = deaf
+    asked = [q for cycle in bench.run(40, is_sending=False) for q in cycle]
+    assert bench.arm.safety_mode() is SafetyMode.IDLE
+    assert asked.count(SET_IDLE) == 1
+    assert SET_IDLE not in [
+        q for cycle in bench.run(40, is_sending=False) for q in cycle
+    ]
+
+
+def test_an_arm_that_confirms_later_is_known_to_be_idle(bench):
+    bench.rig.network.pendant("activate")
+    bench.run(3)
+    bench.rig.network.silence(10)
+    assert not bench.arm.idle()
+    bench.run(10, is_sending=False)
+    assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
+    bench.rig.network.silence(10, is_mute=False)
+    bench.run(30, is_sending=False)
+    assert bench.arm.safety_mode() is SafetyMode.IDLE
+
+
+def test_temperatures_are_told_from_the_coldest_to_the_hottest():
+    pucks = [PuckHealth(31, 36), PuckHealth(33, None), PuckHealth()]
+    assert temperature_range(pucks) == "31-36 °C"
+    assert temperature_range([PuckHealth()]) == "temperatures unknown"
+
+
+def test_health_is_text_in_the_order_of_the_pucks():
+    facts = health_facts([PuckHealth(31, 29, 48, 0), PuckHealth(-5, None, 47, 3)])
+    assert facts == {
+        "pucks:temperature_degc": "31 -5",
+        "pucks:motor_temperature_degc": "29 ?",
+        "pucks:bus_voltage": "48 47",
+        "pucks:error": "0 3",
+    }

@@ -1,0 +1,164 @@
+"""A bus log in the text format of candump: `(1699999999.123456) can0 404#30`."""
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappushpop
+
+from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
+from acquisition.errors import TractionError
+from wam.frames import Group, group_id
+
+LONGEST_LINE = 120  # characters
+_LINE = re.compile(
+    r"\((\d{1,10})\.(\d{6})\) ([!-~]{1,32}) "
+    r"([0-7][0-9A-F]{2}|[01][0-9A-F]{7})#((?:[0-9A-F]{2}){0,8}|R[0-8]?)(?: [RT])?",
+    re.ASCII | re.IGNORECASE,
+)
+_LAST_OF_CYCLE = group_id(Group.WRIST_TORQUE)  # after it nobody waits for the loop
+_WRITE_AT = 4096  # frames kept back at most
+_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
+_REORDERED = 256  # frames; a log has replies after later questions, never by more
+
+
+class CanLogError(TractionError):
+    """A bus log that is not what it should be."""
+
+    exit_code = 6
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class LoggedFrame:
+    """One frame of a log.
+
+    Attributes:
+        utc_ns: UTC [ns since 1970], whole microseconds.
+        line: its line in the log, 1 is the first.
+        channel: name of the bus.
+        can_id: identifier.
+        data: payload, empty for a remote frame.
+        is_of_wam: a data frame with an 11-bit identifier; a WAM uses no others.
+    """
+
+    utc_ns: int
+    line: int
+    channel: str
+    can_id: int
+    data: bytes
+    is_of_wam: bool = True
+
+
+def format_frame(utc_ns: int, channel: str, can_id: int, data: bytes) -> str:
+    """Return the line, without its end, of a data frame with an 11-bit identifier."""
+    seconds, rest_ns = divmod(utc_ns, NS_PER_S)
+    return (
+        f"({seconds}.{rest_ns // 1000:06d}) {channel} {can_id:03X}#{data.hex().upper()}"
+    )
+
+
+def parse_frame(text: str, line: int) -> LoggedFrame:
+    """Return the frame of one line of a log.
+
+    Raises:
+        CanLogError: it is not in candump's format; the message names `line`.
+    """
+    match = _LINE.fullmatch(text)
+    if match is None:
+        raise CanLogError(
+            f"Line {line} of the bus log is malformed: {text[:60]!r}.",
+            hint="Expected candump's format, e.g. (1699999999.123456) can0 404#30.",
+        )
+    seconds, micros, channel, can_id, data = match.groups()
+    is_remote = data[:1] in ("R", "r")
+    return LoggedFrame(
+        utc_ns=int(seconds) * NS_PER_S + int(micros) * 1000,
+        line=line,
+        channel=channel,
+        can_id=int(can_id, 16),
+        data=b"" if is_remote else bytes.fromhex(data),
+        is_of_wam=len(can_id) == 3 and not is_remote,
+    )
+
+
+def parse_log(lines: Iterable[str]) -> Iterator[LoggedFrame]:
+    """Return the frames of a log in the order of their times.
+
+    Raises:
+        CanLogError: a line is malformed; the frames above it have been returned.
+    """
+    waiting: list[LoggedFrame] = []
+    problem: CanLogError | None = None
+    for number, text in enumerate(lines, 1):
+        if not text.strip():
+            continue
+        try:
+            frame = parse_frame(text.rstrip("\r\n"), number)
+        except CanLogError as error:
+            problem = error
+            break
+        if len(waiting) < _REORDERED:
+            waiting.append(frame)
+            if len(waiting) == _REORDERED:
+                heapify(waiting)
+        else:
+            yield heappushpop(waiting, frame)
+    heapify(waiting)
+    while waiting:
+        yield heappop(waiting)
+    if problem is not None:
+        raise problem
+
+
+class CanLog:
+    """Collects frames as they pass and writes them as text when nobody waits.
+
+    A control loop only appends to a list; lines are written after the last torque frame
+    of a cycle. A disk that fails ends the log and nothing else.
+
+    Attributes:
+        failure: why the log ended early, empty if it did not.
+    """
+
+    def __init__(
+        self, write: Callable[[str], object], clock: Clock, channel: str
+    ) -> None:
+        self.failure = ""
+        self._write = write
+        self._clock = clock
+        self._channel = re.sub(r"[^!-~]", "_", channel)[:32] or "can0"
+        self._offset_ns = utc_offset_ns(clock)[0]
+        self._frames: list[tuple[int, int, bytes]] = []
+
+    def add(self, can_id: int, data: bytes, stamp: float = 0.0) -> None:
+        """Note a frame.
+
+        Args:
+            can_id: 11-bit identifier.
+            data: payload.
+            stamp: its time by the bus [s], UTC or monotonic; 0.0 = now.
+        """
+        self._frames.append((self._utc_ns(stamp), can_id, data))
+        if can_id == _LAST_OF_CYCLE or len(self._frames) >= _WRITE_AT:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what has been noted; never raises."""
+        frames, self._frames = self._frames, []
+        if self.failure or not frames:
+            return
+        channel = self._channel
+        try:
+            self._write(
+                "".join(f"{format_frame(t, channel, i, d)}\n" for t, i, d in frames)
+            )
+        except OSError as error:
+            self.failure = error.strerror or str(error)
+
+    def _utc_ns(self, stamp: float) -> int:
+        now_ns = self._clock.now_ns() + self._offset_ns
+        if stamp:
+            stamp_ns = round(stamp * NS_PER_S)
+            for utc_ns in (stamp_ns, stamp_ns + self._offset_ns):
+                if abs(utc_ns - now_ns) < _PLAUSIBLE_NS:
+                    return utc_ns
+        return now_ns
