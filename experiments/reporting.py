@@ -60,16 +60,10 @@ def choose_sessions(
     return sessions
 
 
-def report_sessions(
-    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
-) -> Path:
-    """Load the kept trials, fit, and write the report; return the page.
-
-    One session is reported into its own folder, several into `data`/study.
-
-    Raises:
-        SessionError: no session has a kept trial.
-    """
+def _load_trials(
+    sessions: Sequence[SessionFolder], console: Console
+) -> tuple[dict[str, list[RecordedTrial]], list[str]]:
+    """Return (kept trials by terrain, oldest session first; what was left out)."""
     trials: dict[str, list[RecordedTrial]] = {}
     problems: list[str] = []
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
@@ -88,6 +82,20 @@ def report_sessions(
                     hint="Put the file back where it came from.",
                 )
             trials.setdefault(trial.terrain, []).append(trial)
+    return trials, problems
+
+
+def report_sessions(
+    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
+) -> Path:
+    """Load the kept trials, fit, and write the report; return the page.
+
+    One session is reported into its own folder, several into `data`/study.
+
+    Raises:
+        SessionError: no session has a kept trial.
+    """
+    trials, problems = _load_trials(sessions, console)
     count = sum(len(group) for group in trials.values())
     if not count:
         raise SessionError(

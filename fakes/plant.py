@@ -17,6 +17,7 @@ import pinocchio as pin
 from fakes.contact import NO_CONTACT, Contact, Motion
 from fakes.hand import Hand, HandView
 from fakes.terrain import Terrain
+from fakes.truth import Truth
 from ft_sensor.payload import Payload, TerrainFrame, cross_matrix, payload_of
 from wam.constants import GRAVITY, ArmConstants, Array, Body
 from wam.model import add_point, build_pinocchio, drive_inertia_matrix
@@ -44,29 +45,6 @@ class PlantOptions:
 
     friction: float = 0.05
     substeps: int = 4
-
-
-class Truth:
-    """What really happened, one row per cycle; terrain frame where not said.
-
-    Columns: q [rad] 0-6, sole [m] 7-9, its velocity [m/s] 10-12, ground's force on the
-    foot against x, along y, along z [N] 13-15, hand's force [N] 16-18.
-    """
-
-    COLUMNS = 19
-
-    def __init__(self) -> None:
-        self.t_ns: list[int] = []
-        self._values: list[float] = []
-
-    def add(self, t_ns: int, values: Sequence[float]) -> None:
-        """Append one row."""
-        self.t_ns.append(t_ns)
-        self._values.extend(values)
-
-    def table(self) -> Array:
-        """Return all rows, shape (n, 19)."""
-        return np.array(self._values).reshape(-1, self.COLUMNS)
 
 
 class ArmPlant:

@@ -8,19 +8,19 @@ import numpy as np
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from acquisition.messages import TRUTH
 from acquisition.sample import Record
 from fakes.can_bus import FakeCanBus
 from fakes.ft_streams import BotaOptions, BotaStream
 from fakes.hand import Pace
 from fakes.network_options import NetworkOptions
-from fakes.plant import CYCLE_NS, ArmPlant, PlantOptions, Truth
+from fakes.plant import CYCLE_NS, ArmPlant, PlantOptions
 from fakes.pucks import PuckNetwork
 from fakes.randomness import trial_generator
 from fakes.safety_module import PendantAction
 from fakes.sensor_errors import SensorErrors
 from fakes.serial_port import FakeSerialPort
 from fakes.terrain import make_terrain
+from fakes.truth import truth_records
 from ft_sensor.payload import TerrainFrame
 from wam.constants import ArmConstants, Array
 from wam.model import ArmModel
@@ -210,7 +210,7 @@ class Rehearsal:
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""
-        return _truth_records(self._rig.plant.take_truth(), self._rig.scene.frame)
+        return truth_records(self._rig.plant.take_truth(), self._rig.scene.frame)
 
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground as strings."""
@@ -220,22 +220,3 @@ class Rehearsal:
     def _silence_all(self) -> None:
         for node in range(1, 8):
             self._rig.network.silence(node)
-
-
-def _truth_records(truth: Truth, frame: TerrainFrame) -> Record:
-    """Return `truth` in the layout of traction_msgs/Truth, base frame."""
-    count = len(truth.t_ns)
-    buffer = bytearray(TRUTH.template * count)
-    records: Record = np.frombuffer(buffer, TRUTH.dtype)
-    if not count:
-        return records
-    axes = frame.axes()
-    rows = truth.table()
-    velocity, force, hand = rows[:, 10:13], rows[:, 13:16], rows[:, 16:19]
-    records["host_ns"] = truth.t_ns
-    records["position"] = rows[:, :7]
-    records["sole_position"] = rows[:, 7:10] @ axes + np.array(frame.far_end)
-    records["contact_force"] = (force * [-1.0, 1.0, 1.0]) @ axes
-    records["hand_force"] = hand @ axes
-    records["traction"] = np.column_stack([velocity[:, 0], force[:, 0], force[:, 2]])
-    return records

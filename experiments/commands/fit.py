@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import whole_number
+from experiments.arguments import add_seed
 
 EXAMPLES = """\
   traction fit trials.npz --out fit
@@ -22,13 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
     )
     parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
-    parser.add_argument(
-        "--seed",
-        type=whole_number,
-        default=0,
-        metavar="N",
-        help="of the choice of points (0)",
-    )
+    add_seed(parser)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import whole_number
+from experiments.arguments import add_seed
 
 EXAMPLES = """\
   traction report S012                      one session, into its own folder
@@ -16,13 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
-    parser.add_argument(
-        "--seed",
-        type=whole_number,
-        default=0,
-        metavar="N",
-        help="of the choice of points (0)",
-    )
+    add_seed(parser)
 
 
 def run(args: argparse.Namespace) -> int:

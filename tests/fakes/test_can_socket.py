@@ -246,7 +246,10 @@ def test_a_path_in_use_is_refused(hub, path):
 def test_a_socket_left_behind_is_taken_over(path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as dead:
         dead.bind(str(path))
-    SocketHub(path).close()
+    hub = SocketHub(path)
+    assert path.is_socket()
+    hub.close()
+    assert not path.exists()
 
 
 def test_another_file_is_never_replaced(path):

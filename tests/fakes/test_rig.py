@@ -111,8 +111,10 @@ def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
 def test_every_known_fault_can_be_injected(rig_and_clock):
     rig, _ = rig_and_clock
     hand = Rehearsal(rig)
+    assert hand.fault_names
     for fault in hand.fault_names:
         hand.inject(fault)
+    assert rig.network.safety_mode is SafetyMode.E_STOP  # the last one stays
 
 
 def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):

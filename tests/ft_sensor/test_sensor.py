@@ -217,7 +217,9 @@ def test_rate_is_not_taken_on_the_word_of_a_slow_device_clock():
 
 
 def test_rate_of_502_hz_is_accepted():
-    Bench(BotaOptions(sinc=102)).opened()
+    told = Bench(BotaOptions(sinc=102)).opened().sensor.describe()
+    # counted over a quarter of a second: good to a frame or two
+    assert float(told["measured_rate"].split()[0]) == pytest.approx(502.0, abs=5.0)
 
 
 def test_description_tells_who_and_how_fast():
