@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from fakes.serve import PuckServer
 
 MS = 1_000_000
+TARE_SAMPLES = 4096  # more than any sensor sends during a tare
 # A simulation shares its thread with plant and recorder; only real arms need cadence.
 LATE_WHEN_SIMULATED = 250
 # On the wall clock the simulated safety module lives in the loop's own process, so a
@@ -68,7 +70,7 @@ class Rig:
         payload: what the sensor carries, not tared.
         model: the arm with its tool.
         tape: the last two seconds of frames.
-        wrenches: the sensor's samples since the list was last cleared.
+        wrenches: the sensor's newest samples, for the tare; the oldest are forgotten.
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
@@ -84,7 +86,7 @@ class Rig:
     payload: Payload
     model: ArmModel
     tape: FrameTape
-    wrenches: list[WrenchSample]
+    wrenches: deque[WrenchSample]
     frame: TerrainFrame
     row: TerrainRow
     settings: Settings
@@ -238,7 +240,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         payload=payload,
         model=model,
         tape=tape,
-        wrenches=[],
+        wrenches=deque(maxlen=TARE_SAMPLES),
         frame=frame,
         row=row,
         settings=settings,

@@ -150,7 +150,7 @@ class SessionRunner:
                 self.stage.tick(Prompt.LIFT, name)
             try:
                 result = tare(
-                    self.rig.wrenches, self.rig.settings.rig.limits.tare_spread
+                    list(self.rig.wrenches), self.rig.settings.rig.limits.tare_spread
                 )
             except TareError as error:
                 self._say(f"{error} ARM: holding.")

@@ -67,8 +67,7 @@ class ArmPlant:
         self._sole_cross = cross_matrix(sole_in_sensor)
         self._com_cross = cross_matrix(self._payload.com)
         model = build_pinocchio(constants, (tool.sensor, tool.foot))
-        hand_at = constants.d[6] - _HAND_ABOVE_PLATE
-        self._build_hand(model, constants, hand_at)
+        self._build_hand(model, constants, constants.d[6] - _HAND_ABOVE_PLATE)
         self._sole = add_point(model, constants, "sole", tool.sole)
         self._model = model
         self._data = model.createData()
@@ -95,10 +94,8 @@ class ArmPlant:
         self.t_ns = 0
         self._sole_at = self._hand_at = self._tilt = (0.0, 0.0, 0.0)
         self.truth: Truth | None = None
-        self._cycle_force = np.zeros(3)
-        self._sum_force = np.zeros(3)
-        self._cycle_v = np.zeros(3)
-        self._cycle_a = np.zeros(3)
+        self._cycle_force, self._sum_force = np.zeros(3), np.zeros(3)
+        self._cycle_v, self._cycle_a = np.zeros(3), np.zeros(3)
         self._parts = 0
         pin.computeJointJacobians(model, self._data, self.q)
         self._wanted = self._hand_rotation()

@@ -190,10 +190,6 @@ class Rehearsal:
         rig.plant.hand.push(self._pace, rig.rng)
         rig.plant.start_truth()
 
-    def is_hand_done(self) -> bool:
-        """Return whether the hand has done what it was told."""
-        return self._rig.plant.hand.is_done
-
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""
         self._rig.network.pendant(button)

@@ -83,7 +83,7 @@ def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
     rig, clock = rig_and_clock
     hand = Rehearsal(rig)
     hand.lift()
-    assert not hand.is_hand_done()
+    assert not rig.plant.hand.is_done
     assert rig.plant.hand.phase is Phase.CARRY
     hand.push()
     clock.sleep_until(clock.now_ns() + CYCLE_NS)
