@@ -180,14 +180,12 @@ def _check_safety(seen: Observation) -> Verdict:
 
 def _check_silence(limits: Limits, seen: Observation) -> Verdict:
     missing = seen.reading.missing_cycles
-    if missing >= limits.idle_after_missing:
-        return Verdict(Action.IDLE, "can-silence", (("ms", missing * 2.0),))
-    if missing >= limits.hold_after_missing:
-        silent = float(7 - seen.reading.fresh.bit_count())
-        return Verdict(
-            Action.HOLD, "can-silence", (("ms", missing * 2.0), ("silent", silent))
-        )
-    return OK
+    if missing < limits.hold_after_missing:
+        return OK
+    silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
+    facts = (("ms", missing * 2.0), ("silent", float(silent)))
+    is_long = missing >= limits.idle_after_missing
+    return Verdict(Action.IDLE if is_long else Action.HOLD, "can-silence", facts)
 
 
 def _check_numbers(seen: Observation) -> Verdict:

@@ -9,7 +9,8 @@ from experiments.rehearsing import Rehearsing
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
 )
-AT_PREFLIGHT = frozenset({"ft-silent", "puck-missing"})
+# What the preflight is there to find.
+AT_PREFLIGHT = frozenset({"ft-silent", "puck-missing", "puck-hot", "puck-error"})
 
 
 @dataclass(frozen=True, slots=True)

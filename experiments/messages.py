@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from acquisition.devices import SafetyMode
 from acquisition.guard import Verdict
 
 
@@ -126,6 +127,25 @@ CATALOGUE: dict[str, Message] = {
         4,
         "Without positions there is no gravity compensation to trust.",
     ),
+    "puck-silent": Message(
+        "{pucks} not answered for {ms:.0f} ms; the others do.",
+        "held by its last torques, being braked - support it",
+        "Check the puck's cable. If it was in reset the arm has to be zeroed: traction "
+        "check.",
+        4,
+        "The program goes on without a reply for five cycles. A puck that restarts on "
+        "its own stays silent until a start-up wakes it, and has lost its position.",
+    ),
+    "bus-off": Message(
+        "The CAN interface refuses to send and receive; no reply from the arm for "
+        "{ms:.0f} ms.",
+        "UNKNOWN - support it, press Shift-idle",
+        "Check cable and terminators, restart the interface (ip link set can0 down, "
+        "then up), then: traction check.",
+        4,
+        "A controller with too many errors leaves the bus. Without the loop's traffic "
+        "the safety module brakes the arm by itself within 0.1 s.",
+    ),
     "not-a-number": Message(
         "A position or torque was not a number.",
         "idle",
@@ -134,14 +154,14 @@ CATALOGUE: dict[str, Message] = {
         "Nothing that is not finite is ever sent to a motor.",
     ),
     "estop": Message(
-        "Stop pressed at {seconds:.2f} s.",
+        "Stop pressed{when}.",
         "stopped by its hardware",
         "Release it, press Shift-idle, zero the arm, then: traction run again.",
         4,
         "The hardware stop takes the power away; positions have to be defined anew.",
     ),
     "pendant-idle": Message(
-        "The pendant or the safety module put the arm to idle at {seconds:.2f} s.",
+        "The pendant or the safety module put the arm to idle{when}.",
         "idle, braked",
         "Look at the pendant's lamps, then: traction run again.",
         4,
@@ -203,14 +223,62 @@ CATALOGUE: dict[str, Message] = {
 
 _BY_CAUSE = {"pendant-idle": "safety-idle", "estop": "safety-stop"}
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows
+_PUCKS = 7
 
 
-def fault_text(verdict: Verdict, facts: Mapping[str, object], saved: str = "") -> str:
-    """Return the message of a verdict; `facts` are added to its own.
+@dataclass(frozen=True, slots=True)
+class Circumstances:
+    """When and where a fault came.
 
-    A verdict of the safety circuit is the pendant's unless a monitor is its cause.
+    Attributes:
+        trial: name of the trial, or "The session".
+        seconds: since the start of the recording [s], None outside of one.
+        is_bus_down: the CAN interface refuses to work.
+    """
+
+    trial: str = "The session"
+    seconds: float | None = None
+    is_bus_down: bool = False
+
+
+def fault_text(verdict: Verdict, found: Circumstances, saved: str = "") -> str:
+    """Return the message of a verdict.
+
+    A verdict of the safety circuit is the pendant's unless a monitor is its cause;
+    silence is the bus's, or that of the pucks that are silent.
     """
     words = [f"{c} fault" for c in verdict.causes if c != _BUTTON]
     name = _BY_CAUSE.get(verdict.reason, verdict.reason) if words else verdict.reason
-    known = {**facts, **dict(verdict.facts), "causes": ", ".join(words)}
-    return CATALOGUE[name].text(known, saved)
+    facts = dict(verdict.facts)
+    silent = _nodes(int(facts.get("silent", 0)))
+    if name == "can-silence" and found.is_bus_down:
+        name = "bus-off"
+    elif name == "can-silence" and len(silent) < _PUCKS:
+        name = "puck-silent"
+    known: dict[str, object] = {
+        "trial": found.trial,
+        "seconds": found.seconds or 0.0,
+        "when": "" if found.seconds is None else f" at {found.seconds:.2f} s",
+        "pucks": _who(silent),
+        "causes": ", ".join(words),
+    }
+    return CATALOGUE[name].text({**known, **facts}, saved)
+
+
+def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:
+    """Return what the arm does at the end, `is_confirmed` by the safety module."""
+    if not is_confirmed:
+        return "ARM: UNKNOWN - support it."
+    if mode is SafetyMode.E_STOP:
+        return "ARM: stopped by its hardware, without power."
+    return "ARM: idle, braked."
+
+
+def _nodes(silent: int) -> list[int]:
+    """Return the pucks whose bits are set."""
+    return [node for node in range(1, _PUCKS + 1) if silent >> (node - 1) & 1]
+
+
+def _who(nodes: list[int]) -> str:
+    names = ",".join(map(str, nodes))
+    return f"Puck {names} has" if len(nodes) == 1 else f"Pucks {names} have"

@@ -5,14 +5,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from acquisition.devices import SafetyMode
+from acquisition.devices import SafetyMode, WrenchSensor
 from acquisition.errors import LinkError, PreflightError, TractionError
 from experiments.console import BAD, GOOD, WARNING, Console
 from experiments.messages import CATALOGUE
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, TerrainRow
-from ft_sensor.sensor import BotaSensor
-from wam.health import temperature_range
+from wam.health import complaints, temperature_range
 
 Add = Callable[[str, str, str], None]
 SESSION_GB = 0.9
@@ -32,7 +31,7 @@ class Preflight:
     """The page, and the sensor it opened."""
 
     checks: tuple[Check, ...]
-    sensor: BotaSensor
+    sensor: WrenchSensor
 
     def as_dict(self) -> dict[str, object]:
         """Return the page for preflight.json."""
@@ -83,8 +82,10 @@ def _check_arm(rig: Rig, add: Add) -> None:
     parts = [f"firmware {', '.join(map(str, versions))}"]
     parts += [f"{woken} woken"] if woken else []
     parts += ["zeroed"] if info.is_zeroed else []
-    parts += [temperature_range(rig.arm.health())]
-    add(GOOD, "pucks 1-7", ", ".join(parts))
+    health, now_ns = rig.arm.health(), rig.clock.now_ns()
+    ill = complaints(health, now_ns)
+    parts += [temperature_range(health, now_ns), *ill]
+    add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
     if not info.is_zeroed:
         add(BAD, "zero", "not zeroed")
         raise _named("not-zeroed")
@@ -95,7 +96,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
     add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
 
 
-def _check_sensor(rig: Rig, add: Add) -> BotaSensor:
+def _check_sensor(rig: Rig, add: Add) -> WrenchSensor:
     try:
         sensor = rig.open_sensor()
     except TractionError as error:

@@ -12,7 +12,7 @@ import numpy as np
 from acquisition.clock import Clock, SystemClock
 from acquisition.control import InlineControl
 from acquisition.cycle import Cycle
-from acquisition.devices import WrenchSample
+from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.flight import FrameTape
 from acquisition.guard import Limits
 from acquisition.loop import Loop
@@ -21,6 +21,7 @@ from acquisition.sample import Flag
 from acquisition.shared import SampleRing
 from experiments.rehearsing import Rehearsing
 from experiments.settings import FootSection, RigSettings, Settings, TerrainRow
+from ft_sensor.barrett import BarrettSensor
 from ft_sensor.observer import LiveFoot
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from ft_sensor.sensor import BotaSensor
@@ -99,14 +100,19 @@ class Rig:
         """Whether the devices are simulated."""
         return self.rehearsal is not None
 
-    def open_sensor(self) -> BotaSensor:
-        """Open the wrist sensor's port and start its stream.
+    def open_sensor(self) -> WrenchSensor:
+        """Open the wrist sensor and let it begin; on the arm's bus it goes along.
 
         Raises:
             LinkError: the port cannot be opened, or the sensor is silent.
-            DeviceFaultError: the sensor refuses its settings.
+            DeviceFaultError: the sensor refuses its settings, or is not well.
         """
         section = self.settings.rig.ft_sensor
+        if section.kind == "barrett":
+            on_bus = BarrettSensor(self.can_link, self.clock)
+            on_bus.open()
+            self.arm.accompany(on_bus)
+            return on_bus
         settings = SensorSettings(
             "simulated" if self.is_simulated else section.port,
             baudrate=section.baudrate,
@@ -117,7 +123,7 @@ class Rig:
         sensor.open()
         return sensor
 
-    def connect(self, sensor: BotaSensor) -> InlineControl:
+    def connect(self, sensor: WrenchSensor) -> InlineControl:
         """Join arm, sensor, law and guard into a loop that is ready to run."""
         ring = SampleRing()
         recorder = Recorder(ring, self.clock)
@@ -218,7 +224,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
             return open_port(sensor.port, sensor.baudrate).port
 
     else:
-        clock, simulation, rehearsal = _simulate(row, fake, constants, tool, frame)
+        clock, simulation, rehearsal = _simulate(settings, row, fake, constants, tool)
         bus = simulation.bus
         open_sensor_port = simulation.open_port
     tape = FrameTape()
@@ -251,32 +257,33 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
 
 
 def _simulate(
+    settings: Settings,
     row: TerrainRow,
     fake: FakeOptions,
     constants: ArmConstants,
     tool: Tool,
-    frame: TerrainFrame,
 ) -> tuple[Clock, FakeRig, Rehearsing]:
     """Return (clock, simulated rig, its handle); only here are the fakes imported."""
     from fakes.clock import SteppedClock
+    from fakes.network_options import NetworkOptions
     from fakes.rig import FakeRig, Rehearsal, Scene
 
+    network = NetworkOptions(has_sensor=settings.rig.ft_sensor.kind == "barrett")
     scene = Scene(
         terrain=row.name,
         stones=row.stones,
         foot=row.foot,
-        frame=frame,
+        frame=terrain_frame(row),
         start_q=np.array(row.start_q),
         seed=fake.seed,
     )
     if not fake.is_fast:
         clock = SystemClock()
-        rig = FakeRig(
-            scene, constants, tool, clock, heartbeat_ns=HEARTBEAT_IN_PROCESS_NS
-        )
+        network = replace(network, heartbeat_ns=HEARTBEAT_IN_PROCESS_NS)
+        rig = FakeRig(scene, constants, tool, clock, network=network)
         return clock, rig, Rehearsal(rig)
     stepped = SteppedClock()
-    rig = FakeRig(scene, constants, tool, stepped)
+    rig = FakeRig(scene, constants, tool, stepped, network=network)
     stepped.world = rig
     return stepped, rig, Rehearsal(rig)
 

@@ -1,6 +1,7 @@
 """The runner: lift, tare, put down, record, review, until the session is complete."""
 
 import traceback
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from experiments.archive import ENOUGH, Archive, Outcome
 from experiments.book import Book
 from experiments.company import FaultedError, StopAskedError
-from experiments.messages import CATALOGUE, fault_text
+from experiments.messages import CATALOGUE, Circumstances, fault_text, rest_text
 from experiments.operator import REJECT_REASONS, Prompt
 from experiments.review import Review, review_trial
 from experiments.stage import TICK, Stage
@@ -40,7 +41,7 @@ class SessionRunner:
         self.control = stage.control
         self.book = Book(stage.rig, facts)
         self.archive = Archive(stage.rig, facts)
-        self._place = ("The session", 0.0)
+        self._place = Circumstances()
         self._faults = 0
 
     def run(self, trials: int) -> int:
@@ -98,7 +99,7 @@ class SessionRunner:
 
     def _try_trial(self) -> None:
         """One trial; a fault that leaves the arm holding does not end the session."""
-        self._place = ("The session", 0.0)
+        self._place = Circumstances()
         try:
             self._one_trial()
         except FaultedError as fault:
@@ -190,7 +191,7 @@ class SessionRunner:
         said = 0.0
         while True:
             outcome.seconds = (self.rig.clock.now_ns() - start) * 1e-9
-            self._place = (name.kept, outcome.seconds)
+            self._place = Circumstances(name.kept, outcome.seconds)
             key = self.stage.tick(Prompt.RECORDING, name)
             position = self.control.latest()[0]["foot_position"]
             outcome.displacement = float(self.rig.frame.displacement(position))
@@ -213,6 +214,7 @@ class SessionRunner:
         """
         archive = self.archive
         self.control.watch_trial(is_recording=False)
+        self.control.recorder.event(20, "link", self.rig.arm.counters.text())
         self.control.recorder.event(20, "stop", outcome.reason)
         writer = self.control.recorder.detach()
         verified = self.stage.aside(
@@ -238,6 +240,7 @@ class SessionRunner:
     ) -> None:
         reasons = "  ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
         self._say(f"[k]eep   [r]edo: {reasons}")
+        self._place = Circumstances(name.kept)
         is_whole = outcome.displacement >= ENOUGH * self.rig.frame.travel
         while True:
             try:
@@ -272,7 +275,8 @@ class SessionRunner:
     def _make_safe(self) -> None:
         """Idle the arm; the second call does nothing more."""
         confirmed = self.stage.make_safe()
-        self._say("ARM: idle, braked." if confirmed else "ARM: UNKNOWN - support it.")
+        mode = self.rig.arm.safety_mode()
+        self._say(rest_text(mode, is_confirmed=confirmed))
 
     def _say(self, text: str) -> None:
         self.stage.company.console.say(text)
@@ -290,9 +294,8 @@ class SessionRunner:
             self._say(f" {mark} {text}")
 
     def _tell_fault(self, verdict: Verdict) -> None:
-        trial, seconds = self._place
-        facts: dict[str, object] = {"trial": trial, "seconds": seconds}
-        text = fault_text(verdict, facts, self.book.saved())
+        found = replace(self._place, is_bus_down=self.rig.arm.is_bus_down)
+        text = fault_text(verdict, found, self.book.saved())
         self.stage.company.console.problem(text)
 
     def _tell_bug(self, text: str) -> None:

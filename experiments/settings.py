@@ -4,12 +4,12 @@ import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, get_args
+from typing import Annotated, Literal, TypeVar, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
-from pydantic.fields import FieldInfo
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from acquisition.errors import SettingsError
+from experiments.settings_errors import explain
 
 # strict: a number in quotes, or `true`, is a mistake and no number
 Number = Annotated[float, Field(strict=True)]
@@ -17,8 +17,6 @@ Whole = Annotated[int, Field(strict=True)]
 _Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
 _Vector3 = tuple[_Near, _Near, _Near]
 _Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
-_KINDS: dict[object, str] = {int: "a whole number", float: "a number"}
-_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
 _M = TypeVar("_M", bound=BaseModel)
 Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
 Mass = Annotated[Number, Field(gt=0, le=20)]
@@ -38,9 +36,13 @@ class CanSettings(_Section):
 
 
 class SensorSection(_Section):
-    """The wrist sensor and how it is mounted."""
+    """The wrist sensor and how it is mounted.
 
-    kind: Literal["bota"] = Field(examples=["bota"])
+    A "bota" has a serial line; a "barrett" is on the arm's bus, and the keys of the
+    line can be left out.
+    """
+
+    kind: Literal["bota", "barrett"] = Field(examples=["bota"])
     port: str = Field(examples=["/dev/ttyUSB0"])
     baudrate: Whole = Field(gt=0, examples=[460800])
     sinc: Whole = Field(ge=51, le=512, examples=[64])
@@ -48,6 +50,14 @@ class SensorSection(_Section):
     height: Number = Field(ge=0, le=0.2, examples=[0.012])
     angle_deg: Number = Field(ge=-360, le=360, examples=[0.0])
     sign: Literal[1, -1] = Field(examples=[1])
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_line(cls, data: object) -> object:
+        given = cast("dict[str, object]", data) if isinstance(data, dict) else {}
+        if given.get("kind") != "barrett":
+            return cast("object", data)
+        return {"port": "none", "baudrate": 460800, "sinc": 64, **given}
 
 
 class FootSection(_Section):
@@ -227,71 +237,5 @@ def _parse(model: type[_M], text: str, name: str) -> _M:
         return model.model_validate(data)
     except ValidationError as error:
         raise SettingsError(
-            _explain(model, name, error), hint="Nothing was started."
+            explain(model, name, error), hint="Nothing was started."
         ) from error
-
-
-def _explain(model: type[BaseModel], name: str, error: ValidationError) -> str:
-    first = error.errors()[0]
-    place = ""
-    for part in first["loc"]:
-        place += f"[{part}]" if isinstance(part, int) else f".{part}"
-    place = place.lstrip(".")
-    if first["type"] == "missing":
-        return f"{name}: {place} is missing{_example(model, first['loc'])}."
-    if first["type"] == "extra_forbidden":
-        return f"{name}: {place} is no setting Traction knows."
-    got = first["input"]
-    shown = f'"{got}"' if isinstance(got, str) else repr(got)
-    expected = _expected(model, first["loc"], first["msg"])
-    return (
-        f"{name}: {place} = {shown} - expected {expected}"
-        f"{_example(model, first['loc'])}."
-    )
-
-
-def _expected(
-    model: type[BaseModel], location: tuple[int | str, ...], otherwise: str
-) -> str:
-    """Return what a number should be, with its bounds; else what pydantic says."""
-    field = _field_at(model, location)
-    kind = _KINDS.get(field.annotation) if field else None
-    if field is None or kind is None:
-        return otherwise.removeprefix("Input should be ")
-    bounds = [
-        f"{sign} {getattr(constraint, name)}"
-        for constraint in field.metadata
-        for name, sign in _BOUNDS
-        if hasattr(constraint, name)
-    ]
-    return f"{kind} {' and '.join(bounds)}".rstrip()
-
-
-def _example(model: type[BaseModel], location: tuple[int | str, ...]) -> str:
-    """Return ", e.g. ..." from the examples of the field at `location`."""
-    field = _field_at(model, location)
-    return f", e.g. {field.examples[0]}" if field and field.examples else ""
-
-
-def _field_at(
-    model: type[BaseModel], location: tuple[int | str, ...]
-) -> FieldInfo | None:
-    """Return the last field on the way along `location`."""
-    current: type[BaseModel] | None = model
-    found: FieldInfo | None = None
-    for part in location:
-        if not isinstance(part, str) or current is None:
-            continue
-        found = current.model_fields.get(part)
-        current = _section_of(found.annotation) if found else None
-    return found
-
-
-def _section_of(annotation: Any) -> type[BaseModel] | None:  # noqa: ANN401
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    for inner in get_args(annotation):
-        found = _section_of(inner)
-        if found is not None:
-            return found
-    return None

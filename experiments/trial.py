@@ -105,7 +105,11 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         trial=trial,
         utc_offset_ns=offset,
         offset_uncertainty_ns=uncertainty,
-        provenance={**facts.provenance, **health_facts(rig.arm.health())},
+        provenance={
+            **facts.provenance,
+            **health_facts(rig.arm.health(), rig.clock.now_ns()),
+            **rig.arm.counters.facts(),
+        },
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
     )

@@ -1,8 +1,7 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
-from enum import Enum
-
 from fakes.network_options import NetworkOptions
+from fakes.puck_life import Power, PuckLife
 from wam.pucks import (
     MAGNETIC_ENCODER,
     Device,
@@ -18,24 +17,13 @@ READ_ONLY = frozenset(
 )
 
 
-class Power(Enum):
-    """What a puck's processor is doing."""
-
-    OFF = "no power"
-    MONITOR = "asleep"
-    SILENT = "booting or resetting"
-    AWAKE = "running"
-
-
 class MotorPuck:
     """State of one motor puck.
 
     Attributes:
+        life: its processor.
         node: its number, 1 to 7.
         vers: its firmware.
-        power: what its processor is doing.
-        epoch: number of its lives; events of an earlier one are void.
-        is_mute: its transmit wire is cut.
         offset: its position less the encoder's [counts].
         torque: torque it makes [puck units].
         p_number: number of the property P in its firmware.
@@ -43,13 +31,11 @@ class MotorPuck:
         properties: what a host has set or may ask for, by name.
     """
 
-    def __init__(self, node: int, options: NetworkOptions) -> None:
+    def __init__(self, life: PuckLife, options: NetworkOptions) -> None:
+        self.life = life
+        self.node = node = life.node
         i = node - 1
-        self.node = node
         self.vers = options.vers[i]
-        self.power = Power.OFF
-        self.epoch = 0
-        self.is_mute = False
         self.offset = 0
         self.torque = 0
         self.p_number = property_number(Device.MOTOR, "P", self.vers)
@@ -67,9 +53,9 @@ class MotorPuck:
         self._monitor_vers = options.monitor_vers
 
     @property
-    def is_listening(self) -> bool:
-        """Whether it takes frames at all."""
-        return self.power in (Power.AWAKE, Power.MONITOR)
+    def is_awake(self) -> bool:
+        """Whether its firmware runs."""
+        return self.life.power is Power.AWAKE
 
     @property
     def is_driven(self) -> bool:
@@ -79,17 +65,17 @@ class MotorPuck:
     def hears(self, group: int) -> bool:
         """Return whether the puck belongs to `group` and runs."""
         mine = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
-        return self.is_listening and group in mine
+        return self.life.is_listening and group in mine
 
     def name_of(self, number: int) -> str | None:
         """Return what `number` means to the puck as it is now."""
-        if self.power is Power.MONITOR:
+        if self.life.power is Power.MONITOR:
             return names(Device.MONITOR).get(number)
         return names(Device.MOTOR, self.vers).get(number)
 
     def value_of(self, name: str, counts: int) -> int | None:
         """Return the value of a property, None for one that is not modelled."""
-        is_asleep = self.power is Power.MONITOR
+        is_asleep = self.life.power is Power.MONITOR
         computed = {
             "VERS": self._monitor_vers if is_asleep else self.vers,
             "STAT": Stat.RESET if is_asleep else Stat.READY,
@@ -106,8 +92,7 @@ class MotorPuck:
 
     def restart(self, power: Power) -> None:
         """Lose what a puck loses with its program."""
-        self.epoch += 1
-        self.power = power
+        self.life.enter(power)
         self.torque = 0
         self.properties["MODE"] = PuckMode.IDLE
 

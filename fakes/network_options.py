@@ -14,6 +14,7 @@ class NetworkOptions:
     Attributes:
         safety_mode: mode at the start; in E_STOP the pucks have no power.
         are_asleep: pucks wait in the monitor, as after power-up.
+        has_sensor: there is a force/torque sensor on the bus, node 8.
         is_zeroed: a host has defined the positions (never when asleep or E_STOP).
         vers: firmware of each motor puck.
         monitor_vers: what VERS says while a puck sleeps.
@@ -27,6 +28,7 @@ class NetworkOptions:
 
     safety_mode: SafetyMode = SafetyMode.IDLE
     are_asleep: bool = False
+    has_sensor: bool = False
     is_zeroed: bool = True
     vers: tuple[int, ...] = (200,) * 7
     monitor_vers: int = 5

@@ -1,11 +1,13 @@
 """The seven simulated motor pucks of an arm, and the motors behind them."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Protocol
 
 from acquisition.devices import SafetyMode
-from fakes.motor_puck import READ_ONLY, MotorPuck, Power
+from fakes.motor_puck import READ_ONLY, MotorPuck
 from fakes.network_options import NetworkOptions
+from fakes.puck_life import Power, PuckLife, power_after, power_at_start
 from fakes.safety_module import puck_mode_in
 from fakes.schedule import Schedule
 from wam.frames import (
@@ -15,7 +17,6 @@ from wam.frames import (
     encode_position,
     position_reply_id,
 )
-from wam.pucks import Stat
 
 
 class MotorSide(Protocol):
@@ -58,29 +59,34 @@ class PuckBank:
         self._schedule = schedule
         self._on_positions = on_positions
         self._mode = options.safety_mode
-        self._pucks = [MotorPuck(node, options) for node in MOTOR_NODES]
+        self._pucks = [
+            MotorPuck(PuckLife(node, options, schedule), options)
+            for node in MOTOR_NODES
+        ]
         self._members: dict[int, list[MotorPuck]] = {}
         self._wake_up()
 
     def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
         """Go where the safety module sends the pucks in its new `mode`."""
         self._mode = mode
-        for puck in self._pucks:
-            if mode is SafetyMode.E_STOP:
-                puck.restart(Power.OFF)
-            elif before is SafetyMode.E_STOP:
-                puck.restart(Power.MONITOR)
+        if (power := power_after(mode, before)) is not None:
+            for puck in self._pucks:
+                puck.restart(power)
         self._members.clear()
         self._set_puck_modes()
 
     def silence(self, node: int, *, is_mute: bool) -> None:
         """Cut the transmit wire of a puck, or mend it."""
-        self._pucks[node - 1].is_mute = is_mute
+        self._pucks[node - 1].life.is_mute = is_mute
 
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the pucks measure `voltage` [V]."""
         for puck in self._pucks:
             puck.properties["VBUS"] = round(voltage)
+
+    def set_property(self, node: int, name: str, value: int) -> None:
+        """Let a puck measure `value` for a property such as TEMP."""
+        self._pucks[node - 1].properties[name] = value
 
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor."""
@@ -91,7 +97,7 @@ class PuckBank:
     def receive(self, node: int, request: Property) -> None:
         """Take a GET or SET sent to one puck."""
         puck = self._pucks[node - 1]
-        if puck.is_listening:
+        if puck.life.is_listening:
             self._ask_or_tell([puck], request)
 
     def receive_group(self, group: int, request: Property) -> None:
@@ -106,9 +112,8 @@ class PuckBank:
         self._apply()
 
     def _wake_up(self) -> None:
-        power = Power.MONITOR if self._options.are_asleep else Power.AWAKE
         for puck in self._pucks:
-            puck.restart(power if self._options.has_power else Power.OFF)
+            puck.restart(power_at_start(self._options))
         if not self._options.has_positions:
             self._lose_positions(self._pucks)
         self._set_puck_modes()
@@ -119,33 +124,23 @@ class PuckBank:
             for puck in pucks:
                 self._tell(puck, number, request.value)
             return
-        feedback = [p for p in pucks if p.p_number == number and p.power is Power.AWAKE]
+        feedback = [p for p in pucks if p.p_number == number and p.is_awake]
         if feedback:
             self._schedule.after(self._options.latch_ns, lambda: self._report(feedback))
             return
         for puck in pucks:
             if (name := puck.name_of(number)) is not None:
-                self._answer_later(puck, number, name)
+                puck.life.answer(number, name, partial(self._value_of, puck))
 
-    def _answer_later(self, puck: MotorPuck, number: int, name: str) -> None:
-        epoch = puck.epoch
-
-        def answer() -> None:
-            if puck.epoch != epoch or puck.is_mute:
-                return
-            value = puck.value_of(name, self._encoder_counts()[puck.node - 1])
-            if value is not None:
-                self._schedule.reply(puck.node, number, name, value)
-
-        # A choice within the 75 to 150 us that are known.
-        self._schedule.after(self._options.latch_ns + 10_000 * puck.node, answer)
+    def _value_of(self, puck: MotorPuck, name: str) -> int | None:
+        return puck.value_of(name, self._encoder_counts()[puck.node - 1])
 
     def _report(self, pucks: list[MotorPuck]) -> None:
         """Latch the positions of `pucks` and hand them to the wire."""
         counts = self._encoder_counts()
         reported: dict[int, int] = {}
         for puck in pucks:
-            if puck.power is Power.AWAKE and not puck.is_mute:
+            if puck.is_awake and not puck.life.is_mute:
                 position = encode_position(counts[puck.node - 1] + puck.offset)
                 self._schedule.emit(position_reply_id(puck.node), position)
                 reported[puck.node] = decode_position(position)
@@ -156,7 +151,7 @@ class PuckBank:
         name = puck.name_of(number)
         if name == "STAT":
             self._restart(puck, value)
-        elif puck.power is Power.MONITOR or name is None or name in READ_ONLY:
+        elif not puck.is_awake or name is None or name in READ_ONLY:
             return
         elif name == "P":
             puck.offset = value - self._encoder_counts()[puck.node - 1]
@@ -172,28 +167,24 @@ class PuckBank:
 
     def _restart(self, puck: MotorPuck, stat: int) -> None:
         """Obey SET STAT: wake a sleeping puck, reset a running one."""
-        if stat == Stat.READY and puck.power is Power.MONITOR:
-            delay_ns, power = self._options.boot_ns, Power.AWAKE
-        elif stat == Stat.RESET and puck.power is Power.AWAKE:
-            delay_ns, power = self._options.reset_ns, Power.MONITOR
-        else:
+        change = puck.life.change_by(stat)
+        if change is None:
             return
+        delay_ns, power = change
         puck.restart(Power.SILENT)
-        epoch = puck.epoch
 
         def finish() -> None:
-            if puck.epoch == epoch:
-                puck.restart(power)
-                self._lose_positions([puck])
-                self._members.clear()
+            puck.restart(power)
+            self._lose_positions([puck])
+            self._members.clear()
 
-        self._schedule.after(delay_ns, finish)
+        puck.life.later(delay_ns, finish)
         self._members.clear()
         self._apply()
 
     def _set_puck_modes(self) -> None:
         for puck in self._pucks:
-            if puck.power is Power.AWAKE:
+            if puck.is_awake:
                 puck.properties["MODE"] = puck_mode_in(self._mode)
             puck.torque = 0
         self._apply()

@@ -1,18 +1,27 @@
 """A WAM's puck network without wires: frames in, frames out, time as an argument.
 
-Seven motor pucks and the safety module as far as hosts have described them.
+Seven motor pucks, the safety module and, where there is one, the force/torque sensor,
+as far as hosts have described them.
 """
 
 from acquisition.devices import SafetyMode
+from fakes.bus_faults import BusFaults
+from fakes.ft_puck import ForceTorquePuck, Load
 from fakes.network_options import NetworkOptions
 from fakes.puck_bank import MotorSide, PuckBank
-from fakes.safety_module import TORQUE_GROUPS, FakeSafetyModule, PendantAction
+from fakes.safety_module import (
+    TORQUE_GROUPS,
+    FakeSafetyModule,
+    PendantAction,
+    Strainable,
+)
 from fakes.schedule import OutFrame, Schedule
 from wam.frames import (
     GROUP_BIT,
     MOTOR_NODES,
     SAFETY_NODE,
     SENDER_MASK,
+    SENSOR_NODE,
     FrameError,
     Group,
     Payload,
@@ -27,19 +36,29 @@ class PuckNetwork:
 
     Attributes:
         options: the arm as it was found.
+        faults: what goes wrong with frames on their way to the host.
     """
 
     def __init__(
-        self, motors: MotorSide, options: NetworkOptions | None = None, t_ns: int = 0
+        self,
+        motors: MotorSide,
+        options: NetworkOptions | None = None,
+        t_ns: int = 0,
+        load: Load | None = None,
     ) -> None:
+        """Join devices and motors; `load` is on the sensor, if there is one."""
         self.options = options or NetworkOptions()
         self._schedule = Schedule(t_ns)
+        self.faults = BusFaults(self._schedule)
         self._safety = FakeSafetyModule(
             self.options, self._schedule, self._mode_changed
         )
         self._bank = PuckBank(
             motors, self.options, self._schedule, self._safety.hear_positions
         )
+        self._sensor: ForceTorquePuck | None = None
+        if self.options.has_sensor:
+            self._sensor = ForceTorquePuck(self.options, self._schedule, load or Load())
 
     @property
     def safety_mode(self) -> SafetyMode:
@@ -84,6 +103,8 @@ class PuckNetwork:
                 self._safety.receive(decode_request(data))
             elif to in MOTOR_NODES:
                 self._bank.receive(to, decode_request(data))
+            elif to == SENSOR_NODE and self._sensor is not None:
+                self._sensor.receive(decode_request(data))
         except FrameError:
             return  # devices do not answer what they do not understand
 
@@ -95,17 +116,37 @@ class PuckNetwork:
         """Cut the transmit wire of a node, or mend it; it still hears."""
         if node == SAFETY_NODE:
             self._safety.is_mute = is_mute
+        elif node == SENSOR_NODE:
+            if self._sensor is not None:
+                self._sensor.life.is_mute = is_mute
         else:
             self._bank.silence(node, is_mute=is_mute)
 
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the arm's power bus have `voltage` [V], at the last `advance`."""
         self._bank.set_bus_voltage(voltage)
+        if self._sensor is not None:
+            self._sensor.set_bus_voltage(voltage)
         self._safety.set_bus_voltage(voltage)
 
+    def set_property(self, node: int, name: str, value: int) -> None:
+        """Let a motor puck find `value` for one of its own measurements."""
+        self._bank.set_property(node, name, value)
+
+    def strain(self, monitor: Strainable) -> None:
+        """Let a monitor of the safety module find fault with what it sees."""
+        self._safety.strain(monitor)
+
+    def relax(self) -> None:
+        """Let the safety module judge as before; a fault stays until Shift-idle."""
+        self._safety.relax()
+
     def reboot(self, node: int) -> None:
-        """Let a motor puck fall into its monitor: no torque, position lost."""
-        self._bank.reboot(node)
+        """Let a puck fall into its monitor: no torque, position and tare lost."""
+        if node != SENSOR_NODE:
+            self._bank.reboot(node)
+        elif self._sensor is not None:
+            self._sensor.reboot()
 
     def _receive_group(self, group: int, data: Payload) -> None:
         if group in TORQUE_GROUPS and len(data) == 8:
@@ -117,3 +158,5 @@ class PuckNetwork:
 
     def _mode_changed(self, before: SafetyMode) -> None:
         self._bank.follow(self._safety.mode, before)
+        if self._sensor is not None:
+            self._sensor.follow(self._safety.mode, before)

@@ -1,15 +1,16 @@
 """The whole simulated rig: arm, pucks, sensor, ground and hand, and its handle."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from fakes.can_bus import FakeCanBus
+from fakes.faults import mend_network, network_faults
+from fakes.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.ft_streams import BotaOptions, BotaStream
 from fakes.hand import Pace
 from fakes.network_options import NetworkOptions
@@ -23,6 +24,7 @@ from fakes.terrain import make_terrain
 from fakes.truth import truth_records
 from ft_sensor.payload import TerrainFrame
 from wam.constants import ArmConstants, Array
+from wam.frames import SENSOR_NODE
 from wam.model import ArmModel
 from wam.tool import Tool
 
@@ -82,7 +84,10 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
 
 
 class FakeRig:
-    """Simulated devices joined by one plant; a World for the stepped clock."""
+    """Simulated devices joined by one plant; a World for the stepped clock.
+
+    The wrist sensor is on a serial port, or on the bus where `network` has one.
+    """
 
     def __init__(
         self,
@@ -91,7 +96,7 @@ class FakeRig:
         tool: Tool,
         clock: Clock,
         options: PlantOptions | None = None,
-        heartbeat_ns: int = 100_000_000,
+        network: NetworkOptions | None = None,
     ) -> None:
         self.scene = scene
         self._clock = clock
@@ -99,16 +104,13 @@ class FakeRig:
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
-        self.network = PuckNetwork(
-            self.plant,
-            NetworkOptions(
-                safety_mode=SafetyMode.IDLE, mt=constants.mt, heartbeat_ns=heartbeat_ns
-            ),
-            clock.now_ns(),
-        )
-        self.bus = FakeCanBus(self.network, clock)
+        found = replace(network or NetworkOptions(), mt=constants.mt)
         rng = trial_generator(scene.seed, scene.terrain, 0)
-        self.errors = SensorErrors(rng)
+        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if found.has_sensor else ()
+        self.errors = SensorErrors(rng, *kind)
+        load = Load(self.plant.sensor_load, self.errors)
+        self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
+        self.bus = FakeCanBus(self.network, clock)
         self.stream = BotaStream(
             self.plant.sensor_load,
             self.errors,
@@ -137,6 +139,14 @@ class FakeRig:
             times.append(self._port.next_event_ns())
         return min((t for t in times if t is not None), default=None)
 
+    def silence_sensor(self, *, is_mute: bool = True) -> None:
+        """Let the wrist sensor say nothing, or speak again."""
+        if is_mute:
+            self.stream.go_silent()
+        else:
+            self.stream.speak()
+        self.network.silence(SENSOR_NODE, is_mute=is_mute)
+
     def rake(self, trial: int) -> None:
         """Rake the bed for `trial`: everything random starts anew."""
         self.rng = trial_generator(self.scene.seed, self.scene.terrain, trial)
@@ -159,11 +169,9 @@ class Rehearsal:
         self._rig = rig
         self._pace = pace or Pace()
         self._faults: dict[str, Callable[[], None]] = {
-            "ft-silent": rig.stream.go_silent,
-            "ft-stale": rig.stream.go_silent,
-            "puck-missing": lambda: rig.network.silence(5),
-            "can-silence": self._silence_all,
-            "estop": lambda: rig.network.pendant("estop"),
+            "ft-silent": rig.silence_sensor,
+            "ft-stale": rig.silence_sensor,
+            **network_faults(rig.network),
         }
 
     @property
@@ -200,9 +208,8 @@ class Rehearsal:
 
     def mend(self) -> None:
         """End every fault that can be ended without the arm."""
-        self._rig.stream.speak()
-        for node in range(1, 8):
-            self._rig.network.silence(node, is_mute=False)
+        self._rig.silence_sensor(is_mute=False)
+        mend_network(self._rig.network)
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""
@@ -212,7 +219,3 @@ class Rehearsal:
         """Return the true parameters of the ground as strings."""
         values = self._rig.ground.truth()
         return {name: f"{value:.9g}" for name, value in values.items()}
-
-    def _silence_all(self) -> None:
-        for node in range(1, 8):
-            self._rig.network.silence(node)

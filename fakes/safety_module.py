@@ -17,6 +17,7 @@ from wam.safety import MONITORS, Button, Level, PendantWord, encode_pendant
 from wam.safety_limits import COUNTS_PER_SPEED
 
 PendantAction = Literal["activate", "idle", "estop"]
+Strainable = Literal["velocity", "torque", "heartbeat"]
 TORQUE_GROUPS = (Group.LOWER_TORQUE, Group.WRIST_TORQUE)
 _MODE = 8  # number of the property in every firmware
 _BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
@@ -25,6 +26,7 @@ _POWER_UP_LIMITS = {
     **{"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204},
     **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57},
 }
+_FAULT_LIMITS = {"velocity": "VL2", "torque": "TL2"}
 NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
 _PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
@@ -63,6 +65,8 @@ class FakeSafetyModule:
         self._speeds = SpeedWatch(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
+        self._is_deaf = False
+        self._spared: dict[str, int] = {}  # limits as they were before `strain`
         self._largest_command: dict[Group, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
             **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
@@ -116,8 +120,29 @@ class FakeSafetyModule:
         self._bus_voltage = voltage
         self._judge_voltage()
 
+    def strain(self, monitor: Strainable) -> None:
+        """Let a monitor find fault with what it sees, until `relax`.
+
+        The limits of speed and torque become the smallest that is not off; for the
+        heartbeat the module goes deaf to positions.
+        """
+        limit = _FAULT_LIMITS.get(monitor)
+        if limit is None:
+            self._is_deaf = True
+        else:
+            self._spared.setdefault(limit, self._properties[limit])
+            self._properties[limit] = 1
+
+    def relax(self) -> None:
+        """Judge as before; a fault stays until Shift-idle."""
+        self._is_deaf = False
+        self._properties.update(self._spared)
+        self._spared.clear()
+
     def hear_positions(self, positions: Mapping[int, int]) -> None:
         """Take positions [counts] by node: heartbeat of the arm, and its speed."""
+        if self._is_deaf:
+            return
         self._last_position_ns = self._schedule.now_ns
         self._speeds.hear(self._schedule.now_ns, positions)
         self._judge_speed()

@@ -8,16 +8,22 @@ from wam.pucks import is_wide
 
 OutFrame = tuple[int, int, bytes]  # ready for the wire at [ns], identifier, data
 
+# One bit is 1 us at 1 Mbit/s: 47 bits of frame and 8 per byte, with the stuff bits
+# that typical content needs.
+FRAME_NS = tuple(1000 * bits for bits in (50, 58, 67, 76, 84, 93, 101, 110, 118))
+
 
 class Schedule:
     """One time for all devices of a network, their plans and their frames.
 
     Attributes:
         now_ns: the network's time; it never runs back.
+        on_emit: what a device's frame meets on its way to the wire.
     """
 
     def __init__(self, t_ns: int) -> None:
         self.now_ns = t_ns
+        self.on_emit: Callable[[int, bytes], None] = self.put
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
         self._plan_count = 0
         self._outbox: list[OutFrame] = []
@@ -43,6 +49,10 @@ class Schedule:
         return True
 
     def emit(self, can_id: int, data: bytes) -> None:
+        """Let a device say something now; `on_emit` decides what becomes of it."""
+        self.on_emit(can_id, data)
+
+    def put(self, can_id: int, data: bytes) -> None:
         """Hand a frame to the wire now."""
         self._outbox.append((self.now_ns, can_id, data))
 

@@ -11,11 +11,15 @@ from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from fakes.can_hub import Frame, SocketHub
 from fakes.can_port import CanPort
+from fakes.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.network_options import NetworkOptions
 from fakes.plant import CYCLE_NS, ArmPlant
 from fakes.puck_bank import MotorSide
 from fakes.pucks import PuckNetwork
+from fakes.randomness import trial_generator
 from fakes.safety_module import PendantAction
+from fakes.sensor_errors import SensorErrors
+from fakes.wire import WiredNetwork
 from ft_sensor.payload import TerrainFrame
 from wam.constants import load_constants
 from wam.tool import Tool
@@ -23,6 +27,7 @@ from wam.tool import Tool
 TICK_NS = 2_000_000
 # A stall of the machine must not look like a lost heartbeat or a fall of the arm.
 _LONGEST_STEP_NS = 10 * TICK_NS
+_SEED = 1  # of the sensor's errors
 
 Tap = Callable[[int, bytes], None]
 
@@ -97,6 +102,9 @@ class Supported:
 class PuckServer:
     """A network and the bus it is served on.
 
+    Whatever carries the frames here, the devices' leave one after the other, as on a
+    wire of 1 Mbit/s.
+
     Attributes:
         network: the pucks.
     """
@@ -105,6 +113,7 @@ class PuckServer:
         self, network: PuckNetwork, motors: MotorSide, port: Port, clock: Clock
     ) -> None:
         self.network = network
+        self._wired = WiredNetwork(network, is_far=True)
         self._motors = motors
         self._port = port
         self._clock = clock
@@ -150,8 +159,8 @@ class PuckServer:
         for can_id, data in self._port.receive():
             if tap is not None:
                 tap(can_id, data)
-            self.network.receive(self._world_ns, can_id, data)
-        for _, can_id, data in self.network.due(self._world_ns):
+            self._wired.send(self._world_ns, can_id, data)
+        for _, can_id, data in self._wired.advance(self._world_ns):
             self._port.send(can_id, data)
             if tap is not None:
                 tap(can_id, data)
@@ -163,7 +172,7 @@ class PuckServer:
         self._port.close()
 
     def _deadline_ns(self) -> int:
-        event_ns = self.network.next_event_ns()
+        event_ns = self._wired.next_event_ns()
         left = TICK_NS if event_ns is None else event_ns - self._world_ns
         return self._seen_ns + max(0, min(left, TICK_NS))
 
@@ -191,6 +200,8 @@ def build_home_server(
 ) -> PuckServer:
     """Return a server of an arm that stands at its home position, not zeroed.
 
+    It has a force/torque sensor on its bus.
+
     `is_idle_first`: powered, safety module idle, pucks asleep; otherwise in E-STOP.
     """
     constants = load_constants()
@@ -205,10 +216,15 @@ def build_home_server(
     now_ns = clock.now_ns()
     plant.t_ns = now_ns // CYCLE_NS * CYCLE_NS
     motors = Supported(plant)
+    rng = trial_generator(_SEED, "home", 0)
+    errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
     options = NetworkOptions(
         safety_mode=SafetyMode.IDLE if is_idle_first else SafetyMode.E_STOP,
         are_asleep=True,
+        has_sensor=True,
         is_zeroed=False,
         mt=constants.mt,
     )
-    return PuckServer(PuckNetwork(motors, options, now_ns), motors, port, clock)
+    load = Load(plant.sensor_load, errors)
+    network = PuckNetwork(motors, options, now_ns, load)
+    return PuckServer(network, motors, port, clock)

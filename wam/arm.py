@@ -19,7 +19,7 @@ from wam.health import PuckHealth
 from wam.motion import Motion
 from wam.safety import SafetyModule
 from wam.startup import ArmInfo, StartUp, pucks_do
-from wam.traffic import CycleTraffic
+from wam.traffic import Companion, CycleTraffic
 from wam.transmission import MOTORS, Transmission
 from wam.watch import BRAKED
 
@@ -67,6 +67,10 @@ class WamArm:
         """The safety module, for use outside the loop."""
         return self._safety
 
+    def accompany(self, companion: Companion) -> None:
+        """Ask a device on the arm's bus along with the positions from now on."""
+        self._traffic.companion = companion
+
     def start(self) -> ArmInfo:
         """Find, wake and question the pucks; the arm can be read afterwards.
 
@@ -83,7 +87,8 @@ class WamArm:
         self._watch.note_mode(info.safety_mode)
         self._watch.is_lowering = False
         self._watch.note_pendant(info.pendant)
-        self._watch.health.pucks[:] = [puck.health for puck in info.pucks]
+        health = [puck.health for puck in info.pucks]
+        self._watch.health.begin(health, self._clock.now_ns())
         self._traffic.set_firmware(info.pucks[0].vers)
         transmission = Transmission(
             self._settings.j2mp,
@@ -154,8 +159,13 @@ class WamArm:
         """Return the monitors of the safety module in fault, as last heard."""
         return self._watch.faults
 
+    @property
+    def is_bus_down(self) -> bool:
+        """Whether the bus refused the last question for positions."""
+        return self._traffic.is_down
+
     def health(self) -> tuple[PuckHealth, ...]:
-        """Return what pucks 1 to 7 said last about themselves; does not wait."""
+        """Return what pucks 1 to 7 said last, and when; does not wait."""
         return tuple(self._watch.health.pucks)
 
     def idle(self) -> bool:
@@ -167,11 +177,7 @@ class WamArm:
         """
         if self._is_closed:
             return self._watch.mode in BRAKED
-        try:
-            self._watch.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
-        except LinkError:
-            self.counters.link_errors += 1
-            self._watch.note_mode(SafetyMode.UNKNOWN)
+        self._watch.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
         if self._watch.mode not in BRAKED:
             self._watch.is_lowering = True
             return False

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
-from acquisition.errors import DeviceFaultError
+from acquisition.errors import DeviceFaultError, LinkError
 from wam.dialogue import Dialogue
 from wam.frames import SAFETY_NODE
 from wam.pucks import Device, property_number
@@ -129,22 +129,27 @@ class SafetyModule:
     def lower_to_idle(self, within_ns: int) -> SafetyMode:
         """Ask for IDLE until the module confirms IDLE or E-STOP; return the last mode.
 
-        UNKNOWN means that it never answered; ACTIVE that it did not obey.
-
-        Raises:
-            LinkError: the bus is down.
+        UNKNOWN means that it never answered; ACTIVE that it did not obey. A bus that
+        is down is tried again as well: its controller may come back.
         """
         deadline_ns = self._clock.now_ns() + within_ns
         mode = SafetyMode.UNKNOWN
         while self._clock.now_ns() < deadline_ns:
-            self._dialogue.tell(SAFETY_NODE, _MODE, SafetyMode.IDLE)
-            value = self._dialogue.ask(SAFETY_NODE, _MODE, _RETRY_NS)
+            value = self._ask_down()
             if value is not None:
                 mode = decode_mode(value)
             if mode in (SafetyMode.IDLE, SafetyMode.E_STOP):
                 break
             self._dialogue.pause(_RETRY_NS // 10)
         return mode
+
+    def _ask_down(self) -> int | None:
+        """Ask for IDLE once; return MODE as answered, None without an answer."""
+        try:
+            self._dialogue.tell(SAFETY_NODE, _MODE, SafetyMode.IDLE)
+            return self._dialogue.ask(SAFETY_NODE, _MODE, _RETRY_NS)
+        except LinkError:
+            return None
 
     def is_zeroed(self) -> bool:
         """Return whether a host has defined the positions since power-up."""
@@ -162,6 +167,10 @@ class SafetyModule:
                 "The safety module does not accept ZERO = 1.",
                 hint="Press Shift-idle and zero the arm again.",
             )
+
+    def forget_zero(self) -> None:
+        """Tell the module that positions have been lost."""
+        self._set("ZERO", 0)
 
     def ignore_speed_faults(self, count: int) -> None:
         """Let the module ignore `count` samples before something makes a jump."""

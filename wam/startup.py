@@ -105,6 +105,8 @@ class StartUp:
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
         self._check_wrist(pucks[-1])
+        if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
+            safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
             self._dialogue.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
         return ArmInfo(

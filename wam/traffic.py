@@ -3,8 +3,8 @@
 Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
 """
 
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Final, Protocol
 
 from acquisition.clock import Clock
 from acquisition.errors import DeviceFaultError, LinkError
@@ -13,6 +13,7 @@ from wam.can_link import Link
 from wam.frames import (
     MOTOR_NODES,
     Group,
+    Payload,
     decode_position,
     encode_get,
     encode_torques,
@@ -33,16 +34,48 @@ class LinkCounters:
     """What the loop dropped on its way, counted instead of logged.
 
     Attributes:
-        stale: position replies that came after their cycle.
+        missing: questions for its position that each of motors 1 to 7 left open.
+        stale: position replies that came after their cycle, or twice.
         rejected: positions that jumped.
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
     """
 
+    missing: list[int] = field(default_factory=lambda: [0] * MOTORS)
     stale: int = 0
     rejected: int = 0
     malformed: int = 0
     link_errors: int = 0
+
+    def text(self) -> str:
+        """Return the counters in one line."""
+        return ", ".join(f"{name} {value}" for name, value in self.facts().items())
+
+    def facts(self) -> dict[str, str]:
+        """Return the counters as text for a recording, motors 1 to 7 in one line."""
+        return {
+            "link:missing_replies": " ".join(map(str, self.missing)),
+            "link:late_replies": str(self.stale),
+            "link:rejected_jumps": str(self.rejected),
+            "link:malformed_frames": str(self.malformed),
+            "link:bus_errors": str(self.link_errors),
+        }
+
+
+class Companion(Protocol):
+    """A device that is asked along with the positions, such as a wrist sensor.
+
+    The loop never waits for it: its frames are heard when they have come, in this cycle
+    or in a later one.
+    """
+
+    def request(self, t_ns: int) -> tuple[int, bytes]:
+        """Return identifier and bytes of the question that leaves at `t_ns`."""
+        ...
+
+    def hear(self, can_id: int, data: Payload) -> None:
+        """Take a frame that is no position, of whatever device; never raises."""
+        ...
 
 
 class CycleTraffic:
@@ -54,7 +87,9 @@ class CycleTraffic:
         sent: torques that the bus took last [puck units], motors 1 to 7.
         watch: safety module and pucks, asked in the free bus time.
         p_number: number of the property that holds a puck's position.
+        companion: asked right after the positions, while the pucks latch theirs.
         counters: what was dropped so far.
+        is_down: the bus refused the last question for positions.
     """
 
     def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
@@ -62,7 +97,10 @@ class CycleTraffic:
         self.arm_ns = 0
         self.sent = [0] * MOTORS
         self.watch = Watch(link, settings)
+        self.companion: Companion | None = None
         self.counters = LinkCounters()
+        self.is_down = False
+        self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
         self._link = link
         self._clock = clock
         self._settings = settings
@@ -75,17 +113,30 @@ class CycleTraffic:
         self._t_number = property_number(Device.MOTOR, "T", vers)
 
     def exchange(self, now_ns: int) -> None:
-        """Ask for all positions at `now_ns`; waits until `give_up_ns` at most."""
-        self.watch.begin_cycle()
+        """Ask for all positions at `now_ns`; waits until `give_up_ns` at most.
+
+        Replies carry no number. What has come by now is late and thrown away. A motor
+        that owes an earlier answer is given the time to send two: the last one counts.
+        """
+        self.watch.begin_cycle(now_ns)
         self.arm_ns = 0
         self.received = [None] * MOTORS
         try:
             self.counters.stale += self._collect()
+            if self._owed:
+                self._owed &= self._missing()
             self.received = [None] * MOTORS
             self._link.send(_ARM_ID, self._get_p)
+            self._ask_companion()
             self._await_replies(now_ns)
+            self.is_down = False
         except LinkError:
+            self.is_down = True
             self.counters.link_errors += 1
+        self._owed = self._missing()
+        if self._owed:
+            for i in range(MOTORS):
+                self.counters.missing[i] += self._owed >> i & 1
 
     def transmit(self, units: list[int]) -> bool:
         """Send torques [puck units]; return False when the bus refused a frame."""
@@ -106,16 +157,35 @@ class CycleTraffic:
         except LinkError:
             self.counters.link_errors += 1
 
+    def _ask_companion(self) -> None:
+        """Send the companion's question; a refusal does not cost the positions."""
+        if self.companion is None:
+            return
+        can_id, data = self.companion.request(self._clock.now_ns())
+        try:
+            self._link.send(can_id, data)
+        except LinkError:
+            self.counters.link_errors += 1
+
     def _await_replies(self, now_ns: int) -> None:
         clock, deadline_ns = self._clock, now_ns + self._settings.give_up_ns
         clock.sleep_until(now_ns + self._settings.first_look_ns)
-        if self._collect():
+        found = self._collect()
+        if found:
             self.arm_ns = clock.now_ns()
-        while None in self.received and clock.now_ns() < deadline_ns:
+        while (None in self.received or self._owed) and clock.now_ns() < deadline_ns:
             if not clock.wait(self._link, deadline_ns):
                 break
-            if self._collect():
+            if more := self._collect():
+                found += more
                 self.arm_ns = clock.now_ns()
+        self.counters.stale += found - MOTORS + self.received.count(None)
+
+    def _missing(self) -> int:
+        """Return the bits of the motors whose reply has not come."""
+        if None not in self.received:
+            return 0
+        return sum(1 << i for i, c in enumerate(self.received) if c is None)
 
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
@@ -124,9 +194,14 @@ class CycleTraffic:
             index = _POSITION_INDEX.get(can_id)
             try:
                 if index is not None:
-                    self.received[index] = decode_position(data)
+                    counts = decode_position(data)
+                    if self.received[index] is not None:
+                        self._owed &= ~(1 << index)
+                    self.received[index] = counts
                     found += 1
                 else:
+                    if self.companion is not None:
+                        self.companion.hear(can_id, data)
                     self.watch.hear(can_id, data)
             except DeviceFaultError:
                 self.counters.malformed += 1

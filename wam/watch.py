@@ -54,6 +54,7 @@ class Watch:
         self.is_lowering = False
         self._link = link
         self._settings = settings
+        self._now_ns = 0
         self._unanswered = 0
         self._hints_seen = 0
         self._has_asked = False
@@ -66,8 +67,9 @@ class Watch:
         """Use the property numbers of safety firmware `vers`."""
         self._pen = property_number(Device.SAFETY, "PEN", vers)
 
-    def begin_cycle(self) -> None:
-        """Let a cycle pass; its question may be asked."""
+    def begin_cycle(self, now_ns: int) -> None:
+        """Let the cycle of `now_ns` begin; its question may be asked."""
+        self._now_ns = now_ns
         self._has_asked = False
         self._until_mode -= 1
         self._until_pendant -= 1
@@ -111,7 +113,7 @@ class Watch:
         if reply.value is None:
             return
         if node is not None:
-            self.health.note(node, reply)
+            self.health.note(node, reply, self._now_ns)
         elif reply.number == _MODE:
             self.note_mode(decode_mode(reply.value))
         elif reply.number == self._pen:

@@ -1,3 +1,4 @@
+import ctypes
 import errno
 
 import pytest
@@ -100,3 +101,9 @@ def test_of_several_readings_the_tightest_counts():
 def test_the_uncertainty_is_half_the_tightest_reading():
     clock = UnevenClock([700] * 20)
     assert utc_offset_ns(clock)[1] == 700
+
+
+def test_the_kernel_is_asked_to_be_punctual():
+    SystemClock()
+    get_timer_slack = 30  # PR_GET_TIMERSLACK [ns], 50 us unless asked
+    assert ctypes.CDLL(None).prctl(get_timer_slack) == 1

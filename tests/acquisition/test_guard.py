@@ -299,6 +299,6 @@ def test_the_memory_of_late_cycles_does_not_grow():
     assert state.late == ()
 
 
-def test_silence_tells_how_long_and_how_many():
-    assert dict(judge(**missing(5)).facts) == {"ms": 10.0, "silent": 1.0}
-    assert dict(judge(**missing(25)).facts) == {"ms": 50.0}
+def test_silence_tells_how_long_and_which_motors():
+    assert dict(judge(**missing(5)).facts) == {"ms": 10.0, "silent": 0b0100000}
+    assert dict(judge(**missing(25)).facts) == {"ms": 50.0, "silent": 0b0100000}

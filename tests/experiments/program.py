@@ -92,8 +92,8 @@ def run_watched(config, data, *arguments, press=None):
     seen = []
 
     class Seen(fakes.rig.FakeRig):
-        def __init__(self, *arguments):
-            super().__init__(*arguments)
+        def __init__(self, *arguments, **named):
+            super().__init__(*arguments, **named)
             seen.append(self)
 
     with pytest.MonkeyPatch.context() as patch:

@@ -52,9 +52,9 @@ def sole(plant):
     return FRAME.axes() @ (position - np.array(FRAME.far_end))
 
 
-def make_rig(seed=1, terrain="S0", stones="small"):
+def make_rig(seed=1, terrain="S0", stones="small", network=None):
     clock = SteppedClock()
     scene = Scene(terrain, stones, "tread", FRAME, START_Q, seed)
-    rig = FakeRig(scene, CONSTANTS, TOOL, clock)
+    rig = FakeRig(scene, CONSTANTS, TOOL, clock, network=network)
     clock.world = rig
     return rig, clock

@@ -5,6 +5,7 @@ from weakref import finalize
 
 from acquisition.clock import Readable
 from fakes.can_bus import FakeCanBus
+from fakes.ft_puck import Load
 from fakes.network_options import NetworkOptions
 from fakes.pucks import PuckNetwork
 from wam.can_link import CanLink
@@ -68,10 +69,11 @@ class Rig:
         self,
         options: NetworkOptions | None = None,
         counts: Sequence[int] = (0,) * 7,
+        load: Load | None = None,
     ) -> None:
         self.clock = SteppedClock()
         self.motors = Motors(counts)
-        self.network = PuckNetwork(self.motors, options, self.clock.t_ns)
+        self.network = PuckNetwork(self.motors, options, self.clock.t_ns, load)
         self.bus = FakeCanBus(self.network, self.clock)
         self.clock.world = self.bus
         self.sent: list[tuple[int, int, bytes]] = []

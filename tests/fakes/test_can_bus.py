@@ -3,7 +3,7 @@ from itertools import pairwise
 import can
 import pytest
 
-from fakes.can_bus import FRAME_NS
+from fakes.schedule import FRAME_NS
 from tests.fakes.stepped import Rig
 
 

@@ -1,13 +1,16 @@
+import can
 import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from fakes.hand import Phase
+from fakes.network_options import NetworkOptions
 from fakes.randomness import NormalStream, OrnsteinUhlenbeck, Tremor, trial_generator
 from fakes.rig import Rehearsal, solve_start
 from ft_sensor.payload import TerrainFrame
 from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
+from wam.frames import decode_force, decode_torque
 
 S = 1_000_000_000
 
@@ -106,6 +109,43 @@ def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
     assert said() == b""
     hand.mend()
     assert said()
+
+
+@pytest.fixture
+def rig_with_sensor_on_bus():
+    rig, clock = make_rig(network=NetworkOptions(has_sensor=True))
+    yield rig, clock
+    rig.bus.shutdown()
+
+
+def ask_wrench(rig, clock):
+    """Return force and torque of node 8, None where it is silent."""
+    rig.bus.send(can.Message(arbitration_id=8, is_extended_id=False, data=b"\x36"))
+    clock.sleep_until(clock.now_ns() + S // 1000)
+    force, torque = rig.bus.recv(0), rig.bus.recv(0)
+    if force is None or torque is None:
+        return None
+    return *decode_force(force.data), *decode_torque(torque.data)[0]
+
+
+def test_a_sensor_on_the_bus_feels_what_the_plant_says(rig_with_sensor_on_bus):
+    rig, clock = rig_with_sensor_on_bus
+    felt = np.mean([ask_wrench(rig, clock) for _ in range(200)], axis=0)
+    true = rig.plant.sensor_load(clock.now_ns())
+    # 0.2 s of the sensor's errors: bias 0.24 N and 0.01 N m, drift as much, at 4 sigma.
+    assert felt[:3] == pytest.approx(true[:3], abs=1.3)
+    assert felt[3:] == pytest.approx(true[3:], abs=0.06)
+    assert abs(true[2]) > 3.0  # the foot hangs on it
+
+
+@pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
+def test_a_sensor_on_the_bus_falls_silent_too(rig_with_sensor_on_bus, fault):
+    rig, clock = rig_with_sensor_on_bus
+    hand = Rehearsal(rig)
+    hand.inject(fault)
+    assert ask_wrench(rig, clock) is None
+    hand.mend()
+    assert ask_wrench(rig, clock) is not None
 
 
 def test_every_known_fault_can_be_injected(rig_and_clock):

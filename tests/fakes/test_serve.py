@@ -53,6 +53,13 @@ def clock():
     return SteppedClock()
 
 
+def let_pass(server, clock, duration_ns):
+    """Let the server go on for `duration_ns`, or a tick more."""
+    end_ns = clock.t_ns + duration_ns
+    while clock.t_ns < end_ns:
+        server.step()
+
+
 def serve(hosts, clock, **options):
     motors = Motors()
     network = PuckNetwork(motors, NetworkOptions(**options), clock.t_ns)
@@ -69,6 +76,32 @@ def test_an_answer_leaves_within_a_millisecond(hosts, clock):
     assert hosts.gone == [(0x426, b"\x85\x00\x02\x00")]
 
 
+def test_answers_leave_one_after_the_other_as_on_a_wire(hosts, clock):
+    server, _ = serve(hosts, clock, has_sensor=True)
+    hosts.coming += [(0x404, b"\x30"), (8, b"\x36")]
+    begin_ns = clock.t_ns
+    left = []
+    while clock.t_ns < begin_ns + MS:
+        server.step()
+        left += [clock.t_ns - begin_ns] * (len(hosts.gone) - len(left))
+    # Latched after 75 us; a position has 76 bits, a force 101, and a bit takes 1 us.
+    # Frames leave with their first bit: the way to a host takes as long as the rest.
+    assert left == [1000 * (75 + 76 * n) for n in range(8)] + [1000 * (75 + 532 + 101)]
+    assert [can_id for can_id, _ in hosts.gone] == [
+        *(0x403 + 0x20 * n for n in range(1, 8)),
+        *(0x50A, 0x50B),
+    ]
+
+
+def test_the_lowest_identifier_leaves_first(hosts, clock):
+    server, _ = serve(hosts, clock)
+    hosts.coming += [(10, b"\x05"), (0x404, b"\x30")]
+    let_pass(server, clock, MS)
+    # The safety module is ready with the pucks; 0x546 is the highest of them.
+    assert hosts.gone[-1] == (0x546, b"\x85\0\x02\0")
+    assert len(hosts.gone) == 8
+
+
 def test_every_frame_of_the_bus_is_tapped(hosts, clock):
     server, _ = serve(hosts, clock)
     hosts.coming.append((1, b"\x05"))
@@ -81,8 +114,7 @@ def test_every_frame_of_the_bus_is_tapped(hosts, clock):
 def test_a_host_that_falls_silent_loses_an_active_arm(hosts, clock):
     server, _ = serve(hosts, clock)
     server.press("activate")
-    for _ in range(60):  # 2 ms each, the heartbeat's limit is 100 ms
-        server.step()
+    let_pass(server, clock, 120 * MS)  # the heartbeat's limit is 100 ms
     assert server.network.safety_mode is SafetyMode.IDLE
 
 
@@ -134,22 +166,19 @@ def test_an_arm_without_power_is_carried():
 def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
     server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=is_idle_first)
     assert server.state == state
-    hosts.coming += [(1, b"\x05"), (10, b"\x2a")]
-    for _ in range(3):
-        server.step()
-    asleep = [(0x426, b"\x85\0\0\0")] if is_idle_first else []
+    hosts.coming += [(1, b"\x05"), (8, b"\x05"), (10, b"\x2a")]
+    let_pass(server, clock, MS)
+    asleep = [(0x426, b"\x85\0\0\0"), (0x506, b"\x85\0\0\0")]
     not_zeroed = [(0x546, b"\xaa\0\0\0")]
-    assert sorted(hosts.gone) == asleep + not_zeroed
+    assert sorted(hosts.gone) == (asleep if is_idle_first else []) + not_zeroed
 
 
 def test_the_served_arm_stands_at_home(hosts, clock):
     server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=True)
     hosts.coming += [(node, b"\x85\0\x02\0\0\0") for node in range(1, 8)]
-    for _ in range(400):  # 0.8 s, longer than a puck takes to boot
-        server.step()
+    let_pass(server, clock, 800 * MS)  # longer than a puck takes to boot
     hosts.coming.append((4, b"\x42"))  # MECH
-    server.step()
-    server.step()
+    let_pass(server, clock, MS)
     counts = int(
         np.floor((CONSTANTS.j2mp @ CONSTANTS.home)[3] * CONSTANTS.cts[3] / 2 / np.pi)
     )

@@ -10,10 +10,11 @@ from fakes.network_options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.arm import WamArm
 from wam.frames import encode_set
-from wam.health import PuckHealth, health_facts, temperature_range
+from wam.health import PuckHealth, complaints, health_facts, temperature_range
 
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000
+S = 1_000_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 GET_MODE, GET_PEN = (0x00A, b"\x08"), (0x00A, b"\x2b")
 SET_IDLE = (0x00A, bytes.fromhex("88 00 01 00 00 00"))
@@ -68,10 +69,13 @@ def test_every_puck_is_asked_for_its_health_in_turn(bench):
 
 
 def test_the_newest_health_is_kept(bench):
-    assert bench.arm.health() == (PuckHealth(35, 33, 48, 0),) * 7
+    begin = bench.arm.health()
+    assert begin == (PuckHealth(35, 33, 48, 0, begin[0].heard_ns),) * 7
     bench.rig.network.set_bus_voltage(41.0)
     bench.run(28 * 50 + 1)
-    assert bench.arm.health() == (PuckHealth(35, 33, 41, 0),) * 7
+    end = bench.arm.health()
+    assert [p.bus_voltage for p in end] == [41] * 7
+    assert all(p.is_news(bench.rig.clock.t_ns) for p in end)
 
 
 def test_warnings_and_faults_of_the_pendant_are_heard(bench):
@@ -160,14 +164,33 @@ def test_an_arm_that_confirms_later_is_known_to_be_idle(bench):
 
 
 def test_temperatures_are_told_from_the_coldest_to_the_hottest():
-    pucks = [PuckHealth(31, 36), PuckHealth(33, None), PuckHealth()]
-    assert temperature_range(pucks) == "31-36 °C"
-    assert temperature_range([PuckHealth()]) == "temperatures unknown"
+    pucks = [PuckHealth(31, 36, heard_ns=0), PuckHealth(33, heard_ns=0), PuckHealth()]
+    assert temperature_range(pucks, S) == "31-36 °C"
+    assert temperature_range([PuckHealth()], S) == "temperatures unknown"
+
+
+def test_a_puck_that_falls_silent_is_shown_with_the_age_of_what_it_said(bench):
+    bench.rig.network.silence(3)
+    bench.run(7 * 50 * 5)  # five questions to each puck
+    now_ns, pucks = bench.rig.clock.t_ns, bench.arm.health()
+    assert (pucks[2].puck_degc, pucks[2].is_news(now_ns)) == (35, False)
+    assert temperature_range(pucks, now_ns) == "33-35 °C, puck 3 silent for 4 s"
+    facts = health_facts(pucks, now_ns)
+    assert facts["pucks:temperature_degc"] == "35 35 ? 35 35 35 35"
+    assert float(facts["pucks:age_s"].split()[2]) > 3.0
+
+
+def test_a_puck_that_is_hot_or_reports_an_error_is_named():
+    pucks = [PuckHealth(61, 30, 48, 0, 0), PuckHealth(60, 30, 48, 7, 0), PuckHealth()]
+    expected = ["puck 1 at 61 °C (limit 60)", "puck 2 reports error 7"]
+    assert complaints(pucks, S) == expected
+    assert complaints(pucks, 10 * S) == []
 
 
 def test_health_is_text_in_the_order_of_the_pucks():
-    facts = health_facts([PuckHealth(31, 29, 48, 0), PuckHealth(-5, None, 47, 3)])
-    assert facts == {
+    pucks = [PuckHealth(31, 29, 48, 0, S), PuckHealth(-5, None, 47, 3, 2 * S)]
+    assert health_facts(pucks, 2 * S) == {
+        "pucks:age_s": "1.0 0.0",
         "pucks:temperature_degc": "31 -5",
         "pucks:motor_temperature_degc": "29 ?",
         "pucks:bus_voltage": "48 47",

@@ -1,0 +1,207 @@
+"""What can go wrong on the simulated wire, one fault at a time."""
+
+from itertools import pairwise
+
+import can
+import pytest
+
+from acquisition.devices import SafetyMode
+from fakes.bus_faults import FOREIGN_IDS
+from fakes.faults import mend_network, network_faults
+from fakes.schedule import FRAME_NS
+from tests.fakes.stepped import Rig
+from wam.frames import decode_position, position_reply_id
+from wam.safety import Level
+
+MS = 1_000_000
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+THREE = position_reply_id(3)
+ALL = [position_reply_id(node) for node in range(1, 8)]
+
+
+@pytest.fixture
+def rig():
+    return Rig(counts=HOME_COUNTS)
+
+
+@pytest.fixture
+def faults(rig):
+    return rig.network.faults
+
+
+def ask(rig):
+    """Ask for all positions; return what arrives within two milliseconds."""
+    rig.link.send(0x404, b"\x30")
+    rig.rest(2 * MS)
+    return [(frame.can_id, bytes(frame.data)) for frame in rig.link.receive()]
+
+
+def ids(frames):
+    return [can_id for can_id, _ in frames]
+
+
+def test_the_next_replies_are_lost_and_no_more(rig, faults):
+    faults.drop(THREE, 2)
+    assert [ids(ask(rig)).count(THREE) for _ in range(4)] == [0, 0, 1, 1]
+
+
+def test_a_share_of_the_replies_is_lost_the_same_one_in_every_run():
+    def losses():
+        rig = Rig(counts=HOME_COUNTS)
+        rig.network.faults.drop(THREE, None, share=0.2)
+        return [THREE not in ids(ask(rig)) for _ in range(300)]
+
+    lost = losses()
+    assert 35 <= sum(lost) <= 85  # 60 expected, 7 is a standard deviation
+    assert lost == losses()
+
+
+def test_a_late_reply_comes_late_and_the_others_do_not(rig, faults):
+    faults.delay(THREE, 5 * MS)
+    assert ids(ask(rig)) == [i for i in ALL if i != THREE]
+    rig.rest(5 * MS)
+    assert [frame.can_id for frame in rig.link.receive()] == [THREE]
+
+
+def test_replies_of_one_puck_never_overtake_each_other(rig, faults):
+    faults.delay(THREE, 5 * MS)
+    seen = []
+    for position in (100, 200, 300, 400):
+        rig.motors.position[2] = position
+        seen += [decode_position(d) for i, d in ask(rig) if i == THREE]
+    rig.rest(5 * MS)
+    seen += [decode_position(f.data) for f in rig.link.receive()]
+    assert seen == [100, 200, 300, 400]
+
+
+def test_a_doubled_reply_comes_twice(rig, faults):
+    faults.duplicate(THREE)
+    assert [ids(ask(rig)).count(THREE) for _ in range(2)] == [2, 1]
+
+
+def test_a_corrupted_reply_differs_in_one_byte(rig, faults):
+    (clean,) = [d for i, d in ask(rig) if i == THREE]
+    faults.corrupt(THREE, byte=1)
+    (spoilt,) = [d for i, d in ask(rig) if i == THREE]
+    assert [a ^ b for a, b in zip(clean, spoilt, strict=True)] == [0, 0xFF, 0]
+
+
+@pytest.mark.parametrize("load", [0.3, 0.6])
+def test_a_flood_uses_its_share_of_the_bus(rig, faults, load):
+    faults.flood(load)
+    rig.rest(500 * MS)
+    found = [frame.can_id for frame in rig.link.receive()]
+    while frames := rig.link.receive():
+        found += [frame.can_id for frame in frames]
+    # Pauses vary by half: 29 % of one pause, over some 1,300 of them below 1 %.
+    assert len(found) * FRAME_NS[8] / (500 * MS) == pytest.approx(load, rel=0.03)
+    assert set(found) == set(FOREIGN_IDS)
+
+
+def test_a_flood_delays_replies_as_far_as_its_identifiers_win(rig, faults):
+    def last_reply(chosen):
+        faults.mend()
+        faults.flood(0.4, chosen)
+        begin = rig.clock.t_ns
+        rig.link.send(0x404, b"\x30")
+        rig.rest(2 * MS)
+        stamps = [f.stamp for f in rig.link.receive() if f.can_id in ALL]
+        assert len(stamps) == 7
+        return max(stamps) * 1e9 - begin
+
+    first, last = FOREIGN_IDS
+    alone = FRAME_NS[1] + 75_000 + 7 * FRAME_NS[3]
+    # Who loses can be on the wire already when the question comes, and the replies.
+    assert last_reply([last]) <= alone + 2 * FRAME_NS[8]
+    assert last_reply([first]) > alone + 2 * FRAME_NS[8]
+
+
+def test_a_controller_that_is_off_neither_sends_nor_receives(rig, faults):
+    rig.link.send(0x404, b"\x30")
+    rig.rest(MS)
+    faults.go_off()
+    with pytest.raises(can.CanOperationError, match="bus-off"):
+        rig.bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"\5"))
+    with pytest.raises(can.CanOperationError, match="bus-off"):
+        rig.bus.recv(0)
+    faults.mend()
+    assert rig.bus.recv(0) is None  # what waited is gone
+    assert ids(ask(rig)) == ALL
+
+
+def test_mending_ends_every_fault_of_the_wire(rig, faults):
+    faults.drop(THREE, None)
+    faults.flood(0.9)
+    ask(rig)
+    faults.mend()
+    ask(rig)
+    assert ids(ask(rig)) == ALL
+
+
+def test_swapped_replies_arrive_behind_the_others(rig):
+    network_faults(rig.network)["reply-swapped"]()
+    assert ids(ask(rig)) == [*(i for i in ALL if i != THREE), THREE]
+
+
+@pytest.mark.parametrize(
+    ("name", "monitor", "mode"),
+    [
+        ("safety-speed", "velocity", SafetyMode.IDLE),
+        ("safety-torque", "torque", SafetyMode.IDLE),
+        ("safety-heartbeat", "heartbeat", SafetyMode.IDLE),
+        ("safety-voltage", "voltage", SafetyMode.E_STOP),
+    ],
+)
+def test_a_monitor_faults_and_can_be_cleared_once_it_is_mended(
+    rig, name, monitor, mode
+):
+    def move(cycles=60):  # of 2 ms: longer than the heartbeat
+        for _ in range(cycles):
+            rig.motors.position[3] += 20
+            ask(rig)
+            rig.link.send(0x401, bytes.fromhex("aa 00 0b ff f0 00 bf fe"))
+
+    rig.network.pendant("activate")
+    move()
+    assert rig.network.safety_mode is SafetyMode.ACTIVE
+    network_faults(rig.network)[name]()
+    move()
+    assert rig.network.safety_mode is mode
+    assert getattr(rig.network.pendant_word, monitor) is Level.FAULT
+    mend_network(rig.network)
+    rig.network.pendant("idle")
+    rig.network.pendant("activate")
+    move(40)  # pucks that lost their power are asleep, which is no lost heartbeat yet
+    assert rig.network.safety_mode is SafetyMode.ACTIVE
+
+
+@pytest.mark.parametrize(
+    ("name", "request_", "ill", "well"),
+    [("puck-hot", 9, 72, 35), ("puck-error", 4, 7, 0)],
+)
+def test_an_ill_puck_says_so_until_it_is_mended(rig, name, request_, ill, well):
+    def answer():
+        rig.link.send(3, bytes((request_,)))
+        rig.rest(MS)
+        return rig.link.receive()[0].data[2]
+
+    network_faults(rig.network)[name]()
+    assert answer() == ill
+    mend_network(rig.network)
+    assert answer() == well
+
+
+def test_a_puck_that_rebooted_is_silent_for_positions_but_not_dead(rig):
+    network_faults(rig.network)["puck-reboot"]()
+    assert ids(ask(rig)) == [i for i in ALL if i != THREE]
+    rig.link.send(3, b"\x05")
+    rig.rest(MS)
+    assert bytes(rig.link.receive()[0].data) == b"\x85\0\0\0"  # STAT 0
+
+
+def test_replies_on_a_quiet_wire_follow_each_other_closely(rig):
+    rig.link.send(0x404, b"\x30")
+    rig.rest(2 * MS)
+    stamps = [f.stamp for f in rig.link.receive()]
+    gaps = [round((b - a) * 1e9) for a, b in pairwise(stamps)]
+    assert gaps == pytest.approx([FRAME_NS[3]] * 6, abs=2)  # floats of seconds

@@ -1,0 +1,244 @@
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from fakes.ft_puck import RANGES, STEPS, Load
+from fakes.network_options import NetworkOptions
+from fakes.pucks import PuckNetwork
+from fakes.sensor_errors import SensorErrors
+from tests.fakes.stepped import Motors
+from wam.frames import decode_force, decode_torque
+
+MS = 1_000_000
+LOAD = (1.0, -2.5, -9.76, 0.099, -0.249, 0.015)  # whole steps of the sensor
+REST = [0.0] * 6
+
+
+class Host:
+    """Talks to the sensor of a network without a bus between them."""
+
+    def __init__(self, load=REST, **options):
+        self.load = list(load)
+        options = NetworkOptions(has_sensor=True, **options)
+        felt = Load(lambda _: self.load)
+        self.network = PuckNetwork(Motors(), options, load=felt)
+        self.t_ns = 0
+
+    def say(self, data, can_id=8):
+        """Send a frame; return what comes back within a millisecond."""
+        self.network.receive(self.t_ns, can_id, bytes.fromhex(data))
+        return self.hear(MS)
+
+    def hear(self, duration_ns):
+        self.t_ns += duration_ns
+        return [
+            f"{can_id:03x} {data.hex(' ')}"
+            for _, can_id, data in self.network.due(self.t_ns)
+        ]
+
+    def wrench(self):
+        """Ask for force and torque; return them and the status."""
+        force, torque = self.say("36")
+        return (
+            decode_force(bytes.fromhex(force[4:])),
+            *decode_torque(bytes.fromhex(torque[4:])),
+        )
+
+
+@pytest.mark.parametrize(
+    ("request_", "reply"),
+    [
+        ("05", "506 85 00 02 00"),
+        ("01", "506 81 00 06 00"),
+        ("03", "506 83 00 08 00"),
+        ("1a", "506 9a 00 0a 00"),  # GRPA
+        ("2a", "506 aa 00 00 08"),  # SG1 at rest: 2048
+        ("2f", "506 af 00 00 08"),  # SG6
+        ("3d", "506 bd 00 00 08"),  # T1
+        ("40", "50c 00 00 00 00 3a 27"),
+        ("39", "506 b9 00 3a 27"),  # AZ
+    ],
+)
+def test_a_get_is_answered_with_the_known_bytes(request_, reply):
+    assert Host().say(request_) == [reply]
+
+
+def test_one_question_for_the_wrench_has_two_answers():
+    host = Host((1.0, -2.5, -9.76, 0.0, -0.249, 0.015))
+    force, torque = host.say("36")
+    assert force == "50a 00 01 80 fd 3d f6"  # 256 counts a newton
+    assert torque == "50b 00 00 04 fc 3d 00"  # 4096 counts a newton metre
+
+
+def test_the_wrench_is_that_of_75_us_after_the_question():
+    host = Host()
+    host.network.receive(0, 8, b"\x36")
+    host.network.advance(74_999)
+    host.load[0] = 8.0
+    (ready_ns, _, data), _ = host.network.due(MS)
+    assert (ready_ns, decode_force(data)[0]) == (75_000, 8.0)
+
+
+def test_components_are_told_one_by_one_as_in_the_frames():
+    host = Host(LOAD)
+    force, torque = host.say("36")
+    told = "".join(host.say(f"{n:02x}")[0][-5:].replace(" ", "") for n in range(48, 54))
+    assert told == (force[4:] + torque[4:]).replace(" ", "")
+
+
+def test_readings_come_in_the_steps_of_the_data_sheet():
+    host = Host([0.51 * step for step in STEPS])
+    force, torque, _ = host.wrench()
+    # Half a count of the frame.
+    assert force == pytest.approx(STEPS[:3], abs=0.002)
+    assert torque == pytest.approx(STEPS[3:], abs=0.00013)
+
+
+def test_a_set_is_never_answered_but_an_led_is_kept():
+    host = Host()
+    assert host.say("bc 00 01 00 00 00") == []
+    assert host.say("3c") == ["506 bc 00 01 00"]
+
+
+@pytest.mark.parametrize(("number", "count"), [("ba", 36), ("bb", 6)])
+def test_calibrations_are_taken_without_a_word(number, count):
+    host = Host(LOAD)
+    before = host.say("36")
+    for _ in range(count):
+        assert host.say(f"{number} 00 85 ff ff ff") == []  # -123
+    assert host.say("36") == before
+    assert host.say(f"{int(number, 16) & 0x7F:02x}") == []
+
+
+def test_a_tare_is_not_answered_and_zeroes_the_present_load():
+    host = Host(LOAD)
+    assert host.say("b6 00 00 00 00 00") == []
+    assert host.wrench() == ((0, 0, 0), (0, 0, 0), 0)
+    host.load[2] += 5.04
+    assert host.wrench()[0][2] == pytest.approx(5.04, abs=0.002)
+
+
+def test_only_zero_tares():
+    host = Host(LOAD)
+    host.say("b6 00 01 00 00 00")
+    assert host.wrench()[0][0] == 1.0
+
+
+def test_a_saturated_gauge_is_told_and_stays_told_until_the_tare():
+    host = Host()
+    assert len(host.say("36")[1]) == len("50b") + 3 * 6  # six bytes
+    host.load[2] = -140.0
+    assert host.wrench()[2] == 0xC4
+    host.load[2] = 0.0
+    assert host.wrench()[2] == 0x84
+    host.say("b6 00 00 00 00 00")
+    assert host.wrench()[2] == 0
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_each_gauge_ends_at_the_range_of_its_axis(axis):
+    host = Host()
+    host.load[axis] = 0.99 * RANGES[axis]
+    assert host.wrench()[2] == 0
+    host.load[axis] = 1.01 * RANGES[axis]
+    force, torque, status = host.wrench()
+    assert status == 0xC0 | 1 << axis
+    shown = (*force, *torque)[axis]
+    # What the frame cannot carry is clipped; half a count of torque.
+    assert shown == pytest.approx(min(RANGES[axis], 127.996), abs=0.001)
+    assert host.say(f"{42 + axis:02x}")[0][-5:] == "ff 0f"
+
+
+def test_a_force_beyond_the_frame_is_clipped_though_no_gauge_complains():
+    host = Host((0, 0, 130.0, 0, 0, 0))
+    force, _, status = host.wrench()
+    assert (force[2], status) == (0x7FFF / 256, 0)
+
+
+def test_the_same_errors_as_on_a_serial_sensor_are_added():
+    network = PuckNetwork(
+        Motors(),
+        NetworkOptions(has_sensor=True),
+        load=Load(lambda _: REST, SensorErrors(np.random.default_rng(1))),
+    )
+    twin = SensorErrors(np.random.default_rng(1))
+    network.receive(0, 8, b"\x36")
+    force = decode_force(network.due(MS)[0][2])
+    # Half a step of the sensor.
+    assert force[0] == pytest.approx(twin.apply(75_000, REST)[0], abs=0.03)
+
+
+def test_a_sleeping_sensor_knows_the_monitors_properties_only():
+    host = Host(are_asleep=True)
+    assert host.say("05") == ["506 85 00 00 00"]
+    assert host.say("00") == ["506 80 00 05 00"]
+    assert host.say("01") == ["506 81 00 06 00"]
+    for other in ("36", "2a", "40", "b6 00 00 00 00 00"):
+        assert host.say(other) == []
+
+
+def test_a_woken_sensor_is_silent_while_it_boots():
+    host = Host(are_asleep=True)
+    assert host.say("85 00 02 00 00 00") == []
+    assert host.say("05") == []
+    host.hear(600 * MS)
+    assert host.say("05") == ["506 85 00 02 00"]
+    assert len(host.say("36")) == 2
+
+
+def test_a_reset_sensor_is_back_in_its_monitor_and_has_lost_its_tare():
+    host = Host(LOAD)
+    host.say("b6 00 00 00 00 00")
+    host.say("85 00 00 00 00 00")
+    assert host.say("05") == []
+    host.hear(500 * MS)
+    assert host.say("05") == ["506 85 00 00 00"]
+    host.say("85 00 02 00 00 00")
+    host.hear(600 * MS)
+    assert host.wrench()[0][0] == 1.0
+
+
+def test_a_rebooted_sensor_sleeps():
+    host = Host()
+    host.network.reboot(8)
+    assert host.say("05") == ["506 85 00 00 00"]
+
+
+def test_an_e_stop_takes_the_sensor_off_the_bus_even_in_mid_answer():
+    host = Host()
+    host.network.receive(0, 8, b"\x36")
+    host.network.pendant("estop")
+    assert host.hear(MS) == ["540 88 00 00 00"]
+    assert host.say("05") == []
+    host.network.pendant("idle")
+    host.hear(MS)
+    assert host.say("05") == ["506 85 00 00 00"]
+
+
+def test_a_stopped_arm_has_no_sensor():
+    assert Host(safety_mode=SafetyMode.E_STOP).say("05") == []
+
+
+def test_a_mute_sensor_hears_and_does_not_speak():
+    host = Host(LOAD)
+    host.network.silence(8)
+    assert host.say("05") == host.say("36") == host.say("40") == []
+    host.say("b6 00 00 00 00 00")
+    host.network.silence(8, is_mute=False)
+    assert host.wrench()[0] == (0, 0, 0)
+
+
+def test_frames_to_the_whole_bus_or_arm_are_not_for_the_sensor():
+    host = Host()
+    heard = host.say("05", 0x400) + host.say("05", 0x404)
+    assert heard
+    assert not [frame for frame in heard if frame.startswith("50")]
+
+
+def test_a_network_without_a_sensor_has_nothing_to_silence():
+    network = PuckNetwork(Motors())
+    network.silence(8)
+    network.reboot(8)
+    network.set_bus_voltage(47.0)
+    network.receive(0, 8, b"\x05")
+    assert network.due(MS) == []

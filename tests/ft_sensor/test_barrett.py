@@ -1,0 +1,313 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import DeviceFaultError, LinkTimeoutError
+from fakes.ft_puck import Load
+from fakes.network_options import NetworkOptions
+from ft_sensor.barrett import BarrettSensor
+from ft_sensor.barrett_frames import (
+    SAMPLING_DELAY_NS,
+    BarrettCounters,
+    WrenchPairing,
+    status_words,
+)
+from tests.fakes.stepped import Rig, SteppedClock
+from wam.arm import WamArm
+from wam.frames import encode_force, encode_torque
+
+MS = 1_000_000
+CYCLE_NS = 2 * MS
+FORCE_ID, TORQUE_ID = 0x50A, 0x50B
+FORCE = bytes.fromhex("00 01 80 fd 31 f6")  # (1.0, -2.5, -9.81) N
+TORQUE = bytes.fromhex("9a 01 00 fc 3d 00")  # (0.1, -0.25, 0.015) N m
+ZERO = np.zeros(7)
+
+
+# --- pairing --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pairing():
+    pairing = WrenchPairing(BarrettCounters())
+    pairing.ask(5 * MS)
+    return pairing
+
+
+def hear(pairing, *frames):
+    """Return the samples that `frames` complete."""
+    samples = [pairing.hear(can_id, data) for can_id, data in frames]
+    return [sample for sample in samples if sample is not None]
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_force_and_torque_in_either_order_make_one_sample(pairing, order):
+    (sample,) = hear(pairing, *[(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)][::order])
+    # Half a count of each.
+    assert sample.wrench[:3] == pytest.approx((1.0, -2.5, -9.81), abs=0.002)
+    assert sample.wrench[3:] == pytest.approx((0.1, -0.25, 0.015), abs=0.00013)
+    assert (sample.status, sample.is_valid, sample.is_saturated) == (0, True, False)
+    assert sample.t_ns == 5 * MS + SAMPLING_DELAY_NS
+
+
+@pytest.mark.parametrize(
+    ("status", "is_valid", "is_saturated"),
+    [(0x80, True, False), (0x84, True, True), (0x01, True, True), (0xC4, False, True)],
+)
+def test_the_status_after_the_torque_judges_the_force_too(
+    pairing, status, is_valid, is_saturated
+):
+    (sample,) = hear(pairing, (FORCE_ID, FORCE), (TORQUE_ID, TORQUE + bytes((status,))))
+    assert (sample.is_valid, sample.is_saturated) == (is_valid, is_saturated)
+    assert sample.status == status
+
+
+@pytest.mark.parametrize(
+    ("wrench", "is_saturated"),
+    [
+        ((79.9, 0, 0, 0, 0, 0), False),
+        ((0, -80.0, 0, 0, 0, 0), True),
+        ((0, 0, 127.9, 0, 0, 0), False),
+        ((0, 0, 135.0, 0, 0, 0), True),
+        ((0, 0, -135.0, 0, 0, 0), True),
+        ((0, 0, 0, 2.74, 0, 0), False),
+        ((0, 0, 0, 0, 0, -2.75), True),
+    ],
+)
+def test_a_reading_at_its_range_is_saturated(pairing, wrench, is_saturated):
+    force, torque = encode_force(wrench[:3]), encode_torque(wrench[3:])
+    (sample,) = hear(pairing, (FORCE_ID, force), (TORQUE_ID, torque))
+    assert sample.is_saturated == is_saturated
+    assert sample.is_valid
+
+
+@pytest.mark.parametrize("half", [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)])
+def test_half_an_answer_is_counted_and_pairs_with_no_later_one(half):
+    counters = BarrettCounters()
+    pairing = WrenchPairing(counters)
+    pairing.ask(0)
+    hear(pairing, half)
+    pairing.ask(CYCLE_NS)
+    assert (counters.unpaired, counters.unanswered) == (1, 1)
+    other = (FORCE_ID, FORCE) if half[0] == TORQUE_ID else (TORQUE_ID, TORQUE)
+    assert hear(pairing, other) == []
+
+
+@pytest.mark.parametrize("half", [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)])
+def test_of_two_equal_halves_the_first_is_dropped(half):
+    counters = BarrettCounters()
+    pairing = WrenchPairing(counters)
+    pairing.ask(0)
+    assert hear(pairing, half, half) == []
+    assert counters.unpaired == 1
+
+
+def test_an_answer_nobody_asked_for_is_dropped():
+    counters = BarrettCounters()
+    pairing = WrenchPairing(counters)
+    pairing.ask(0)
+    answer = [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)]
+    assert len(hear(pairing, *answer, *answer)) == 1
+    assert (counters.samples, counters.unasked) == (1, 1)
+
+
+def test_frames_that_contradict_the_protocol_are_counted():
+    counters = BarrettCounters()
+    pairing = WrenchPairing(counters)
+    pairing.ask(0)
+    assert hear(pairing, (FORCE_ID, FORCE + b"\0"), (TORQUE_ID, b"")) == []
+    assert counters.malformed == 2
+
+
+frames = st.tuples(
+    st.sampled_from([FORCE_ID, TORQUE_ID, 0x506, 0x423]), st.binary(max_size=8)
+)
+
+
+@given(st.lists(st.one_of(frames, st.none()), max_size=30))
+def test_no_frames_make_more_samples_than_questions(heard):
+    counters = BarrettCounters()
+    pairing = WrenchPairing(counters)
+    samples = []
+    for t_ns, frame in enumerate(heard):
+        if frame is None:
+            pairing.ask(t_ns)
+        else:
+            samples += hear(pairing, frame)
+    assert len(samples) == counters.samples <= heard.count(None)
+    times = [sample.t_ns for sample in samples]
+    assert times == sorted(set(times))
+
+
+def test_a_status_is_told_in_words():
+    assert status_words(0) == ()
+    assert status_words(0x80) == ("tare suggested",)
+    assert status_words(0xC4) == (
+        "data bad now",
+        "gauge 3 saturated since the tare",
+        "tare suggested",
+    )
+    assert status_words(0x21) == (
+        "gauge 1 saturated since the tare",
+        "gauge 6 saturated since the tare",
+    )
+
+
+# --- the sensor on a bus --------------------------------------------------------------
+
+
+class Bench:
+    """A sensor and an arm on one simulated bus."""
+
+    def __init__(self, load=lambda _: (0.0,) * 6, **options):
+        options = NetworkOptions(**({"has_sensor": True} | options))
+        self.rig = Rig(options, load=Load(load))
+        self.network, self.clock = self.rig.network, self.rig.clock
+        self.sensor = BarrettSensor(self.rig.link, self.clock)
+        self.arm = WamArm(self.rig.link, self.clock)
+
+    def started(self):
+        self.arm.start()
+        self.sensor.open()
+        self.arm.accompany(self.sensor)
+        self.rig.sent.clear()
+        return self
+
+    def run(self, cycles):
+        """Read, send and poll for some cycles; return (start, samples) of each."""
+        found = []
+        for _ in range(cycles):
+            reading = self.arm.read(self.clock.t_ns)
+            assert reading.is_complete
+            found.append((reading.host_ns, self.sensor.poll(reading.host_ns)))
+            self.arm.send(ZERO, ZERO)
+            self.clock.sleep_until(reading.host_ns + CYCLE_NS)
+        return found
+
+
+def test_the_wrench_is_asked_for_right_after_the_positions():
+    bench = Bench().started()
+    begin_ns = bench.clock.t_ns
+    bench.run(1)
+    assert bench.rig.sent[:2] == [
+        (begin_ns, 0x404, b"\x30"),
+        (begin_ns, 0x008, b"\x36"),
+    ]
+
+
+def test_every_cycle_but_the_first_has_the_sample_of_the_one_before():
+    bench = Bench().started()
+    found = bench.run(50)
+    assert found[0][1] == []
+    for (asked_ns, _), (_, (sample,)) in pairwise(found):
+        assert sample.t_ns == asked_ns + SAMPLING_DELAY_NS
+    assert bench.sensor.counters == BarrettCounters(samples=49 + 20)
+
+
+def test_a_sample_is_dated_with_the_instant_at_which_it_was_taken():
+    # The load tells the time: 1 N for each 0.1 s.
+    begin_ns = SteppedClock().t_ns
+    bench = Bench(lambda t_ns: ((t_ns - begin_ns) * 1e-8, 0, 0, 0, 0, 0)).started()
+    samples = [sample for _, (sample, *_) in bench.run(500)[1:]]
+    shown = np.array([sample.wrench[0] for sample in samples])
+    true = np.array([(sample.t_ns - begin_ns) * 1e-8 for sample in samples])
+    # Steps of 0.05 N and counts of 4 mN, which average to nothing; 1 mN is 0.1 ms.
+    assert np.abs(shown - true).max() < 0.028
+    assert np.mean(shown - true) == pytest.approx(0.0, abs=0.001)
+
+
+def test_positions_come_as_early_with_the_sensor_as_without():
+    def arrival(bench):
+        bench.arm.start()
+        if bench.network.options.has_sensor:
+            bench.sensor.open()
+            bench.arm.accompany(bench.sensor)
+        reading = bench.arm.read(bench.clock.t_ns)
+        return reading.arm_ns - reading.host_ns
+
+    assert arrival(Bench()) == arrival(Bench(has_sensor=False))
+
+
+def test_a_silent_sensor_costs_the_arm_nothing():
+    bench = Bench().started()
+    bench.network.silence(8)
+    found = bench.run(20)
+    assert not any(samples for _, samples in found)
+    assert bench.sensor.counters.unanswered == 19
+
+
+def test_the_arms_start_up_wakes_the_sensor_with_the_pucks():
+    bench = Bench(are_asleep=True)
+    bench.arm.start()
+    bench.rig.sent.clear()
+    bench.sensor.open()
+    assert (8, b"\x85\0\2\0\0\0") not in [(i, data) for _, i, data in bench.rig.sent]
+
+
+def test_a_sensor_opened_first_is_woken_and_left_alone_while_it_boots():
+    bench = Bench(are_asleep=True)
+    bench.sensor.open()
+    times = [t for t, _, _ in bench.rig.sent]
+    wake = bench.rig.sent.index((times[1], 8, b"\x85\0\2\0\0\0"))
+    assert times[wake + 1] - times[wake] >= 1000 * MS
+
+
+def test_an_opened_sensor_says_who_it_is():
+    facts = Bench().started().sensor.describe()
+    assert facts["model"] == "Barrett force/torque sensor, node 8"
+    assert facts["serial_number"] == "1008"
+    assert facts["role"] == "ROLE 0x0006"
+    assert facts["measured_rate"] == "20 of 20 questions answered"
+
+
+def test_opening_sends_no_tare():
+    bench = Bench()
+    bench.sensor.open()
+    assert not [data for _, _, data in bench.rig.sent if data[0] == 0xB6]
+
+
+def test_a_missing_sensor_is_told():
+    with pytest.raises(LinkTimeoutError, match="node 8\\) does not answer") as caught:
+        Bench(has_sensor=False).sensor.open()
+    assert "ft_sensor.kind" in caught.value.hint
+
+
+def test_a_sensor_that_does_not_wake_up_is_told():
+    with pytest.raises(DeviceFaultError, match="STAT unknown, not 2"):
+        Bench(are_asleep=True, boot_ns=5000 * MS).sensor.open()
+
+
+def test_a_node_without_force_and_torque_is_told():
+    bench = Bench()
+    bench.network.faults.drop(TORQUE_ID, count=None)
+    with pytest.raises(LinkTimeoutError, match=r"no force and torque \(ROLE 0x0006\)"):
+        bench.sensor.open()
+
+
+def test_a_sensor_with_a_saturated_gauge_is_refused():
+    with pytest.raises(DeviceFaultError, match="data bad now, gauge 2 saturated"):
+        Bench(lambda _: (0, 90.0, 0, 0, 0, 0)).sensor.open()
+
+
+def test_a_tare_is_told_to_the_sensor_and_its_first_reading_thrown_away():
+    bench = Bench(lambda _: (1.0, -2.0, 4.0, 0, 0, 0))
+    bench.sensor.open()
+    bench.sensor.tare()
+    assert [data for _, _, data in bench.rig.sent[-2:]] == [b"\xb6\0\0\0\0\0", b"\x36"]
+    assert bench.sensor.poll(0) == []
+    bench.arm.start()
+    bench.arm.accompany(bench.sensor)
+    assert bench.run(2)[1][1][0].wrench == (0.0,) * 6
+
+
+def test_closing_twice_forgets_what_was_heard():
+    bench = Bench().started()
+    bench.arm.read(bench.clock.t_ns)
+    bench.rig.rest(CYCLE_NS)
+    bench.arm.read(bench.clock.t_ns)
+    bench.sensor.close()
+    bench.sensor.close()
+    assert bench.sensor.poll(0) == []

@@ -1,0 +1,93 @@
+"""A device that is asked along with the positions, and what it costs the arm."""
+
+import numpy as np
+import pytest
+
+from acquisition.errors import LinkError
+from fakes.network_options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+
+CYCLE_NS = 2_000_000
+FORCE, TORQUE = 0x50A, 0x50B
+
+
+class Listener:
+    """Asks for the wrench and remembers what it was told."""
+
+    def __init__(self):
+        self.asked, self.heard = [], []
+
+    def request(self, t_ns):
+        self.asked.append(t_ns)
+        return 8, b"\x36"
+
+    def hear(self, can_id, data):
+        self.heard.append((can_id, bytes(data)))
+
+
+@pytest.fixture
+def rig():
+    return Rig(NetworkOptions(has_sensor=True))
+
+
+@pytest.fixture
+def listener():
+    return Listener()
+
+
+@pytest.fixture
+def arm(rig, listener):
+    arm = WamArm(rig.link, rig.clock)
+    arm.start()
+    arm.accompany(listener)
+    rig.sent.clear()
+    return arm
+
+
+def test_it_is_asked_once_a_cycle_right_after_the_positions(rig, arm, listener):
+    begin_ns = rig.clock.t_ns
+    arm.read(begin_ns)
+    assert [(can_id, data) for _, can_id, data in rig.sent[:2]] == [
+        (0x404, b"\x30"),
+        (0x008, b"\x36"),
+    ]
+    assert listener.asked == [begin_ns]
+
+
+def test_it_is_not_waited_for(rig, arm, listener):
+    reading = arm.read(rig.clock.t_ns)
+    assert reading.is_complete
+    assert FORCE not in {can_id for can_id, _ in listener.heard}
+    assert rig.clock.t_ns - reading.host_ns < 800_000  # the torque comes at 0.87 ms
+
+
+def test_what_came_after_the_positions_is_heard_in_the_next_cycle(rig, arm, listener):
+    begin_ns = rig.clock.t_ns
+    arm.read(begin_ns)
+    rig.clock.sleep_until(begin_ns + CYCLE_NS)
+    arm.read(begin_ns + CYCLE_NS)
+    heard = [can_id for can_id, _ in listener.heard if can_id in (FORCE, TORQUE)]
+    assert heard == [FORCE, TORQUE]
+
+
+def test_it_hears_no_positions(rig, arm, listener):
+    for n in range(3):
+        rig.clock.sleep_until(rig.clock.t_ns // CYCLE_NS * CYCLE_NS + CYCLE_NS)
+        arm.read(rig.clock.t_ns)
+        arm.send(np.zeros(7), np.zeros(7))
+        assert n < 1 or listener.heard
+    assert not [can_id for can_id, _ in listener.heard if can_id & 0x1F == 3]
+
+
+def test_a_bus_that_refuses_its_question_keeps_the_positions(rig, arm, monkeypatch):
+    send = rig.link.send
+
+    def refuse(can_id, data):
+        if can_id == 8:
+            raise LinkError("full")
+        send(can_id, data)
+
+    monkeypatch.setattr(rig.link, "send", refuse)
+    assert arm.read(rig.clock.t_ns).is_complete
+    assert arm.counters.link_errors == 1

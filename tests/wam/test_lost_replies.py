@@ -1,0 +1,185 @@
+"""What the driver makes of replies that are missing, late, doubled or wrong."""
+
+import numpy as np
+import pytest
+
+from fakes.bus_faults import BusFaults
+from fakes.faults import network_faults
+from fakes.network_options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+from wam.arm_settings import ArmSettings
+from wam.frames import position_reply_id
+
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+ZERO = np.zeros(7)
+CYCLE_NS = 2_000_000
+STEP = 20  # counts that each motor moves in a cycle
+# A reply so late comes between the next question and its answer.
+ALMOST_A_CYCLE_NS = 1_950_000
+
+
+class Bench:
+    """An arm whose motors move steadily, read every 2 ms.
+
+    Attributes:
+        took_ns: how long the last reading took.
+    """
+
+    def __init__(self, **settings) -> None:
+        options = NetworkOptions(heartbeat_ns=100_000_000_000)
+        self.rig = Rig(options, HOME_COUNTS)
+        self.arm = WamArm(self.rig.link, self.rig.clock, ArmSettings(**settings))
+        self.arm.start()
+        self.took_ns = 0
+        self.faults: BusFaults = self.rig.network.faults
+
+    def cycle(self):
+        rig = self.rig
+        rig.motors.position = [p + STEP for p in rig.motors.position]
+        reading = self.arm.read(rig.clock.t_ns)
+        self.took_ns = rig.clock.t_ns - reading.host_ns
+        if reading.is_complete:
+            self.arm.send(ZERO, ZERO)
+        rig.clock.sleep_until(reading.host_ns + CYCLE_NS)
+        return reading
+
+    def is_true(self, reading):
+        return list(reading.counts) == list(self.rig.motors.position)
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def test_missing_replies_are_counted_for_each_puck(bench):
+    bench.faults.drop(position_reply_id(2), 3)
+    bench.faults.drop(position_reply_id(7), 1)
+    readings = [bench.cycle() for _ in range(5)]
+    assert bench.arm.counters.missing == [0, 3, 0, 0, 0, 0, 1]
+    assert [r.missing_cycles for r in readings] == [1, 2, 3, 0, 0]
+    facts = bench.arm.counters.facts()
+    assert facts["link:missing_replies"] == "0 3 0 0 0 0 1"
+    assert "link:missing_replies 0 3 0 0 0 0 1" in bench.arm.counters.text()
+
+
+# Puck 1 answers first and puck 7 last, when the others are complete already; the
+# driver may look before all have come, or after.
+@pytest.mark.parametrize("node", [1, 4, 7])
+@pytest.mark.parametrize("first_look_ns", [100_000, 700_000])
+def test_a_late_reply_never_answers_the_next_question(node, first_look_ns):
+    bench = Bench(first_look_ns=first_look_ns)
+    bench.cycle()
+    bench.faults.delay(position_reply_id(node), ALMOST_A_CYCLE_NS)
+    late = bench.cycle()
+    assert late.fresh == 0b1111111 & ~(1 << node - 1)
+    following = bench.cycle()
+    assert following.is_complete
+    assert bench.is_true(following)
+    assert bench.arm.counters.stale == 1
+    assert bench.is_true(bench.cycle())
+    assert bench.arm.counters.stale == 1
+
+
+def test_a_reply_that_comes_after_its_cycle_is_drained_before_the_next(bench):
+    bench.faults.delay(position_reply_id(3), 1_700_000)
+    assert not bench.cycle().is_complete
+    assert bench.is_true(bench.cycle())
+    assert bench.arm.counters.stale == 1
+    assert bench.took_ns < 1_000_000  # nothing is owed any more, nothing waited for
+
+
+def test_a_lost_reply_costs_the_next_cycle_a_wait_and_no_more(bench):
+    bench.faults.drop(position_reply_id(3))
+    bench.cycle()
+    taken = [(bench.is_true(bench.cycle()), bench.took_ns) for _ in range(3)]
+    assert taken == [(True, 1_500_000), (True, 700_000), (True, 700_000)]
+    assert bench.arm.counters.stale == 0
+
+
+def test_a_doubled_reply_is_counted_and_changes_nothing(bench):
+    bench.faults.duplicate(position_reply_id(3), None)
+    readings = [bench.cycle() for _ in range(5)]
+    assert all(r.is_complete for r in readings)
+    assert bench.is_true(readings[-1])
+    assert bench.arm.counters.stale >= 4  # the last one may still be on the wire
+
+
+def test_swapped_replies_disturb_no_position(bench):
+    network_faults(bench.rig.network)["reply-swapped"]()
+    incomplete = 0
+    for _ in range(200):
+        reading = bench.cycle()
+        incomplete += not reading.is_complete
+        assert bench.is_true(reading) is reading.is_complete
+        assert reading.missing_cycles <= 1
+    assert incomplete == 4  # puck 6 is a question late every 50 cycles
+    assert bench.arm.counters.rejected == 0
+
+
+@pytest.mark.parametrize("byte", [0, 1])
+def test_a_spoilt_position_is_rejected(bench, byte):
+    for _ in range(3):
+        bench.cycle()
+    bench.faults.corrupt(position_reply_id(3), byte)
+    reading = bench.cycle()
+    assert reading.fresh == 0b1111011
+    counters = bench.arm.counters
+    assert counters.rejected + counters.malformed == 1
+    assert bench.is_true(bench.cycle())
+
+
+def test_a_bus_used_to_sixty_percent_by_others_costs_no_cycle(bench):
+    network_faults(bench.rig.network)["bus-flooded"]()
+    readings = [bench.cycle() for _ in range(500)]
+    assert all(r.is_complete for r in readings)
+    latest = max(r.arm_ns - r.host_ns for r in readings)
+    assert 1_000_000 < latest < 1_500_000  # later than alone, and in time
+
+
+def test_a_bus_that_is_off_is_known_and_comes_back(bench):
+    bench.cycle()
+    bench.faults.go_off()
+    assert bench.cycle().fresh == 0
+    assert bench.arm.is_bus_down
+    assert bench.arm.counters.link_errors > 0
+    bench.faults.mend()
+    reading = bench.cycle()
+    assert reading.is_complete
+    assert bench.is_true(reading)
+    assert not bench.arm.is_bus_down
+
+
+def test_idle_is_confirmed_when_the_bus_comes_back_in_time(bench):
+    bench.rig.network.pendant("activate")
+    bench.cycle()
+    bench.faults.go_off()
+    advance = bench.rig.bus.advance
+    back_ns = bench.rig.clock.t_ns + 20_000_000
+
+    def coming_back(t_ns):
+        if t_ns >= back_ns:
+            bench.faults.mend()
+        advance(t_ns)
+
+    bench.rig.bus.advance = coming_back
+    assert bench.arm.idle()
+
+
+def test_idle_on_a_bus_that_stays_off_ends_in_unknown(bench):
+    bench.rig.network.pendant("activate")
+    bench.cycle()
+    bench.faults.go_off()
+    begin_ns = bench.rig.clock.t_ns
+    assert not bench.arm.idle()
+    # As long as the arm's own heartbeat allows, and no longer.
+    assert 100_000_000 <= bench.rig.clock.t_ns - begin_ns <= 120_000_000
+
+
+def test_a_puck_that_restarted_alone_takes_the_zero_away(bench):
+    bench.rig.network.reboot(3)
+    again = WamArm(bench.rig.link, bench.rig.clock)
+    assert not again.start().is_zeroed
+    # Awake by now, it looks like the others: the module has to remember.
+    assert not WamArm(bench.rig.link, bench.rig.clock).start().is_zeroed
