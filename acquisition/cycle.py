@@ -1,6 +1,6 @@
 """One cycle: read, check, command, sample. It has no waiting of its own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Protocol
@@ -46,6 +46,14 @@ class ControlLaw(Protocol):
         """Return (joint torques, their gravity part) [N m], shapes (7,)."""
         ...
 
+    def move_to(self, goal: Vector, reading: ArmReading) -> float:
+        """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
+
+        Raises:
+            ValueError: the arm is not in hold, or `goal` cannot be reached.
+        """
+        ...
+
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         ...
@@ -58,6 +66,10 @@ class FootObserver(Protocol):
         self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
     ) -> float:
         """Write foot pose, twist, wrench and traction; return the sole's speed."""
+        ...
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Take the sensor's reading without load [N, N m], six numbers."""
         ...
 
 
@@ -82,6 +94,11 @@ class Cycle:
     """The work of one period, with the devices, the law and the guard given.
 
     `sink` receives the bytes of every sample; `on_wrench` the sensor's own samples.
+
+    Attributes:
+        is_recording: a trial is being recorded; the guard's limits for it count.
+        replies_ns: when the last joint reply of this cycle arrived [ns], 0 = none did.
+        status: what the console sees.
     """
 
     def __init__(  # noqa: PLR0913, PLR0917
@@ -108,8 +125,11 @@ class Cycle:
         self._wrench: WrenchSample | None = None
         self._wrench_ns = 0
         self._requested: ArmState | None = None
+        self._goal: Vector | None = None
+        self._reported: Verdict | None = None
         self._was_active = False
         self.is_recording = False
+        self.replies_ns = 0
         self.status = ControlStatus()
 
     def request(self, state: ArmState) -> None:
@@ -121,14 +141,28 @@ class Cycle:
         self._requested = state
         self.status.verdict = None
 
+    def move_to(self, goal: Sequence[float]) -> None:
+        """Ask for a move to joint positions `goal` [rad], seven; only in hold."""
+        self._goal = np.array(goal)
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Take the sensor's reading without load [N, N m], six numbers."""
+        self._observer.set_bias(bias)
+
+    def report(self, verdict: Verdict) -> None:
+        """Let the next cycle obey what was found outside of it."""
+        self._reported = verdict
+
     def __call__(self, tick: Tick) -> None:
         """Run the cycle `tick`."""
         reading = self._arm.read(tick.now_ns)
+        self.replies_ns = reading.arm_ns
         is_new = self._take_wrench(tick.now_ns)
         status = self.status
         status.safety = self._arm.safety_mode()
         self._confirm_idle(reading)
         self._enter_requested(reading)
+        self._begin_move(reading)
         tau, tau_gravity = self._torque(reading)
         sample = self._sample
         speed = self._observer.observe(
@@ -169,6 +203,16 @@ class Cycle:
             self._idle(reading)
         else:
             self._enter(state, reading)
+
+    def _begin_move(self, reading: ArmReading) -> None:
+        goal = self._goal
+        if goal is None or reading.missing_cycles:
+            return
+        self._goal = None
+        try:
+            self._law.move_to(goal, reading)
+        except ValueError:
+            self.report(Verdict(Action.HOLD, "move-refused"))
 
     def _idle(self, reading: ArmReading) -> None:
         """Brake the arm. Unless that is confirmed no zero torque follows: free fall."""
@@ -212,6 +256,9 @@ class Cycle:
             is_late=tick.is_late,
         )
         self._guard, verdict = check(self._limits, self._guard, seen)
+        reported, self._reported = self._reported, None
+        if reported is not None and reported.severity > verdict.severity:
+            return reported
         return verdict
 
     def _obey(self, verdict: Verdict, reading: ArmReading) -> None:

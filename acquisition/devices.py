@@ -70,6 +70,16 @@ class WrenchSample:
 class Arm(Protocol):
     """A robot arm with seven joints that takes joint torques."""
 
+    @property
+    def sent_ns(self) -> int:
+        """Return when torques were last handed over [monotonic ns], 0 = never."""
+        ...
+
+    @property
+    def is_bus_down(self) -> bool:
+        """Return whether the bus refused the last question."""
+        ...
+
     def read(self, now_ns: int) -> ArmReading:
         """Ask for the joint positions and return them; waits 1.5 ms at most."""
         ...

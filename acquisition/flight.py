@@ -1,51 +1,46 @@
 """The flight record: the last two seconds with raw frames, written on a fault."""
 
 import struct
-from collections import deque
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from acquisition.cdr import CdrWriter
+from acquisition.sample import Record
+from acquisition.shared import Ring
 
 SECONDS = 2.0
-_CAN_FRAME = struct.Struct("<IB3x8s")
-
-
-@dataclass(frozen=True, slots=True)
-class RawFrame:
-    """One CAN frame as it passed: monotonic time [ns], identifier, data."""
-
-    t_ns: int
-    can_id: int
-    data: bytes
+_FRAME: Final = struct.Struct("<QIB3x8s")
+_CAN_FRAME: Final = np.dtype(
+    [("can_id", "<u4"), ("length", "u1"), ("gap", "V3"), ("data", "V8")]
+)
 
 
 class FrameTape:
-    """Keeps the frames of the last two seconds, about 13,000 of them."""
+    """Writes the frames of the bus into a ring that outlives its writer."""
 
-    def __init__(self, frames: int = 13_000) -> None:
-        self._frames: deque[RawFrame] = deque(maxlen=frames)
+    def __init__(self, ring: Ring) -> None:
+        self._ring = ring
 
     def add(self, t_ns: int, can_id: int, data: bytes) -> None:
-        """Keep one frame; the oldest is forgotten."""
-        self._frames.append(RawFrame(t_ns, can_id, data))
-
-    def last(self, seconds: float = SECONDS) -> list[RawFrame]:
-        """Return the frames of the last `seconds` before the newest one."""
-        if not self._frames:
-            return []
-        earliest = self._frames[-1].t_ns - int(seconds * 1e9)
-        return [frame for frame in self._frames if frame.t_ns >= earliest]
+        """Keep one frame of monotonic time `t_ns` [ns]; the oldest is forgotten."""
+        self._ring.write(_FRAME.pack(t_ns, can_id, len(data), data))
 
 
-def encode_can_batch(log_time: int, frames: Iterable[RawFrame]) -> bytes:
+def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:
+    """Return the frames of the last `seconds` before the newest one, oldest first."""
+    frames = ring.last(ring.slots)
+    if not len(frames):
+        return frames
+    earliest = int(frames["t_ns"][-1]) - int(seconds * 1e9)
+    return frames[frames["t_ns"].astype(np.int64) >= earliest]
+
+
+def encode_can_batch(log_time: int, frames: Record) -> bytes:
     """Return a traction_msgs/CanBatch payload of struct can_frame records."""
-    frames = list(frames)
-    raw = b"".join(
-        _CAN_FRAME.pack(f.can_id, len(f.data), f.data.ljust(8, b"\0")) for f in frames
-    )
+    raw = np.zeros(len(frames), _CAN_FRAME)
+    for name in ("can_id", "length", "data"):
+        raw[name] = frames[name]
     writer = CdrWriter().header(log_time, "can")
-    writer.sequence(np.array([f.t_ns for f in frames], np.uint64))
-    return writer.sequence(np.frombuffer(raw, np.uint8)).finish()
+    writer.sequence(np.ascontiguousarray(frames["t_ns"]))
+    return writer.sequence(raw.view(np.uint8)).finish()

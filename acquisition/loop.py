@@ -84,7 +84,3 @@ class Loop:
         self.stats.cycles += 1
         self._number += 1
         self._next_ns += self._period_ns
-
-    def restart_grid(self) -> None:
-        """Begin a new grid at the next step, after a pause on purpose."""
-        self._next_ns = None

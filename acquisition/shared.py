@@ -1,31 +1,59 @@
-"""Hand-over of samples from the loop to the recorder: one writer, one reader."""
+"""Hand-over between processes: rings of records and newest-value slots, no locks.
+
+Each has one writer. The payload is written before the counter, so a reader never takes
+a record that is half written; what the writer has overwritten is counted as lost.
+"""
 
 import numpy as np
 
-from acquisition.messages import CYCLE
 from acquisition.sample import Record
 
-SLOTS = 8192  # 16 s at 500 Hz
+LINE = 64  # bytes of a cache line; a record begins at a multiple of it
+_LENGTH_BYTES = 8
+_TRIES = 100  # a reader that is beaten this often takes what is there for nothing
+
+LayoutType = np.dtype[np.void]
 
 
-class SampleRing:
-    """A ring of cycle records; a lapped reader learns how many it lost.
+def lines(size: int) -> int:
+    """Return `size` [bytes] rounded up to whole cache lines."""
+    return -(-size // LINE) * LINE
 
-    The payload is written before the counter, so a reader never sees a half-written
-    newest record.
+
+class Ring:
+    """A ring of fixed records in memory that may be shared: one writer, any readers.
+
+    The record being written is never handed out, so `slots - 1` records can be read.
     """
 
-    def __init__(self, slots: int = SLOTS) -> None:
+    def __init__(self, memory: memoryview, dtype: LayoutType, slots: int) -> None:
+        """Lay the ring over `memory` of at least `size_of(dtype, slots)` bytes."""
         self.slots = slots
-        self._records = np.zeros(slots, CYCLE.dtype)
-        size = CYCLE.size
-        self._raw = self._records.view(np.uint8).reshape(slots, size)
-        self.written = 0
+        self._size = dtype.itemsize
+        self._stride = lines(dtype.itemsize)
+        self._counter = memory[:8].cast("Q")
+        self._bytes = memory[LINE : self.size_of(dtype, slots)]
+        self._records: Record = np.ndarray(
+            (slots,), dtype, self._bytes, strides=(self._stride,)
+        )
 
-    def write(self, payload: memoryview) -> None:
-        """Append one record (bytes of traction_msgs/Cycle)."""
-        self._raw[self.written % self.slots] = payload
-        self.written += 1
+    @staticmethod
+    def size_of(dtype: LayoutType, slots: int) -> int:
+        """Return how much memory such a ring needs [bytes]."""
+        return LINE + slots * lines(dtype.itemsize)
+
+    @property
+    def written(self) -> int:
+        """Number of records written since the start."""
+        return self._counter[0]
+
+    def write(self, payload: bytes | memoryview) -> None:
+        """Append one record, given as its bytes."""
+        counter = self._counter
+        number = counter[0]
+        start = number % self.slots * self._stride
+        self._bytes[start : start + self._size] = payload
+        counter[0] = number + 1
 
     def reader(self) -> "RingReader":
         """Return a reader that starts at the next record."""
@@ -34,26 +62,40 @@ class SampleRing:
     def since(self, position: int) -> tuple[Record, int]:
         """Return (records from `position` on, number lost because overwritten)."""
         end = self.written
-        start = max(position, end - self.slots)
-        indices = np.arange(start, end) % self.slots
-        return self._records[indices], start - position
+        start = min(end, max(position, end - self.slots + 1))
+        records = self._records[np.arange(start, end) % self.slots]
+        # While they were copied the writer may have come round.
+        intact = self.written - self.slots + 1
+        if intact > start:
+            records = records[intact - start :]
+            start = min(end, intact)
+        return records, start - position
 
-    def latest(self) -> Record:
-        """Return the newest record, shape (1,); empty before the first write."""
-        return self.since(max(0, self.written - 1))[0]
+    def last(self, count: int) -> Record:
+        """Return the newest records, `count` at most, oldest first."""
+        return self.since(max(0, self.written - count))[0]
 
 
 class RingReader:
-    """Reads a SampleRing from where it last stopped."""
+    """Reads a ring from where it last stopped.
 
-    def __init__(self, ring: SampleRing) -> None:
+    Attributes:
+        lost: records that were overwritten before they were read.
+    """
+
+    def __init__(self, ring: Ring) -> None:
         self._ring = ring
         self._position = ring.written
         self.lost = 0
 
+    @property
+    def backlog(self) -> int:
+        """Records that have been written and not read."""
+        return self._ring.written - self._position
+
     def rewind(self, records: int) -> None:
         """Go back so that the next read begins `records` records earlier."""
-        oldest = max(0, self._ring.written - self._ring.slots)
+        oldest = max(0, self._ring.written - self._ring.slots + 1)
         self._position = max(oldest, self._position - records)
 
     def read(self) -> Record:
@@ -62,3 +104,45 @@ class RingReader:
         self._position += len(records) + lost
         self.lost += lost
         return records
+
+
+class Slot:
+    """The newest value of something, as bytes of changing length: one writer.
+
+    A counter is odd while the value is being written; a reader looks at it before and
+    after.
+    """
+
+    def __init__(self, memory: memoryview) -> None:
+        """Lay the slot over `memory`, whose size is the largest value plus 64."""
+        self._counter = memory[:8].cast("Q")
+        self._length = memory[_LENGTH_BYTES : 2 * _LENGTH_BYTES].cast("Q")
+        self._bytes = memory[LINE:]
+
+    @property
+    def version(self) -> int:
+        """Number that changes with every new value."""
+        return self._counter[0]
+
+    def write(self, value: bytes) -> None:
+        """Replace the value.
+
+        Raises:
+            ValueError: it does not fit.
+        """
+        if len(value) > len(self._bytes):
+            raise ValueError(f"{len(value)} bytes, the slot has {len(self._bytes)}")
+        counter = self._counter
+        counter[0] += 1
+        self._length[0] = len(value)
+        self._bytes[: len(value)] = value
+        counter[0] += 1
+
+    def read(self) -> bytes:
+        """Return the newest whole value; empty before the first one."""
+        for _ in range(_TRIES):
+            before = self._counter[0]
+            value = bytes(self._bytes[: self._length[0]])
+            if before % 2 == 0 and self._counter[0] == before:
+                return value
+        return b""

@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass
 
-from acquisition.control import InlineControl
 from acquisition.errors import TrialFileError
-from acquisition.recorder import seal
 from acquisition.trial_file.verify import Verified
-from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from acquisition.trial_file.writer import TrialHeader
 from experiments.rigs import Rig
 from experiments.store import iso_utc, move_file, write_json
 from experiments.trial import SessionFacts, TrialName, write_flight, write_truth
@@ -42,26 +40,22 @@ class Archive:
     rig: Rig
     facts: SessionFacts
 
-    def seal(
-        self, writer: TrialWriter, header: TrialHeader, name: TrialName, reason: str
-    ) -> Verified:
+    def seal(self, header: TrialHeader, name: TrialName, reason: str) -> Verified:
         """End and verify the trial file, and the truth beside it when simulated.
 
         Raises:
             TrialFileError: a file could not be written or verified.
         """
-        verified = seal(writer, reason)
+        verified = self.rig.crew.recorder.finish(reason)
         truth = self.facts.folder.trials / f"{name.kept}.truth.mcap"
         write_truth(self.rig, header, truth)
         return verified
 
-    def flight(
-        self, control: InlineControl, header: TrialHeader, name: TrialName, reason: str
-    ) -> str:
+    def flight(self, header: TrialHeader, name: TrialName, reason: str) -> str:
         """Write the flight record of a fault; return what to say about it."""
         path = self.facts.folder.faults / f"{name.rejected}.flight.mcap"
         try:
-            write_flight(self.rig, control, header, path, reason)
+            write_flight(self.rig, header, path, reason)
         except TrialFileError as error:
             return f"No flight record: {error}"
         return f"Flight record: faults/{path.name}."

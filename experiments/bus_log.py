@@ -58,16 +58,31 @@ def open_bus_log(
 
 @contextmanager
 def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None]:
-    """Write the bus of `rig` to `path` while this lasts; at the end the arm is closed.
+    """Write the bus of `rig` to `path` while this lasts; at the end the rig is closed.
 
     Raises:
         SettingsError: as `open_bus_log`.
     """
     channel = "fake0" if rig.is_simulated else rig.settings.rig.can.channel
+    reader = rig.board.frames.reader()
+
+    def drain(log: CanLog) -> None:
+        for frame in reader.read():
+            length = int(frame["length"])
+            data = frame["data"].tobytes()[:length]
+            log.add(int(frame["can_id"]), data, int(frame["t_ns"]))
+
     with (
-        closing(rig.arm),  # closed even where the log cannot be opened
+        closing(rig.crew),  # closed even where the log cannot be opened
         open_bus_log(path, rig.clock, channel, console) as log,
-        closing(rig.arm),  # what it says in parting is logged
     ):
-        rig.can_link.tap = log.add if log else None
-        yield
+        if log is not None:
+            rig.crew.desk.on_pass.append(lambda: drain(log))
+        try:
+            yield
+        finally:
+            rig.crew.close()  # what the arm says in parting is logged
+            if log is not None:
+                drain(log)
+            if reader.lost:
+                console.say(f"{WARNING} {reader.lost} frames are not in the bus log.")

@@ -5,14 +5,19 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from acquisition.devices import SafetyMode, WrenchSensor
+import numpy as np
+
+from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError, PreflightError, TractionError
+from acquisition.timing import SLOW_EXCHANGE_NS, loop_report
 from experiments.console import BAD, GOOD, WARNING, Console
+from experiments.crews import EXCHANGE_CYCLES
 from experiments.messages import CATALOGUE
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, TerrainRow
 from wam.health import complaints, temperature_range
 
+LOOP_TEST = 5.0  # s
 Add = Callable[[str, str, str], None]
 SESSION_GB = 0.9
 
@@ -28,10 +33,10 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Preflight:
-    """The page, and the sensor it opened."""
+    """The page, and what the devices said about themselves."""
 
     checks: tuple[Check, ...]
-    sensor: WrenchSensor
+    devices: dict[str, str]
 
     def as_dict(self) -> dict[str, object]:
         """Return the page for preflight.json."""
@@ -52,8 +57,12 @@ def connect_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -
         ) from error
 
 
-def run_preflight(rig: Rig, data: Path, console: Console) -> Preflight:
-    """Check configuration, arm, sensor and disk; print one line each.
+def run_preflight(
+    rig: Rig, data: Path, console: Console, seconds: float = LOOP_TEST
+) -> Preflight:
+    """Check configuration, arm, sensor, loop and disk; print one line each.
+
+    The loop runs afterwards, the arm idle. `seconds`: how long it is tested.
 
     Raises:
         PreflightError: a check failed.
@@ -68,12 +77,17 @@ def run_preflight(rig: Rig, data: Path, console: Console) -> Preflight:
     check_disk(rig, data, add)
     _check_arm(rig, add)
     sensor = _check_sensor(rig, add)
-    return Preflight(tuple(checks), sensor)
+    _check_exchange(rig, add)
+    grants = _check_rights(rig, add)
+    rig.crew.begin()
+    _check_loop(rig, seconds, add)
+    devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
+    return Preflight(tuple(checks), {**devices, **grants})
 
 
 def _check_arm(rig: Rig, add: Add) -> None:
     try:
-        info = rig.arm.start()
+        info = rig.crew.start_arm()
     except TractionError as error:
         add(BAD, "arm", str(error))
         raise _as_preflight(error, "not touched") from error
@@ -82,7 +96,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
     parts = [f"firmware {', '.join(map(str, versions))}"]
     parts += [f"{woken} woken"] if woken else []
     parts += ["zeroed"] if info.is_zeroed else []
-    health, now_ns = rig.arm.health(), rig.clock.now_ns()
+    health, now_ns = [puck.health for puck in info.pucks], rig.clock.now_ns()
     ill = complaints(health, now_ns)
     parts += [temperature_range(health, now_ns), *ill]
     add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
@@ -96,15 +110,83 @@ def _check_arm(rig: Rig, add: Add) -> None:
     add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
 
 
-def _check_sensor(rig: Rig, add: Add) -> WrenchSensor:
+def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
     try:
-        sensor = rig.open_sensor()
+        facts = rig.crew.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
         raise _as_preflight(error, "idle") from error
-    facts = sensor.describe()
     add(GOOD, "F/T sensor", f"{facts['model']}, {facts['measured_rate']}")
-    return sensor
+    return facts
+
+
+def start_devices(rig: Rig) -> None:
+    """Start arm, sensor and loop without a page of checks.
+
+    Raises:
+        PreflightError: the arm or the sensor is not fit.
+    """
+    try:
+        rig.crew.start_arm()
+        rig.crew.open_sensor()
+    except TractionError as error:
+        raise _as_preflight(error, "not touched") from error
+    rig.crew.begin()
+
+
+def _check_exchange(rig: Rig, add: Add) -> None:
+    """Grade the way from the request to the seventh position over this adapter."""
+    times = np.array(rig.crew.measure_exchange())
+    lost = EXCHANGE_CYCLES - len(times)
+    if len(times) < EXCHANGE_CYCLES // 2:
+        add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
+        raise _named("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
+    p50, p99 = np.percentile(times, (50, 99)) / 1e6
+    text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete"
+    is_slow = p99 * 1e6 > SLOW_EXCHANGE_NS or lost > 1
+    slow = f": slow adapter, limit {SLOW_EXCHANGE_NS / 1e6:.1f} ms" if is_slow else ""
+    add(WARNING if is_slow else GOOD, "exchange", text + slow)
+
+
+def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
+    """Say what the kernel refused to each process; return it for the recording."""
+    facts: dict[str, str] = {}
+    refused: list[str] = []
+    for process, grants in rig.crew.grants().items():
+        words = [
+            grant.what if grant.is_granted else f"no {grant.what} ({grant.reason})"
+            for grant in grants
+        ]
+        facts[f"scheduler:{process}"] = ", ".join(words) or "ordinary"
+        refused += [
+            f"{process}: {w}"
+            for w, g in zip(words, grants, strict=True)
+            if not g.is_granted
+        ]
+    if facts:
+        text = "; ".join(refused) or "real-time scheduling, memory locked"
+        add(WARNING if refused else GOOD, "scheduler", text)
+    return facts
+
+
+def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
+    """Run the loop for a while, the arm idle, and grade its cadence."""
+    if rig.is_stepped:
+        rig.crew.desk.advance(0.1)
+        return
+    timings = rig.crew.desk.timings()
+    rig.crew.desk.advance(seconds)
+    report = loop_report(timings.read())
+    if report is None:
+        add(BAD, "loop", "no cycle ran")
+        raise _named("loop-dead")
+    worst = rig.settings.rig.limits.late_per_second
+    text = (
+        f"{report.rate:.1f} Hz · p99.9 late {report.late.p999 / 1000:.2f} ms · "
+        f"missed {report.missed}/{report.cycles}"
+    )
+    is_late = report.missed > worst * seconds
+    add(WARNING if is_late else GOOD, f"loop {seconds:g} s", text)
 
 
 def check_disk(rig: Rig, data: Path, add: Add) -> None:

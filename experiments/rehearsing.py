@@ -1,7 +1,12 @@
 """What a session may ask of a simulation and never of a rig."""
 
+import base64
 from typing import Literal, Protocol
 
+import numpy as np
+
+from acquisition.messages import TRUTH
+from acquisition.processes import Child
 from acquisition.sample import Record
 
 
@@ -48,3 +53,50 @@ class Rehearsing(Protocol):
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground."""
         ...
+
+
+class RemoteRehearsal:
+    """The handle of a simulation in another process; implements `Rehearsing`."""
+
+    def __init__(self, child: Child) -> None:
+        self._child = child
+        self.fault_names: tuple[str, ...] = tuple(child.ask("fault_names"))
+
+    def prepare(self, trial: int) -> None:
+        """Rake the bed for `trial`."""
+        self._child.ask("prepare", trial)
+
+    def lift(self) -> None:
+        """Let the hand lift the foot above the far end."""
+        self._child.ask("lift")
+
+    def put_down(self) -> None:
+        """Let the hand put the foot down there."""
+        self._child.ask("put_down")
+
+    def push(self) -> None:
+        """Let the hand push the foot across; the truth is written from here on."""
+        self._child.ask("push")
+
+    def pendant(self, button: Literal["activate", "idle", "estop"]) -> None:
+        """Press the pendant."""
+        self._child.ask("pendant", button)
+
+    def inject(self, fault: str) -> None:
+        """Let a device fail."""
+        self._child.ask("inject", fault)
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        self._child.ask("mend")
+
+    def take_truth(self) -> Record:
+        """Return traction_msgs/Truth records since the push began."""
+        parts = bytearray()
+        while part := base64.b64decode(self._child.ask("truth_part")):
+            parts += part
+        return np.frombuffer(parts, TRUTH.dtype)
+
+    def parameters(self) -> dict[str, str]:
+        """Return the true parameters of the ground."""
+        return self._child.ask("parameters")

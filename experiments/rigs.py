@@ -2,53 +2,33 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+import os
+import sys
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
-from acquisition.control import InlineControl
-from acquisition.cycle import Cycle
-from acquisition.devices import WrenchSample, WrenchSensor
-from acquisition.flight import FrameTape
-from acquisition.guard import Limits
-from acquisition.loop import Loop
-from acquisition.recorder import Recorder
-from acquisition.sample import Flag
-from acquisition.shared import SampleRing
-from experiments.rehearsing import Rehearsing
-from experiments.settings import FootSection, RigSettings, Settings, TerrainRow
-from ft_sensor.barrett import BarrettSensor
-from ft_sensor.observer import LiveFoot
+from acquisition.devices import WrenchSensor
+from experiments.crews import Crew, InlineCrew, Jobs, ProcessCrew
+from experiments.parts import (
+    LoopParts,
+    build_arm,
+    build_sensor,
+    build_tool,
+    open_bus_sensor,
+    terrain_frame,
+)
+from experiments.rehearsing import Rehearsing, RemoteRehearsal
+from experiments.settings import Settings, TerrainRow
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
-from ft_sensor.sensor import BotaSensor
-from ft_sensor.sensor_settings import SensorSettings
-from ft_sensor.serial_link import SerialLink, SerialPort, open_port
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.can_link import CanLink, open_bus
-from wam.constants import ArmConstants, Body, load_constants
-from wam.controller import FootController
-from wam.joint_lock import LockGains
+from wam.can_link import CanLink
+from wam.constants import load_constants
 from wam.model import ArmModel
-from wam.safety_limits import WARNING_SHARE, SafetyLimits
-from wam.tapped_link import TappedLink
-from wam.tool import Tool, sensor_body
+from wam.tool import Tool, tool_facts
 
 if TYPE_CHECKING:
-    from fakes.rig import FakeRig
     from fakes.serve import PuckServer
-
-MS = 1_000_000
-TARE_SAMPLES = 4096  # more than any sensor sends during a tare
-# A simulation shares its thread with plant and recorder; only real arms need cadence.
-LATE_WHEN_SIMULATED = 250
-# On the wall clock the simulated safety module lives in the loop's own process, so a
-# stall of the machine stops both: it must not look like a lost heartbeat.
-HEARTBEAT_IN_PROCESS_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,37 +41,31 @@ class FakeOptions:
 
 @dataclass(slots=True)
 class Rig:
-    """Everything a session needs, real or simulated, already connected.
+    """Everything a session needs, real or simulated.
 
     Attributes:
-        clock: the time of loop and devices.
-        arm: driver of the arm, not started.
-        open_sensor_port: opens the serial port of the wrist sensor.
-        foot: live view of the foot; its payload is replaced by each tare.
-        payload: what the sensor carries, not tared.
+        clock: the console's time.
+        crew: who works the rig.
+        board: the memory they share.
         model: the arm with its tool.
-        tape: the last two seconds of frames.
-        wrenches: the sensor's newest samples, for the tare; the oldest are forgotten.
+        payload: what the sensor carries, not tared.
+        tared: the same with the bias of the newest tare.
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
-        can_link: the arm's bus, for those who listen in.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """
 
     clock: Clock
-    arm: WamArm
-    open_sensor_port: Callable[[], SerialPort]
-    foot: LiveFoot
-    payload: Payload
+    crew: Crew
+    board: Board
     model: ArmModel
-    tape: FrameTape
-    wrenches: deque[WrenchSample]
+    payload: Payload
+    tared: Payload
     frame: TerrainFrame
     row: TerrainRow
     settings: Settings
-    can_link: CanLink
     rehearsal: Rehearsing | None
     is_stepped: bool
 
@@ -100,192 +74,124 @@ class Rig:
         """Whether the devices are simulated."""
         return self.rehearsal is not None
 
-    def open_sensor(self) -> WrenchSensor:
-        """Open the wrist sensor and let it begin; on the arm's bus it goes along.
-
-        Raises:
-            LinkError: the port cannot be opened, or the sensor is silent.
-            DeviceFaultError: the sensor refuses its settings, or is not well.
-        """
-        section = self.settings.rig.ft_sensor
-        if section.kind == "barrett":
-            on_bus = BarrettSensor(self.can_link, self.clock)
-            on_bus.open()
-            self.arm.accompany(on_bus)
-            return on_bus
-        settings = SensorSettings(
-            "simulated" if self.is_simulated else section.port,
-            baudrate=section.baudrate,
-            sinc=section.sinc,
-            rate_check=0.5 if self.is_simulated else 2.0,
-        )
-        sensor = BotaSensor(SerialLink(self.open_sensor_port()), self.clock, settings)
-        sensor.open()
-        return sensor
-
-    def connect(self, sensor: WrenchSensor) -> InlineControl:
-        """Join arm, sensor, law and guard into a loop that is ready to run."""
-        ring = SampleRing()
-        recorder = Recorder(ring, self.clock)
-
-        def on_wrench(samples: list[WrenchSample]) -> None:
-            recorder.add_wrenches(samples)
-            self.wrenches.extend(samples)
-
-        control = self.settings.rig.control
-        gains = LockGains(kp=control.lock_kp, kd=control.lock_kd)
-        limits = build_limits(self.settings.rig, self.model.constants)
-        if self.is_simulated:
-            limits = replace(limits, late_per_second=LATE_WHEN_SIMULATED)
-        cycle = Cycle(
-            self.arm,
-            sensor,
-            FootController(self.model, control.virtual_mass, gains),
-            self.foot,
-            limits,
-            ring.write,
-            on_wrench,
-            extra_flags=Flag.SIMULATED if self.is_simulated else 0,
-        )
-        return InlineControl(Loop(cycle, self.clock), cycle, recorder, ring)
-
-
-def terrain_frame(row: TerrainRow) -> TerrainFrame:
-    """Return the frame of a row of the matrix."""
-    return TerrainFrame(
-        incline=float(np.radians(row.incline_deg)),
-        heading=float(np.radians(row.heading_deg)),
-        far_end=row.far_end,
-        travel=row.travel,
-    )
-
-
-def build_tool(rig: RigSettings, foot: str) -> Tool:
-    """Return sensor and foot as rig.toml describes them."""
-    section: FootSection = rig.feet.tread if foot == "tread" else rig.feet.bare
-    sensor = rig.ft_sensor
-    body = sensor_body()
-    return Tool(
-        sensor=Body(sensor.mass, body.com, body.inertia),
-        foot=Body(
-            section.mass, np.array(section.com), np.diag(np.array(section.inertia))
-        ),
-        sole=np.array(section.sole),
-        sensor_height=sensor.height,
-        sensor_angle=float(np.radians(sensor.angle_deg)),
-        sensor_sign=float(sensor.sign),
-    )
-
-
-def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
-    """Return the guard's limits of rig.toml."""
-    limits = rig.limits
-    return Limits(
-        q_lower=constants.q_lower,
-        q_upper=constants.q_upper,
-        qd=np.array(limits.speed),
-        tau=np.array(limits.torque),
-        foot_speed=limits.foot_speed,
-        joint7=limits.joint7_mrad * 1e-3,
-        ft_stale_ns=round(limits.ft_stale_ms * MS),
-        ft_stop_ns=round(limits.ft_stop_ms * MS),
-        late_per_second=limits.late_per_second,
-    )
-
-
-def build_safety_limits(rig: RigSettings) -> SafetyLimits:
-    """Return what the safety module is told; see [safety] of rig.toml."""
-    safety = rig.safety
-    speed, torque = safety.speed_warning, safety.torque_warning_units
-    if speed is None:
-        speed = WARNING_SHARE * safety.speed_fault
-    if torque is None:
-        torque = int(WARNING_SHARE * safety.torque_fault_units)
-    return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
-
 
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
-    """Return the rig for one session.
+    """Return the rig for one session: on stepped time in this thread, else processes.
 
     Raises:
-        LinkError: the CAN interface cannot be opened (real rig).
+        LinkError: a process cannot open its bus or port.
     """
-    constants = load_constants()
     tool = build_tool(settings.rig, row.foot)
-    frame = terrain_frame(row)
-    sensor = settings.rig.ft_sensor
+    model = ArmModel(load_constants(), tool)
+    board = Board.create()
     rehearsal: Rehearsing | None = None
-    if fake is None:
-        clock: Clock = SystemClock()
-        can = settings.rig.can
-        bus = open_bus(can.interface, can.channel, can.bitrate)
-
-        def open_sensor_port() -> SerialPort:
-            return open_port(sensor.port, sensor.baudrate).port
-
+    if fake is not None and fake.is_fast:
+        clock, crew, rehearsal = _stepped(settings, row, fake.seed, model, board)
     else:
-        clock, simulation, rehearsal = _simulate(settings, row, fake, constants, tool)
-        bus = simulation.bus
-        open_sensor_port = simulation.open_port
-    tape = FrameTape()
-    model = ArmModel(constants, tool)
+        clock = SystemClock()
+        crew = ProcessCrew(_jobs(settings, row, fake, tool), board, clock)
+        if crew.fake is not None:
+            rehearsal = RemoteRehearsal(crew.fake)
     payload = payload_of(tool)
-    can_link = CanLink(bus)
     return Rig(
         clock=clock,
-        arm=WamArm(
-            TappedLink(can_link, tape, clock),
-            clock,
-            ArmSettings(
-                j2mp=constants.j2mp,
-                safety_limits=build_safety_limits(settings.rig),
-            ),
-        ),
-        open_sensor_port=open_sensor_port,
-        foot=LiveFoot(model, payload, frame),
-        payload=payload,
+        crew=crew,
+        board=board,
         model=model,
-        tape=tape,
-        wrenches=deque(maxlen=TARE_SAMPLES),
-        frame=frame,
+        payload=payload,
+        tared=payload,
+        frame=terrain_frame(row),
         row=row,
         settings=settings,
-        can_link=can_link,
         rehearsal=rehearsal,
         is_stepped=fake is not None and fake.is_fast,
     )
 
 
-def _simulate(
-    settings: Settings,
-    row: TerrainRow,
-    fake: FakeOptions,
-    constants: ArmConstants,
-    tool: Tool,
-) -> tuple[Clock, FakeRig, Rehearsing]:
-    """Return (clock, simulated rig, its handle); only here are the fakes imported."""
+def _jobs(
+    settings: Settings, row: TerrainRow, fake: FakeOptions | None, tool: Tool
+) -> Jobs:
+    rig = settings.rig
+    common: dict[str, Any] = {
+        "rig": rig.model_dump(mode="json"),
+        "is_simulated": fake is not None,
+    }
+    control = {
+        **common,
+        "row": row.model_dump(mode="json"),
+        "can": rig.can.model_dump(mode="json"),
+        "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
+    }
+    is_on_bus = rig.ft_sensor.kind == "barrett"
+    reader = None if is_on_bus else {**common, "port": rig.ft_sensor.port}
+    simulated: dict[str, Any] | None = None
+    if fake is not None:
+        simulated = {
+            "scene": _scene_facts(row, fake.seed),
+            "tool": tool_facts(tool),
+            "has_sensor": is_on_bus,
+        }
+    return Jobs(control, reader, simulated)
+
+
+def _scene_facts(row: TerrainRow, seed: int) -> dict[str, Any]:
+    frame = terrain_frame(row)
+    return {
+        "terrain": row.name,
+        "stones": row.stones,
+        "foot": row.foot,
+        "frame": {
+            "incline": frame.incline,
+            "heading": frame.heading,
+            "far_end": list(frame.far_end),
+            "travel": frame.travel,
+        },
+        "start_q": list(row.start_q),
+        "seed": seed,
+    }
+
+
+def _stepped(
+    settings: Settings, row: TerrainRow, seed: int, model: ArmModel, board: Board
+) -> tuple[Clock, Crew, Rehearsing]:
+    """Return (clock, crew, handle) of a simulation that runs in this thread."""
     from fakes.clock import SteppedClock
     from fakes.network_options import NetworkOptions
-    from fakes.rig import FakeRig, Rehearsal, Scene
+    from fakes.rig import FakeRig, Rehearsal
+    from fakes.station import scene_of
 
-    network = NetworkOptions(has_sensor=settings.rig.ft_sensor.kind == "barrett")
-    scene = Scene(
-        terrain=row.name,
-        stones=row.stones,
-        foot=row.foot,
-        frame=terrain_frame(row),
-        start_q=np.array(row.start_q),
-        seed=fake.seed,
-    )
-    if not fake.is_fast:
-        clock = SystemClock()
-        network = replace(network, heartbeat_ns=HEARTBEAT_IN_PROCESS_NS)
-        rig = FakeRig(scene, constants, tool, clock, network=network)
-        return clock, rig, Rehearsal(rig)
-    stepped = SteppedClock()
-    rig = FakeRig(scene, constants, tool, stepped, network=network)
-    stepped.world = rig
-    return stepped, rig, Rehearsal(rig)
+    clock = SteppedClock()
+    assert model.tool is not None
+    scene = scene_of(_scene_facts(row, seed))
+    is_on_bus = settings.rig.ft_sensor.kind == "barrett"
+    network = NetworkOptions(has_sensor=is_on_bus)
+    simulation = FakeRig(scene, model.constants, model.tool, clock, network=network)
+    clock.world = simulation
+    link = CanLink(simulation.bus)
+    arm = build_arm(settings.rig, model.constants, link, board, clock)
+
+    def sensor() -> WrenchSensor:
+        if is_on_bus:
+            return open_bus_sensor(arm, link, clock)
+        port = simulation.open_port()
+        serial = build_sensor(settings.rig, port, clock, is_simulated=True)
+        serial.open()
+        return serial
+
+    def parts(opened: WrenchSensor) -> LoopParts:
+        return LoopParts(
+            rig=settings.rig,
+            row=row,
+            model=model,
+            arm=arm,
+            sensor=opened,
+            board=board,
+            clock=clock,
+            is_simulated=True,
+        )
+
+    crew = InlineCrew(board, clock, arm, sensor, parts)
+    return clock, crew, Rehearsal(simulation)
 
 
 def build_server(

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from acquisition.board import unpack_wrenches
 from acquisition.cycle import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError, TractionError
 from acquisition.guard import Verdict
-from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from acquisition.processes import ProcessLostError
+from acquisition.trial_file.writer import TrialHeader
 from experiments.archive import ENOUGH, Archive, Outcome
 from experiments.book import Book
 from experiments.company import FaultedError, StopAskedError
@@ -38,7 +40,8 @@ class SessionRunner:
         self.stage = stage
         self.facts = facts
         self.rig = stage.rig
-        self.control = stage.control
+        self.control = stage.rig.crew.desk
+        self.recorder = stage.rig.crew.recorder
         self.book = Book(stage.rig, facts)
         self.archive = Archive(stage.rig, facts)
         self._place = Circumstances()
@@ -137,6 +140,11 @@ class SessionRunner:
             self.stage.obey_stop()
             self._end_recording(name, header, outcome)
             raise
+        except ProcessLostError as lost:
+            outcome.reason = f"{lost.name} lost"
+            if lost.name != "recorder":
+                self._end_recording(name, header, outcome)
+            raise
         self.control.request(ArmState.HOLD)
         sidecar = self._end_recording(name, header, outcome)
         self._ask_verdict(name, sidecar, outcome)
@@ -146,25 +154,26 @@ class SessionRunner:
         self._say("Lift the foot clear of everything and keep it still.")
         while True:
             self._wait_still(name)
-            self.rig.wrenches.clear()
+            reader = self.control.wrenches()
             for _ in range(round(TARE_SECONDS / TICK) + 1):
                 self.stage.tick(Prompt.LIFT, name)
             try:
                 result = tare(
-                    list(self.rig.wrenches), self.rig.settings.rig.limits.tare_spread
+                    unpack_wrenches(reader.read()),
+                    self.rig.settings.rig.limits.tare_spread,
                 )
             except TareError as error:
                 self._say(f"{error} ARM: holding.")
                 continue
             position = self.control.latest()["position"][0]
             rotation = self.rig.model.sole_pose(position)[1]
-            self.rig.foot.payload = self.rig.payload.tared(
-                np.array(result.wrench), rotation
-            )
+            self.rig.tared = self.rig.payload.tared(np.array(result.wrench), rotation)
+            bias = self.rig.tared.bias.tolist()
+            self.control.set_bias(bias)
             self.book.note(
                 "tared",
                 trial_number=name.number,
-                bias=[round(v, 4) for v in self.rig.foot.payload.bias.tolist()],
+                bias=[round(v, 4) for v in bias],
                 spread=round(float(result.spread), 3),
             )
             return
@@ -183,8 +192,8 @@ class SessionRunner:
         """Record until the trial is over; `outcome` is kept up to date."""
         path = self.facts.folder.trials / f"{name.kept}.mcap"
         self.book.note("trial-started", trial=name.number, attempt=name.attempt)
-        self.control.recorder.start(lambda: TrialWriter(path, header))
-        self.control.recorder.event(20, "operator", "trial started")
+        self.recorder.start(path, header)
+        self.recorder.event(20, "operator", "trial started")
         self.control.watch_trial(is_recording=True)
         start = self.rig.clock.now_ns()
         watch = EndWatch(self.rig.frame.travel)
@@ -214,12 +223,10 @@ class SessionRunner:
         """
         archive = self.archive
         self.control.watch_trial(is_recording=False)
-        self.control.recorder.event(20, "link", self.rig.arm.counters.text())
-        self.control.recorder.event(20, "stop", outcome.reason)
-        writer = self.control.recorder.detach()
-        verified = self.stage.aside(
-            lambda: archive.seal(writer, header, name, outcome.reason)
-        )
+        self.control.advance(TICK)  # what the devices said until now is written down
+        self.recorder.event(20, "link", self.control.device_facts().get("link", ""))
+        self.recorder.event(20, "stop", outcome.reason)
+        verified = self.stage.aside(lambda: archive.seal(header, name, outcome.reason))
         sidecar = archive.sidecar(name, verified, outcome)
         self._say(
             f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · "
@@ -232,7 +239,7 @@ class SessionRunner:
         self._reject(name, sidecar, f"interrupted: {outcome.reason}")
         self._say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
         if outcome.reason != "interrupted":
-            self._say(archive.flight(self.control, header, name, outcome.reason))
+            self._say(archive.flight(header, name, outcome.reason))
         return sidecar
 
     def _ask_verdict(
@@ -275,7 +282,7 @@ class SessionRunner:
     def _make_safe(self) -> None:
         """Idle the arm; the second call does nothing more."""
         confirmed = self.stage.make_safe()
-        mode = self.rig.arm.safety_mode()
+        mode = self.rig.crew.safety_mode()
         self._say(rest_text(mode, is_confirmed=confirmed))
 
     def _say(self, text: str) -> None:
@@ -294,7 +301,7 @@ class SessionRunner:
             self._say(f" {mark} {text}")
 
     def _tell_fault(self, verdict: Verdict) -> None:
-        found = replace(self._place, is_bus_down=self.rig.arm.is_bus_down)
+        found = replace(self._place, is_bus_down=self.control.loop.is_bus_down)
         text = fault_text(verdict, found, self.book.saved())
         self.stage.company.console.problem(text)
 

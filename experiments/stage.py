@@ -1,19 +1,17 @@
 """The stage: time passes, keys and stops are heard, rehearsed faults come and go."""
 
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acquisition.control import InlineControl
 from acquisition.cycle import ArmState
+from acquisition.desk import Desk
 from experiments.company import Company, FaultedError, StopAskedError
 from experiments.operator import Asked, Prompt
 from experiments.rigs import Rig
 from experiments.trial import TrialName
 
-SWITCH_INTERVAL = 0.0002  # while slow work shares the interpreter with the loop [s]
 TICK = 0.02  # the console looks this often [s]
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _T = TypeVar("_T")
@@ -24,11 +22,15 @@ class Stage:
     """Rig, loop and company of a session, and the passing of time between them."""
 
     rig: Rig
-    control: InlineControl
     company: Company
     _asked: tuple[Prompt, int, int] | None = None
     _asked_at: int = 0
     _is_stopped: bool = False
+
+    @property
+    def control(self) -> Desk:
+        """The console's side of the loop."""
+        return self.rig.crew.desk
 
     def tick(
         self,
@@ -78,21 +80,16 @@ class Stage:
         self.control.advance(0.1)
 
     def aside(self, work: Callable[[], _T]) -> _T:
-        """Do slow work without letting the loop stop: it is the arm's heartbeat."""
+        """Do slow work while the loop goes on to see that the console is alive."""
         if self.rig.is_stepped:
             return work()
-        interval = sys.getswitchinterval()
-        sys.setswitchinterval(SWITCH_INTERVAL)
-        try:
-            with ThreadPoolExecutor(1) as pool:
-                future = pool.submit(work)
-                while not future.done():
-                    self.control.advance(TICK)
-                    if self.company.stop.is_urgent:
-                        self.obey_stop()
-                return future.result()
-        finally:
-            sys.setswitchinterval(interval)
+        with ThreadPoolExecutor(1) as pool:
+            future = pool.submit(work)
+            while not future.done():
+                self.control.advance(TICK)
+                if self.company.stop.is_urgent:
+                    self.obey_stop()
+            return future.result()
 
     def obey_stop(self) -> None:
         """Hold; when asked twice within 3 s, damp for a moment and brake, once."""
@@ -107,5 +104,6 @@ class Stage:
 
     def make_safe(self) -> bool:
         """Idle the arm and let go of an open file; return whether it is confirmed."""
-        self.control.recorder.abandon()
-        return self.rig.arm.idle()
+        crew = self.rig.crew
+        crew.recorder.abandon()
+        return crew.idle()

@@ -1,11 +1,11 @@
 """One trial on its way to the disk: header, end conditions, sidecar, flight record."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import utc_offset_ns
-from acquisition.control import InlineControl
-from acquisition.devices import WrenchSensor
+from acquisition.flight import last_frames
 from acquisition.recorder import seal
 from acquisition.trial_file.verify import Verified
 from acquisition.trial_file.writer import (
@@ -18,7 +18,6 @@ from experiments import provenance
 from experiments.rigs import Rig
 from experiments.store import SessionFolder, iso_utc
 from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
-from wam.health import health_facts
 from wam.urdf import urdf
 
 TIME_LIMIT = 30.0  # s
@@ -61,12 +60,11 @@ class SessionFacts:
 
 
 def collect_facts(
-    folder: SessionFolder, operator: str, seed: int | None, sensor: WrenchSensor
+    folder: SessionFolder, operator: str, seed: int | None, devices: Mapping[str, str]
 ) -> SessionFacts:
     """Return the facts of a session; asks git once."""
     facts = provenance.collect()
-    for key, value in sensor.describe().items():
-        facts[f"ft_sensor:{key}"] = value
+    facts.update(devices)
     return SessionFacts(folder, operator, seed, facts, provenance.diff_patch())
 
 
@@ -97,7 +95,7 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         "matrix.toml": rig.settings.matrix_text,
         "arm_model.toml": rig.model.constants.text,
         "robot.urdf": urdf(rig.model.constants),
-        "ft_calibration.toml": payload_to_toml(rig.foot.payload, rig.model.tool.sole),
+        "ft_calibration.toml": payload_to_toml(rig.tared, rig.model.tool.sole),
         "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
         "diff.patch": facts.diff,
     }
@@ -105,11 +103,7 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         trial=trial,
         utc_offset_ns=offset,
         offset_uncertainty_ns=uncertainty,
-        provenance={
-            **facts.provenance,
-            **health_facts(rig.arm.health(), rig.clock.now_ns()),
-            **rig.arm.counters.facts(),
-        },
+        provenance={**facts.provenance, **rig.crew.desk.device_facts()},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
     )
@@ -157,12 +151,10 @@ def write_truth(rig: Rig, header: TrialHeader, path: Path) -> Verified | None:
     return seal(writer, "simulation")
 
 
-def write_flight(
-    rig: Rig, control: InlineControl, header: TrialHeader, path: Path, reason: str
-) -> None:
+def write_flight(rig: Rig, header: TrialHeader, path: Path, reason: str) -> None:
     """Write the last two seconds with raw frames after a fault."""
     writer = TrialWriter(path, header, FLIGHT_TOPICS)
-    writer.write_cycles(control.last(FLIGHT_SECONDS))
-    writer.write_can(rig.tape.last(FLIGHT_SECONDS))
+    writer.write_cycles(rig.crew.desk.last(FLIGHT_SECONDS))
+    writer.write_can(last_frames(rig.board.frames, FLIGHT_SECONDS))
     writer.write_event(rig.clock.now_ns(), 40, "fault", reason)
     seal(writer, reason)

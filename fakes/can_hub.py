@@ -43,6 +43,11 @@ class SocketHub:
         """The bus as a client of python-can names it."""
         return f"traction-fake:{self._path}"
 
+    @property
+    def clients(self) -> int:
+        """Number of clients that are connected."""
+        return len(self._clients)
+
     def fileno(self) -> int:
         """Return a descriptor that is readable when somebody connects or sends."""
         return self._poll.fileno()

@@ -28,6 +28,14 @@ class Truth:
         self.t_ns.append(t_ns)
         self._values.extend(values)
 
+    def take(self, rows: int) -> "Truth":
+        """Take the oldest rows away, `rows` at most, and return them."""
+        taken = Truth()
+        taken.t_ns, self.t_ns = self.t_ns[:rows], self.t_ns[rows:]
+        cut = rows * self.COLUMNS
+        taken._values, self._values = self._values[:cut], self._values[cut:]
+        return taken
+
     def table(self) -> Array:
         """Return all rows, shape (n, 19)."""
         return np.array(self._values).reshape(-1, self.COLUMNS)

@@ -1,5 +1,8 @@
 """Live view of the foot: pose, wrench and traction written into the sample."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from acquisition.devices import ArmReading, WrenchSample
@@ -17,6 +20,10 @@ class LiveFoot:
         self._model = model
         self.payload = payload
         self._axes = terrain.axes()
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Take the sensor's reading without load [N, N m], six numbers."""
+        self.payload = replace(self.payload, bias=np.array(bias))
 
     def observe(
         self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample

@@ -76,6 +76,14 @@ class BotaSensor:
         data = self._link.read_available()
         return self._dating.date(self._parser.feed(data), now_ns) if data else []
 
+    def fileno(self) -> int:
+        """Return the descriptor of the port, -1 if it has none."""
+        return self._link.fileno()
+
+    def is_readable(self) -> bool:
+        """Return whether bytes have arrived."""
+        return self._link.is_readable()
+
     @property
     def counters(self) -> SensorCounters:
         """What happened to the stream since it was opened."""

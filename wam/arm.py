@@ -63,6 +63,11 @@ class WamArm:
         return self._started().transmission
 
     @property
+    def sent_ns(self) -> int:
+        """When torques were last handed to the bus [monotonic ns], 0 = never."""
+        return self._traffic.sent_ns
+
+    @property
     def safety(self) -> SafetyModule:
         """The safety module, for use outside the loop."""
         return self._safety
@@ -98,7 +103,11 @@ class WamArm:
         )
         self._motion = Motion(transmission, self._settings)
         self._begin_at_rest()
-        return replace(info, late_replies=self._dialogue.late_replies)
+        pucks = tuple(
+            replace(puck, health=dated)
+            for puck, dated in zip(info.pucks, self.health(), strict=True)
+        )
+        return replace(info, pucks=pucks, late_replies=self._dialogue.late_replies)
 
     def read(self, now_ns: int) -> ArmReading:
         """Ask for the joint positions at `now_ns` and return them.

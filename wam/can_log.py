@@ -7,7 +7,6 @@ from heapq import heapify, heappop, heappushpop
 
 from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
 from acquisition.errors import TractionError
-from wam.frames import Group, group_id
 
 LONGEST_LINE = 120  # characters
 _LINE = re.compile(
@@ -15,9 +14,7 @@ _LINE = re.compile(
     r"([0-7][0-9A-F]{2}|[01][0-9A-F]{7})#((?:[0-9A-F]{2}){0,8}|R[0-8]?)(?: [RT])?",
     re.ASCII | re.IGNORECASE,
 )
-_LAST_OF_CYCLE = group_id(Group.WRIST_TORQUE)  # after it nobody waits for the loop
 _WRITE_AT = 4096  # frames kept back at most
-_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
 _REORDERED = 256  # frames; a log has replies after later questions, never by more
 
 
@@ -110,10 +107,7 @@ def parse_log(lines: Iterable[str]) -> Iterator[LoggedFrame]:
 
 
 class CanLog:
-    """Collects frames as they pass and writes them as text when nobody waits.
-
-    A control loop only appends to a list; lines are written after the last torque frame
-    of a cycle. A disk that fails ends the log and nothing else.
+    """Collects frames and writes them as text; a disk that fails ends the log only.
 
     Attributes:
         failure: why the log ended early, empty if it did not.
@@ -129,16 +123,17 @@ class CanLog:
         self._offset_ns = utc_offset_ns(clock)[0]
         self._frames: list[tuple[int, int, bytes]] = []
 
-    def add(self, can_id: int, data: bytes, stamp: float = 0.0) -> None:
+    def add(self, can_id: int, data: bytes, t_ns: int = 0) -> None:
         """Note a frame.
 
         Args:
             can_id: 11-bit identifier.
             data: payload.
-            stamp: its time by the bus [s], UTC or monotonic; 0.0 = now.
+            t_ns: monotonic time at which it passed [ns]; 0 = now.
         """
-        self._frames.append((self._utc_ns(stamp), can_id, data))
-        if can_id == _LAST_OF_CYCLE or len(self._frames) >= _WRITE_AT:
+        utc_ns = (t_ns or self._clock.now_ns()) + self._offset_ns
+        self._frames.append((utc_ns, can_id, data))
+        if len(self._frames) >= _WRITE_AT:
             self.flush()
 
     def flush(self) -> None:
@@ -153,12 +148,3 @@ class CanLog:
             )
         except OSError as error:
             self.failure = error.strerror or str(error)
-
-    def _utc_ns(self, stamp: float) -> int:
-        now_ns = self._clock.now_ns() + self._offset_ns
-        if stamp:
-            stamp_ns = round(stamp * NS_PER_S)
-            for utc_ns in (stamp_ns, stamp_ns + self._offset_ns):
-                if abs(utc_ns - now_ns) < _PLAUSIBLE_NS:
-                    return utc_ns
-        return now_ns

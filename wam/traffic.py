@@ -85,6 +85,7 @@ class CycleTraffic:
         received: positions of this cycle [counts], motors 1 to 7, None = no reply.
         arm_ns: when the last of them arrived [ns], 0 = none did.
         sent: torques that the bus took last [puck units], motors 1 to 7.
+        sent_ns: when it took them [ns], 0 = never.
         watch: safety module and pucks, asked in the free bus time.
         p_number: number of the property that holds a puck's position.
         companion: asked right after the positions, while the pucks latch theirs.
@@ -96,6 +97,7 @@ class CycleTraffic:
         self.received: list[int | None] = [None] * MOTORS
         self.arm_ns = 0
         self.sent = [0] * MOTORS
+        self.sent_ns = 0
         self.watch = Watch(link, settings)
         self.companion: Companion | None = None
         self.counters = LinkCounters()
@@ -145,6 +147,7 @@ class CycleTraffic:
             self.sent[:4] = units[:4]
             self._link.send(_WRIST_ID, encode_torques(units[4:], self._t_number))
             self.sent[4:] = units[4:]
+            self.sent_ns = self._clock.now_ns()
         except LinkError:
             self.counters.link_errors += 1
             return False

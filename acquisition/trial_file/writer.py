@@ -11,9 +11,8 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
-from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
-from acquisition.flight import RawFrame, encode_can_batch
+from acquisition.flight import encode_can_batch
 from acquisition.messages import CYCLE, TRUTH, schema_text
 from acquisition.sample import CHANNELS, Flag, Record
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
@@ -48,6 +47,7 @@ class TrialHeader:
         attachments: file name to content, e.g. `config.toml`.
         robot_description: URDF of the arm.
         views_every: every how many cycles the 50 Hz views are written, 0 = never.
+        has_frames: the raw frames of the bus are recorded too.
     """
 
     trial: Mapping[str, str]
@@ -58,6 +58,7 @@ class TrialHeader:
     robot_description: str
     rate_hz: int = 500
     views_every: int = 10
+    has_frames: bool = False
 
 
 @dataclass(slots=True)
@@ -132,16 +133,14 @@ class TrialWriter:
                     for topic, view in encode_views(records[i], log_time).items():
                         self._add(topic, log_time, view, publish_time, number)
 
-    def write_wrench_samples(self, samples: list[WrenchSample]) -> None:
-        """Append one batch of sensor samples at the sensor's own rate."""
-        if not samples:
+    def write_wrenches(self, samples: Record) -> None:
+        """Append one batch of sensor samples (records of the board's ring)."""
+        if not len(samples):
             return
-        log_time = samples[-1].t_ns + self._header.utc_offset_ns
+        log_time = int(samples["t_ns"][-1]) + self._header.utc_offset_ns
         writer = CdrWriter().header(log_time, "ft_sensor")
-        writer.sequence(np.array([s.t_ns for s in samples], np.uint64))
-        writer.sequence(np.array([s.counter & 0xFFFFFFFF for s in samples], np.uint32))
-        writer.sequence(np.array([s.status & 0xFFFF for s in samples], np.uint16))
-        writer.sequence(np.array([s.wrench for s in samples], np.float64).ravel())
+        for name in ("t_ns", "counter", "status", "wrench"):
+            writer.sequence(np.ascontiguousarray(samples[name]).ravel())
         with self._guarded():
             self._add("/ft/raw", log_time, writer.finish())
 
@@ -162,11 +161,11 @@ class TrialWriter:
             for i, log_time in enumerate(log_times.tolist()):
                 self._add(TRUTH_TOPIC, log_time, data[i * size : (i + 1) * size])
 
-    def write_can(self, frames: list[RawFrame]) -> None:
-        """Append raw CAN frames as one batch (flight records)."""
-        if not frames:
+    def write_can(self, frames: Record) -> None:
+        """Append raw CAN frames (records of the board's ring) as one batch."""
+        if not len(frames):
             return
-        log_time = frames[-1].t_ns + self._header.utc_offset_ns
+        log_time = int(frames["t_ns"][-1]) + self._header.utc_offset_ns
         with self._guarded():
             self._add(CAN_TOPIC, log_time, encode_can_batch(log_time, frames))
 

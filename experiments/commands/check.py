@@ -17,6 +17,16 @@ EXAMPLES = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `check`."""
     parser.add_argument("--fake", action="store_true", help="simulated devices")
+    parser.add_argument(
+        "--fast", action="store_true", help="stepped time, only with --fake"
+    )
+    parser.add_argument(
+        "--loop-test",
+        type=float,
+        default=5.0,
+        metavar="SECONDS",
+        help="how long the loop is measured (5)",
+    )
     parser.add_argument("--terrain", metavar="NAME", help="row of the matrix (first)")
     parser.add_argument(
         "--config-only", action="store_true", help="check the settings, no device"
@@ -46,12 +56,11 @@ def run(args: argparse.Namespace) -> int:
         return 0
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
-    fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
+    fake = FakeOptions(args.fast, seed=1) if args.fake else None
     rig = connect_rig(settings, row, fake)
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):
-        page = run_preflight(rig, Path(args.data), console)
-        page.sensor.close()
+        run_preflight(rig, Path(args.data), console, args.loop_test)
     console.say("Fit to run.")
     return 0
 

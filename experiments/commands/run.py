@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,11 +68,11 @@ def run(args: argparse.Namespace) -> int:
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {row.name}        {kind}")
         page = run_preflight(rig, Path(args.data), console)
-        with closing(page.sensor), signals_ask(stop):
+        with signals_ask(stop):
             facts = _open_session(args, rig, page, console)
             hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
             company = Company(keys, console, stop, hand, fault)
-            stage = Stage(rig, rig.connect(page.sensor), company)
+            stage = Stage(rig, company)
             code = SessionRunner(stage, facts).run(args.trials or row.trials)
     if company.fault is not None:
         console.say(
@@ -126,7 +125,7 @@ def _open_session(
     console.say(f"session {folder.id}: {folder.path}")
     operator = args.operator or ("auto" if rig.is_simulated else "")
     seed = args.seed if rig.is_simulated else None
-    facts = collect_facts(folder, operator, seed, page.sensor)
+    facts = collect_facts(folder, operator, seed, page.devices)
     write_json(folder.path / "preflight.json", page.as_dict())
     write_json(folder.path / "provenance.json", facts.provenance)
     write_text(folder.path / "config.toml", rig.settings.rig_text)

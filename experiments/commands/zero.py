@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)
     try:
         try:
-            info = rig.arm.start()
+            info = rig.crew.start_arm()
         except TractionError as error:
             raise PreflightError(
                 error.message, hint=error.hint, arm_state="not touched"
@@ -51,10 +51,10 @@ def run(args: argparse.Namespace) -> int:
         if not args.yes and not _is_confirmed(console):
             console.say("Nothing was changed. ARM: idle, braked.")
             return 5
-        rig.arm.define_position(home)
+        rig.crew.define_position(home.tolist())
         console.check(GOOD, "zero", "positions defined at home")
     finally:
-        rig.arm.close()
+        rig.crew.close()
     return 0
 
 

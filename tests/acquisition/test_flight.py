@@ -2,41 +2,61 @@ import struct
 
 import pytest
 
-from acquisition.flight import FrameTape, RawFrame, encode_can_batch
+from acquisition.board import FRAME_DTYPE
+from acquisition.flight import FrameTape, encode_can_batch, last_frames
+from acquisition.shared import Ring
 from tests.acquisition.ros import decode
 
 S = 1_000_000_000
 
 
-def test_the_tape_keeps_the_last_two_seconds():
-    tape = FrameTape()
-    for t_ns in (0, S, 3 * S - 1, 3 * S, 5 * S):
+@pytest.fixture
+def ring():
+    size = Ring.size_of(FRAME_DTYPE, 6)
+    return Ring(memoryview(bytearray(size)), FRAME_DTYPE, 6)
+
+
+def tape_of(ring, times_ns):
+    tape = FrameTape(ring)
+    for t_ns in times_ns:
         tape.add(t_ns, 1, b"")
-    assert [frame.t_ns for frame in tape.last()] == [3 * S, 5 * S]
 
 
-def test_the_span_can_be_chosen():
-    tape = FrameTape()
-    for t_ns in (0, S, 2 * S):
-        tape.add(t_ns, 1, b"")
-    assert [frame.t_ns for frame in tape.last(1.0)] == [S, 2 * S]
+def times(frames):
+    return frames["t_ns"].tolist()
 
 
-def test_an_empty_tape_gives_nothing():
-    assert FrameTape().last() == []
+def test_the_last_two_seconds_are_found(ring):
+    tape_of(ring, (0, S, 3 * S - 1, 3 * S, 5 * S))
+    assert times(last_frames(ring)) == [3 * S, 5 * S]
 
 
-def test_the_tape_does_not_grow():
-    tape = FrameTape(frames=5)
-    for t_ns in range(50):
-        tape.add(t_ns, 1, b"")
-    assert [frame.t_ns for frame in tape.last()] == [45, 46, 47, 48, 49]
+def test_the_span_can_be_chosen(ring):
+    tape_of(ring, (0, S, 2 * S))
+    assert times(last_frames(ring, 1.0)) == [S, 2 * S]
+
+
+def test_an_empty_tape_gives_nothing(ring):
+    assert len(last_frames(ring)) == 0
+
+
+def test_the_tape_does_not_grow(ring):
+    tape_of(ring, range(50))
+    assert times(last_frames(ring)) == [45, 46, 47, 48, 49]
+
+
+def frames_of(*frames):
+    ring = Ring(memoryview(bytearray(Ring.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9)
+    tape = FrameTape(ring)
+    for frame in frames:
+        tape.add(*frame)
+    return ring.last(9)
 
 
 @pytest.mark.parametrize("size", range(9))
 def test_a_frame_is_sixteen_bytes_as_linux_has_it(size):
     data = bytes(range(1, size + 1))
-    payload = encode_can_batch(0, [RawFrame(7, 0x403, data)])
+    payload = encode_can_batch(0, frames_of((7, 0x403, data)))
     batch = decode("traction_msgs/msg/CanBatch", payload)
     raw = batch.frames.tobytes()
     assert len(raw) == 16
@@ -46,7 +66,7 @@ def test_a_frame_is_sixteen_bytes_as_linux_has_it(size):
 
 
 def test_frames_and_times_go_together():
-    frames = [RawFrame(10 + i, i, bytes([i])) for i in range(5)]
+    frames = frames_of(*((10 + i, i, bytes([i])) for i in range(5)))
     batch = decode("traction_msgs/msg/CanBatch", encode_can_batch(3, frames))
     assert batch.t_ns.tolist() == [10, 11, 12, 13, 14]
     assert batch.frames.reshape(5, 16)[:, 8].tolist() == [0, 1, 2, 3, 4]
@@ -54,5 +74,5 @@ def test_frames_and_times_go_together():
 
 
 def test_a_batch_without_frames_is_a_message_too():
-    batch = decode("traction_msgs/msg/CanBatch", encode_can_batch(0, []))
+    batch = decode("traction_msgs/msg/CanBatch", encode_can_batch(0, frames_of()))
     assert (len(batch.t_ns), len(batch.frames)) == (0, 0)

@@ -99,15 +99,6 @@ def test_running_counts_periods_not_calls(work):
     assert work.numbers == [0, 10]
 
 
-def test_a_pause_on_purpose_is_not_a_stall(work):
-    work.loop.run(3)
-    work.clock.sleep_until(work.clock.now_ns() + 1000 * MS)
-    work.loop.restart_grid()
-    work.loop.run(3)
-    assert work.numbers == [0, 1, 2, 3, 4, 5]
-    assert work.loop.stats.skipped == 0
-
-
 def test_a_pause_that_was_not_announced_is_a_stall(work):
     work.loop.run(3)
     work.clock.sleep_until(work.clock.now_ns() + 1000 * MS)

@@ -1,11 +1,15 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from acquisition.board import Board, Role
 from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
+from acquisition.flight import FrameTape
 from acquisition.messages import CYCLE
 from acquisition.recorder import Recorder
-from acquisition.shared import SampleRing
+from acquisition.shared_sensor import publish
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialWriter
 from fakes.clock import SteppedClock
@@ -18,10 +22,11 @@ MS = 1_000_000
 class Desk:
     """A recorder, its ring and its clock, with a loop that runs when told."""
 
-    def __init__(self, folder, slots=8192):
+    def __init__(self, folder):
         self.clock = SteppedClock()
-        self.ring = SampleRing(slots)
-        self.recorder = Recorder(self.ring, self.clock)
+        self.board = Board.create()
+        self.ring = self.board.cycles
+        self.recorder = Recorder(self.board, self.clock)
         self.path = folder / "T01.mcap"
         self.cycle = 0
 
@@ -37,7 +42,7 @@ class Desk:
         self.cycle += cycles
 
     def start(self):
-        self.recorder.start(lambda: TrialWriter(self.path, make_header()))
+        self.recorder.start(self.path, make_header())
 
     def numbers(self):
         return TrialReader(self.path).cycles().data["cycle"].tolist()
@@ -70,7 +75,7 @@ def test_a_trial_begins_one_second_before_its_trigger(desk):
     desk.run(1200)
     desk.start()
     desk.run(300)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert desk.numbers() == list(range(700, 1500))
 
 
@@ -78,37 +83,37 @@ def test_a_young_loop_gives_what_pre_roll_it_has(desk):
     desk.run(40)
     desk.start()
     desk.run(10)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert desk.numbers() == list(range(50))
 
 
 def test_a_second_trial_repeats_nothing_but_its_pre_roll(desk, tmp_path):
     desk.start()
     desk.run(600)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     desk.path = tmp_path / "T02.mcap"
     desk.start()
     desk.run(10)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert desk.numbers() == list(range(100, 610))
 
 
 def test_forces_of_the_pre_roll_are_kept_and_older_ones_are_not(desk):
     desk.clock.sleep_until(desk.clock.now_ns() + 3000 * MS)
     young, old = desk.wrench(999 * MS), desk.wrench(1001 * MS)
-    desk.recorder.add_wrenches([old, young])
+    publish([old, young], desk.board.wrenches)
     desk.start()
     desk.run(5)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert batches(desk) == [[young.t_ns]]
 
 
-def test_forces_do_not_pile_up_between_trials(desk):
-    desk.recorder.add_wrenches([desk.wrench() for _ in range(9000)])
+def test_forces_of_a_fast_sensor_are_all_written(desk):
     desk.start()
+    publish([desk.wrench() for _ in range(9000)], desk.board.wrenches)
     desk.run(5)
-    desk.recorder.stop("end")
-    assert [len(batch) for batch in batches(desk)] == [2000]  # 1 s at 2 kHz
+    desk.recorder.finish("end")
+    assert [len(batch) for batch in batches(desk)] == [9000]
 
 
 def batches(desk):
@@ -123,7 +128,7 @@ def test_draining_writes_what_is_new(desk):
     desk.recorder.drain()
     desk.recorder.drain()
     desk.run(7)
-    verified = desk.recorder.stop("end")
+    verified = desk.recorder.finish("end")
     assert verified.cycles == 17
 
 
@@ -147,25 +152,41 @@ def test_a_fast_drain_does_not_flush_more_often(desk, flushes):
     assert flushes == [125, 250, 375, 500]
 
 
-def test_what_the_ring_lost_is_in_the_result(tmp_path):
-    desk = Desk(tmp_path, slots=64)
-    desk.run(64)
+def test_what_the_ring_lost_is_in_the_result(desk):
     desk.start()
-    desk.run(100)
-    desk.recorder.stop("end")
+    slots = desk.ring.slots
+    desk.run(slots + 99)
+    desk.recorder.finish("end")
     result = TrialReader(desk.path).metadata["result"]
-    assert result["lost_in_ring"] == "100"  # 64 of the pre-roll and 36 after it
-    assert desk.numbers() == list(range(100, 164))
+    assert result["lost_in_ring"] == "100"  # the record being written is not handed out
+    assert desk.numbers() == list(range(100, slots + 99))
 
 
-def test_a_small_ring_is_not_a_loss(tmp_path):
-    desk = Desk(tmp_path, slots=64)
-    desk.run(200)
+def test_a_long_wait_before_the_trigger_is_not_a_loss(desk):
+    desk.run(desk.ring.slots + 200)
     desk.start()
     desk.recorder.drain()
     desk.run(10)
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert TrialReader(desk.path).metadata["result"]["lost_in_ring"] == "0"
+
+
+def test_raw_frames_are_recorded_when_the_header_asks(desk):
+    tape = FrameTape(desk.board.frames)
+    tape.add(desk.clock.now_ns() - 1001 * MS, 1, b"")
+    desk.recorder.start(desk.path, replace(make_header(), has_frames=True))
+    tape.add(desk.clock.now_ns(), 0x404, b"\x30")
+    desk.run(5)
+    desk.recorder.finish("end")
+    ((_, payload),) = messages_of(desk.path)["/can/raw"]
+    frames = decode("traction_msgs/msg/CanBatch", payload).frames
+    assert frames[:4].view("<u4").tolist() == [0x404]
+
+
+def test_a_drain_shows_that_the_recorder_is_alive(desk):
+    desk.run(10)
+    desk.recorder.drain()
+    assert desk.board.beats.last_ns(Role.RECORDER) == desk.clock.now_ns()
 
 
 def test_events_are_written_while_a_trial_runs(desk):
@@ -173,7 +194,7 @@ def test_events_are_written_while_a_trial_runs(desk):
     desk.start()
     desk.run(5)
     desk.recorder.event(20, "operator", "during")
-    desk.recorder.stop("end")
+    desk.recorder.finish("end")
     assert TrialReader(desk.path).topic_counts()["/events"] == 1
 
 
@@ -188,9 +209,8 @@ def test_a_write_error_keeps_the_partial_and_is_told(desk, monkeypatch):
     desk.start()
     desk.run(100, drain_every=10)
     full_disk(monkeypatch)
-    with pytest.raises(TrialFileError, match="No space left"):
-        desk.run(100, drain_every=10)
-    desk.recorder.abandon()
+    desk.run(100, drain_every=10)
+    assert "No space left" in desk.recorder.failure.reason
     assert not desk.recorder.is_recording
     assert not desk.path.exists()
     assert desk.path.with_name("T01.mcap.partial").stat().st_size > 0
@@ -201,7 +221,7 @@ def test_a_write_error_at_the_end_keeps_the_partial(desk, monkeypatch):
     desk.run(100)
     full_disk(monkeypatch)
     with pytest.raises(TrialFileError, match="No space left"):
-        desk.recorder.stop("end")
+        desk.recorder.finish("end")
     assert not desk.recorder.is_recording
     assert [p.name for p in desk.path.parent.iterdir()] == ["T01.mcap.partial"]
 
@@ -211,14 +231,14 @@ def test_a_write_error_in_the_last_drain_ends_the_recording(desk, monkeypatch):
     desk.run(200)  # a quarter of a second has passed: the last drain flushes
     full_disk(monkeypatch)
     with pytest.raises(TrialFileError):
-        desk.recorder.detach()
+        desk.recorder.finish("end")
     assert not desk.recorder.is_recording
 
 
 def test_a_trial_that_cannot_be_verified_is_not_published(desk):
     desk.start()
     with pytest.raises(TrialFileError, match="fewer than two"):
-        desk.recorder.stop("end")
+        desk.recorder.finish("end")
     assert [p.name for p in desk.path.parent.iterdir()] == ["T01.mcap.partial"]
 
 
@@ -231,7 +251,7 @@ def test_a_file_that_cannot_be_opened_leaves_the_recorder_idle(desk):
 
 def test_stopping_without_a_trial_is_an_error_of_the_program(desk):
     with pytest.raises(RuntimeError):
-        desk.recorder.stop("end")
+        desk.recorder.finish("end")
 
 
 def test_abandoning_twice_does_nothing(desk):

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from acquisition.devices import WrenchSample
+from acquisition.board import FRAME_DTYPE, WRENCH_DTYPE
 from acquisition.errors import TrialFileError
-from acquisition.flight import RawFrame
 from acquisition.messages import TRUTH
 from acquisition.recorder import seal
 from acquisition.sample import CHANNELS, Flag
@@ -267,18 +266,17 @@ def test_what_was_flushed_survives_a_kill(tmp_path, cycles):
 
 def test_sensor_samples_keep_their_own_times(tmp_path):
     writer = write_trial(tmp_path / "T.mcap", make_cycles(10))
-    samples = [
-        WrenchSample(START_NS + i, 2**32 + i, (i, 1, 2, 3, 4, 5), i, True, False)
-        for i in range(3)
-    ]
-    writer.write_wrench_samples(samples)
-    writer.write_wrench_samples([])
+    samples = np.zeros(3, WRENCH_DTYPE)
+    samples["t_ns"] = START_NS + np.arange(3)
+    samples["counter"] = samples["status"] = samples["wrench"][:, 0] = np.arange(3)
+    writer.write_wrenches(samples)
+    writer.write_wrenches(samples[:0])
     seal(writer, "end")
     ((time, payload),) = messages_of(tmp_path / "T.mcap")["/ft/raw"]
     batch = decode("traction_msgs/msg/WrenchBatch", payload)
     assert time == START_NS + 2 + OFFSET_NS
     assert batch.t_ns.tolist() == [START_NS, START_NS + 1, START_NS + 2]
-    assert batch.counter.tolist() == [0, 1, 2]  # modulo 2^32
+    assert batch.counter.tolist() == [0, 1, 2]
     assert batch.status.tolist() == [0, 1, 2]
     assert batch.wrench_raw.reshape(3, 6)[:, 0].tolist() == [0, 1, 2]
 
@@ -286,9 +284,9 @@ def test_sensor_samples_keep_their_own_times(tmp_path):
 def test_a_flight_record_keeps_raw_frames(tmp_path):
     writer = TrialWriter(tmp_path / "F.mcap", make_header(), FLIGHT_TOPICS)
     writer.write_cycles(make_cycles(10))
-    writer.write_can(
-        [RawFrame(START_NS, 0x404, b"\x2c"), RawFrame(START_NS + 5, 1, b"")]
-    )
+    frames = np.zeros(2, FRAME_DTYPE)
+    frames["t_ns"] = START_NS, START_NS + 5
+    writer.write_can(frames)
     seal(writer, "fault")
     ((time, payload),) = messages_of(tmp_path / "F.mcap")["/can/raw"]
     batch = decode("traction_msgs/msg/CanBatch", payload)

@@ -70,10 +70,11 @@ def test_a_message_that_does_not_exist_is_refused_with_those_that_do():
 
 
 def test_check_finds_the_simulated_rig_fit(config, tmp_path):
-    done = traction("check", "--fake", "--config", config, "--data", tmp_path)
+    options = ("--config", config, "--data", tmp_path)
+    done = traction("check", "--fake", "--fast", *options)
     assert (done.code, done.err) == (0, "")
     assert done.out.splitlines()[0].endswith("SIMULATED")
-    assert done.out.count(" ✔ ") == 5
+    assert done.out.count(" ✔ ") == 6
     assert done.out.endswith("Fit to run.\n")
     assert list(tmp_path.iterdir()) == []
 

@@ -84,7 +84,7 @@ def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
     reader = TrialReader(path)
     assert reader.metadata["result"]["stop_reason"] == "ft-stale"
     lasted = np.ptp(reader.cycles().data["host_ns"].astype(float)) * 1e-9
-    assert lasted == pytest.approx(2.0, abs=0.05)  # pre-roll, 1 s, two ticks
+    assert lasted == pytest.approx(2.0, abs=0.07)  # pre-roll, 1 s, three ticks
 
 
 def test_the_redone_trial_says_that_it_is_a_second_attempt(stale):

@@ -7,7 +7,7 @@ from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from experiments.messages import Circumstances, fault_text
 from experiments.operator import Prompt
-from experiments.rigs import build_safety_limits
+from experiments.parts import build_safety_limits
 from experiments.settings import load_settings
 from tests.experiments.program import run_watched, traction, write_config
 from wam.frames import encode_set

@@ -1,0 +1,109 @@
+"""What a process asks of the kernel to keep time, and what it was granted."""
+
+import ctypes
+import errno
+import gc
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+
+_MCL_CURRENT, _MCL_FUTURE = 1, 2
+_NEEDS = {
+    "SCHED_FIFO": "root, CAP_SYS_NICE or `ulimit -r`",
+    "memory locked": "root, CAP_IPC_LOCK or `ulimit -l unlimited`",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What a process would like.
+
+    Attributes:
+        priority: of SCHED_FIFO, 0 = ordinary scheduling.
+        core: processor to stay on; None = any.
+        nice: for ordinary scheduling.
+        is_locked: keep all memory resident and let no garbage collector run.
+    """
+
+    priority: int = 0
+    core: int | None = None
+    nice: int = 0
+    is_locked: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """One thing asked for: what, whether it was granted, why not."""
+
+    what: str
+    is_granted: bool
+    reason: str = ""
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the fields by name."""
+        return asdict(self)
+
+
+def choose_cores() -> tuple[int | None, int | None]:
+    """Return (core of the loop, core of everything else); None where one is all."""
+    cores = sorted(os.sched_getaffinity(0))
+    return (cores[-1], cores[0]) if len(cores) > 1 else (None, None)
+
+
+def request(wish: Wish) -> list[Grant]:
+    """Ask the kernel for what `wish` says; what it refuses is in the answer."""
+    grants: list[Grant] = []
+    if wish.core is not None:
+        core = wish.core
+        grants.append(_try(f"core {core}", lambda: os.sched_setaffinity(0, {core})))
+    if wish.priority:
+        parameter = os.sched_param(wish.priority)
+        grants.append(
+            _try(
+                "SCHED_FIFO",
+                lambda: os.sched_setscheduler(0, os.SCHED_FIFO, parameter),
+            )
+        )
+    if wish.nice:
+        grants.append(_try(f"nice {wish.nice}", lambda: _nice(wish.nice)))
+    if wish.is_locked:
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        grants.append(_try("memory locked", _lock_memory))
+    return grants
+
+
+def die_with_parent(signal_number: int) -> None:
+    """Let the kernel send this process a signal when its parent dies."""
+    pr_set_pdeathsig = 1
+    ctypes.CDLL(None, use_errno=True).prctl(pr_set_pdeathsig, signal_number)
+
+
+def page_faults() -> int:
+    """Return how many pages this process had to wait for, minor ones included."""
+    import resource
+
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_minflt + usage.ru_majflt
+
+
+def _nice(value: int) -> None:
+    os.setpriority(os.PRIO_PROCESS, 0, value)
+
+
+def _lock_memory() -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE):
+        number = ctypes.get_errno()
+        raise OSError(number, os.strerror(number))
+
+
+def _try(what: str, ask: Callable[[], object]) -> Grant:
+    try:
+        ask()
+    except OSError as error:
+        name = errno.errorcode.get(error.errno or 0, "error")
+        needs = f"; needs {_NEEDS[what]}" if what in _NEEDS else ""
+        return Grant(what, is_granted=False, reason=f"{name}{needs}")
+    return Grant(what, is_granted=True)

@@ -1,0 +1,316 @@
+"""Who works a rig: everything in this thread, or one process for each job."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from acquisition.board import Board
+from acquisition.clock import Clock
+from acquisition.desk import Desk, InlinePassing
+from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.errors import TractionError
+from acquisition.loop import PERIOD_NS, Loop
+from acquisition.processes import Child, ProcessLostError
+from acquisition.realtime import Grant, choose_cores
+from acquisition.recorder import Recorder, TrialRecording
+from acquisition.recorder_process import RemoteRecorder
+from experiments.parts import LoopParts, build_attendant
+from wam.arm import WamArm
+from wam.startup import ArmInfo
+
+ARM_INFO = TypeAdapter(ArmInfo)
+_GRANTS = TypeAdapter(list[Grant])
+EXCHANGE_CYCLES = 100
+
+
+class Crew(Protocol):
+    """What the console asks of those who work the rig.
+
+    Attributes:
+        desk: the console's side of the loop.
+    """
+
+    desk: Desk
+
+    @property
+    def recorder(self) -> TrialRecording:
+        """What writes the trials."""
+        ...
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        ...
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque.
+
+        Returns:
+            From request to seventh position [ns]; incomplete ones are left out.
+        """
+        ...
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        ...
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        ...
+
+    def begin(self) -> None:
+        """Let the loop run from here on."""
+        ...
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return what the kernel granted to each process."""
+        ...
+
+    def idle(self) -> bool:
+        """Brake the arm whatever has happened; return whether that is confirmed."""
+        ...
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        ...
+
+    def close(self) -> None:
+        """Brake the arm and end everything; safe to repeat."""
+        ...
+
+
+class InlineCrew:
+    """Arm, sensor, loop and recorder in this thread, on any clock."""
+
+    def __init__(
+        self,
+        board: Board,
+        clock: Clock,
+        arm: WamArm,
+        open_sensor: Callable[[], WrenchSensor],
+        parts: Callable[[WrenchSensor], LoopParts],
+    ) -> None:
+        self.arm = arm
+        self._board = board
+        self._clock = clock
+        self._open_sensor = open_sensor
+        self._parts = parts
+        self._sensor: WrenchSensor | None = None
+        self.recorder = Recorder(board, clock)
+        self.desk = Desk(board, clock, _not_begun)
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        return self.arm.start()
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque."""
+        return measure_exchange(self.arm, self._clock)
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        self._sensor = self._open_sensor()
+        return self._sensor.describe()
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        self.arm.define_position(np.array(q))
+
+    def begin(self) -> None:
+        """Let the loop run from here on, whenever the console waits."""
+        if self._sensor is None:
+            raise RuntimeError("the sensor was not opened")
+        attendant = build_attendant(self._parts(self._sensor))
+        loop = Loop(attendant, self._clock)
+        attendant.stats = loop.stats
+        self.desk.passing = InlinePassing(loop, self.recorder)
+        self.desk.beat()
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return nothing: this thread asks for nothing."""
+        return {}
+
+    def idle(self) -> bool:
+        """Brake the arm; return whether that is confirmed."""
+        return self.arm.idle()
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        return self.arm.safety_mode()
+
+    def close(self) -> None:
+        """Brake the arm and give bus and port back; safe to repeat."""
+        self.recorder.abandon()
+        self.arm.close()
+        if self._sensor is not None:
+            self._sensor.close()
+            self._sensor = None
+        self._board.close()
+
+
+def measure_exchange(arm: WamArm, clock: Clock) -> list[int]:
+    """Ask `arm` 100 times for its positions, one period apart, without torque.
+
+    Returns:
+        From request to seventh position [ns]; incomplete exchanges are left out.
+    """
+    times: list[int] = []
+    next_ns = clock.now_ns() + PERIOD_NS
+    for _ in range(EXCHANGE_CYCLES):
+        clock.sleep_until(next_ns)
+        reading = arm.read(clock.now_ns())
+        if reading.is_complete:
+            times.append(reading.arm_ns - reading.host_ns)
+        next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
+    return times
+
+
+def _not_begun(cycles: int) -> None:
+    raise RuntimeError(f"the loop does not run yet; {cycles} cycles were waited for")
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """What the processes are told at their start.
+
+    Attributes:
+        control: settings of the process that has the arm.
+        reader: settings of the process that has the sensor's port; None = the sensor
+            hangs on the arm's bus.
+        fake: settings of the simulated rig; None = the devices are real.
+    """
+
+    control: dict[str, Any]
+    reader: dict[str, Any] | None
+    fake: dict[str, Any] | None
+
+
+class ProcessCrew:
+    """A process for the loop, one for the recorder, one for a serial sensor.
+
+    The simulated devices have a process of their own too. All die with the console;
+    the one with the arm brakes it first.
+    """
+
+    def __init__(self, jobs: Jobs, board: Board, clock: Clock) -> None:
+        self._board = board
+        self._clock = clock
+        self._children: dict[str, Child] = {}
+        self._told: set[str] = set()
+        loop_core, other_core = choose_cores()
+        self._jobs = jobs
+        self.fake: Child | None = None
+        if jobs.fake is not None:
+            self.fake = self._spawn("fake rig", "fakes.station:main", jobs.fake)
+            devices = self.fake.ask("hello")
+            jobs.control["can"] = devices["can"]
+            if jobs.reader is not None:
+                jobs.reader["port"] = devices["port"]
+        jobs.control["core"] = loop_core
+        self._control = self._spawn(
+            "control", "experiments.stations:control", jobs.control
+        )
+        recorder = self._spawn(
+            "recorder", "acquisition.recorder_process:main", {"core": other_core}
+        )
+        self._reader: Child | None = None
+        if jobs.reader is not None:
+            jobs.reader["core"] = other_core
+            self._reader = self._spawn(
+                "sensor reader", "experiments.stations:reader", jobs.reader
+            )
+        self.recorder = RemoteRecorder(recorder, board)
+        self.desk = Desk(board, clock, self._pass)
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        return ARM_INFO.validate_python(self._control.ask("start"))
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque."""
+        return self._control.ask("exchange")
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        return (self._reader or self._control).ask("open")
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        self._control.ask("define", list(q))
+
+    def begin(self) -> None:
+        """Let the loop run from here on."""
+        self.desk.beat()
+        self._control.ask("begin")
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return what the kernel granted to each process."""
+        asked = [self._control, *([self._reader] if self._reader else [])]
+        return {
+            child.name: _GRANTS.validate_python(child.ask("grants"))
+            for child in asked
+            if not (child is self._control and self.desk.loop.is_running)
+        }
+
+    def processes(self) -> dict[str, int]:
+        """Return the numbers of the processes by name."""
+        return {name: child.pid for name, child in self._children.items()}
+
+    def idle(self) -> bool:
+        """Brake the arm; when its process has died, a new one does it."""
+        if not self._control.is_alive:
+            return self._rescue()
+        if self.desk.loop.is_running:
+            return self.desk.idle()
+        return bool(self._control.ask("idle"))
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        if self.desk.loop.is_running or not self._control.is_alive:
+            return self.desk.status.safety
+        return SafetyMode(self._control.ask("mode"))
+
+    def close(self) -> None:
+        """Brake the arm, let the processes end, the simulated rig last."""
+        if not self._children:
+            return
+        try:
+            self.idle()
+            if self._control.is_alive and self.desk.loop.is_running:
+                self.desk.leave()
+        except TractionError:
+            pass  # the safety module brakes an arm that nobody asks any more
+        finally:
+            for child in reversed(self._children.values()):
+                child.stop()
+            self._children.clear()
+            self._board.close()
+
+    def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
+        child = Child(name, target, settings, self._board)
+        self._children[name] = child
+        return child
+
+    def _pass(self, cycles: int) -> None:
+        """Let time pass; raise once for every process that has died meanwhile."""
+        self._clock.sleep_until(self._clock.now_ns() + cycles * PERIOD_NS)
+        for name, child in self._children.items():
+            if name not in self._told and not child.is_alive:
+                self._told.add(name)
+                raise ProcessLostError(name, child.how_it_ended())
+        self.recorder.check()
+
+    def _rescue(self) -> bool:
+        """Brake the arm of a dead process through a new one."""
+        self._children.pop("control").stop()
+        self._control = self._spawn(
+            "control", "experiments.stations:control", self._jobs.control
+        )
+        try:
+            return bool(self._control.ask("idle"))
+        except TractionError:
+            return False

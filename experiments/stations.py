@@ -1,0 +1,209 @@
+"""What the processes beside the console do: one has the arm, one the sensor."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from acquisition.attendant import Attendant
+from acquisition.board import Role
+from acquisition.channel import ChannelClosedError
+from acquisition.clock import SystemClock
+from acquisition.devices import WrenchSensor
+from acquisition.errors import TractionError
+from acquisition.loop import Loop
+from acquisition.processes import Station, name_process
+from acquisition.realtime import Wish, request
+from acquisition.shared_sensor import SharedSensor, publish
+from experiments.crews import ARM_INFO, measure_exchange
+from experiments.parts import (
+    LoopParts,
+    build_arm,
+    build_attendant,
+    build_sensor,
+    build_tool,
+    open_bus_sensor,
+)
+from experiments.settings import RigSettings, TerrainRow
+from ft_sensor.sensor import BotaSensor
+from ft_sensor.serial_link import open_port
+from wam.arm import WamArm
+from wam.can_link import CanLink, open_bus
+from wam.constants import load_constants
+from wam.model import ArmModel
+
+CONTROL_PRIORITY = 80
+READER_PRIORITY = 60
+READ_NS = 20_000_000  # the reader shows being alive this often
+
+
+def control(station: Station) -> None:
+    """Drive the arm: answer the console, then run the loop until it says so."""
+    name_process("traction-control")
+    ControlStation(station).serve()
+
+
+class ControlStation:
+    """The process that has the arm; one thread."""
+
+    def __init__(self, station: Station) -> None:
+        settings = station.settings
+        self._station = station
+        self._clock = SystemClock()
+        self._rig = RigSettings.model_validate(settings["rig"])
+        self._row = TerrainRow.model_validate(settings["row"])
+        self._is_simulated = bool(settings["is_simulated"])
+        constants = load_constants()
+        self._model = ArmModel(constants, build_tool(self._rig, self._row.foot))
+        self._constants = constants
+        self._arm: WamArm | None = None
+        self._link: CanLink | None = None
+        self._sensor: WrenchSensor = SharedSensor(station.board.wrenches)
+        self._attendant: Attendant | None = None
+        self._is_orphaned = False
+        signal.signal(signal.SIGTERM, self._note_orphaned)
+        wish = Wish(CONTROL_PRIORITY, settings.get("core"), is_locked=True)
+        self._grants = request(wish)
+
+    def serve(self) -> None:
+        """Answer until the console hangs up; the arm is braked then."""
+        handlers: dict[str, Callable[[Any], Any]] = {
+            "start": lambda _: ARM_INFO.dump_python(
+                self._opened().start(), mode="json"
+            ),
+            "exchange": lambda _: measure_exchange(self._opened(), self._clock),
+            "define": lambda q: self._opened().define_position(np.array(q)),
+            "begin": lambda _: self._prepare(self._opened()),
+            "idle": lambda _: self._opened().idle(),
+            "mode": lambda _: int(self._opened().safety_mode()),
+            "open": lambda _: self._open_sensor(),
+            "grants": lambda _: [grant.as_dict() for grant in self._grants],
+        }
+        try:
+            while not self._is_orphaned:
+                self._station.channel.answer(handlers)
+                if self._attendant is not None:
+                    self._run(self._attendant)
+                    self._attendant = None
+        except ChannelClosedError:
+            pass
+        finally:
+            if self._arm is not None:
+                self._arm.close()
+
+    def _open_sensor(self) -> dict[str, str]:
+        """Open a wrist sensor on the arm's bus."""
+        arm = self._opened()
+        assert self._link is not None
+        self._sensor = open_bus_sensor(arm, self._link, self._clock)
+        return self._sensor.describe()
+
+    def _opened(self) -> WamArm:
+        """Return the arm, its bus open; raises LinkError."""
+        if self._arm is None:
+            can = self._station.settings["can"]
+            link = self._link = CanLink(
+                open_bus(can["interface"], can["channel"], can["bitrate"])
+            )
+            board = self._station.board
+            self._arm = build_arm(self._rig, self._constants, link, board, self._clock)
+        return self._arm
+
+    def _prepare(self, arm: WamArm) -> None:
+        parts = LoopParts(
+            rig=self._rig,
+            row=self._row,
+            model=self._model,
+            arm=arm,
+            sensor=self._sensor,
+            board=self._station.board,
+            clock=self._clock,
+            is_simulated=self._is_simulated,
+            ring=self._ring_bell,
+        )
+        self._attendant = build_attendant(parts)
+
+    def _run(self, attendant: Attendant) -> None:
+        """Run the loop; whatever ends it, the arm is braked."""
+        self._station.board.memory.touch()
+        loop = Loop(attendant, self._clock)
+        attendant.stats = loop.stats
+        try:
+            while not attendant.is_over:
+                attendant.is_orphaned = self._is_orphaned
+                loop.step()
+        finally:
+            self._opened().idle()
+            attendant.leave()
+
+    def _ring_bell(self) -> None:
+        """Ring the bell of the console's terminal, if it has one."""
+        path = self._station.settings.get("terminal")
+        if not path:
+            return
+        with contextlib.suppress(OSError):
+            terminal = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+            os.write(terminal, b"\a")
+            os.close(terminal)
+
+    def _note_orphaned(self, *_: object) -> None:
+        self._is_orphaned = True
+
+
+def reader(station: Station) -> None:
+    """Read a serial wrist sensor and put every sample onto the board."""
+    name_process("traction-reader")
+    ReaderStation(station).serve()
+
+
+class ReaderStation:
+    """The process that has the sensor's port."""
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self._clock = SystemClock()
+        self._sensor: BotaSensor | None = None
+        self._grants = request(Wish(READER_PRIORITY, station.settings.get("core")))
+
+    def serve(self) -> None:
+        """Answer the console and read what comes until it hangs up."""
+        channel = self._station.channel
+        handlers: dict[str, Callable[[Any], Any]] = {
+            "open": lambda _: self._open(),
+            "grants": lambda _: [grant.as_dict() for grant in self._grants],
+        }
+        try:
+            while True:
+                if self._sensor is None or channel.is_readable():
+                    channel.answer(handlers)
+                else:
+                    self._read(self._sensor)
+        except ChannelClosedError:
+            if self._sensor is not None:
+                self._sensor.close()
+
+    def _open(self) -> dict[str, str]:
+        settings = self._station.settings
+        rig = RigSettings.model_validate(settings["rig"])
+        port = open_port(settings["port"], rig.ft_sensor.baudrate).port
+        is_simulated = bool(settings["is_simulated"])
+        sensor = build_sensor(rig, port, self._clock, is_simulated=is_simulated)
+        sensor.open()
+        self._sensor = sensor
+        return sensor.describe()
+
+    def _read(self, sensor: BotaSensor) -> None:
+        """Publish what arrives within 20 ms; a port that has gone leaves stale ones."""
+        clock, board = self._clock, self._station.board
+        clock.wait(sensor, clock.now_ns() + READ_NS)
+        try:
+            publish(sensor.poll(clock.now_ns()), board.wrenches)
+        except TractionError:
+            sensor.close()
+            self._sensor = None
+        board.beats.beat(Role.READER, clock.now_ns())

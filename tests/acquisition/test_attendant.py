@@ -1,0 +1,179 @@
+import json
+
+import pytest
+
+from acquisition.attendant import Attendant, Surroundings
+from acquisition.board import Board, Role
+from acquisition.cycle import ArmState, ControlStatus
+from acquisition.guard import Action
+from acquisition.loop import PERIOD_NS, Tick
+from acquisition.mailbox import Kind, Mailbox, StatusBoard
+
+MS = 1_000_000
+START_NS = 10**12
+GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+
+
+class Cycle:
+    """Notes what it is asked for."""
+
+    def __init__(self):
+        self.status = ControlStatus()
+        self.replies_ns = 0
+        self.is_recording = False
+        self.requests, self.reports, self.goals, self.biases = [], [], [], []
+        self.ticks = 0
+
+    def request(self, state):
+        self.requests.append(state)
+
+    def report(self, verdict):
+        self.reports.append(verdict)
+
+    def move_to(self, goal):
+        self.goals.append(goal)
+
+    def set_bias(self, bias):
+        self.biases.append(bias)
+
+    def __call__(self, tick):
+        self.ticks += 1
+        self.replies_ns = tick.now_ns + 700_000
+
+
+class Arm:
+    sent_ns = 5
+    is_bus_down = False
+
+
+class Loop:
+    """An attendant whose periods pass when told; the console beats unless silent."""
+
+    def __init__(self):
+        self.board = Board.create()
+        self.cycle = Cycle()
+        self.now_ns = START_NS
+        self.rung = 0
+        self.console = Mailbox(self.board.commands)
+        around = Surroundings(lambda: self.now_ns, lambda: {"puck": "warm"}, self.ring)
+        self.attendant = Attendant(self.cycle, Arm(), self.board, around)
+        self.number = 0
+
+    def ring(self):
+        self.rung += 1
+
+    def run(self, seconds, *, beating=(Role.CONSOLE, Role.RECORDER)):
+        for _ in range(max(1, round(seconds * 500))):
+            for role in beating:
+                self.board.beats.beat(role, self.now_ns)
+            self.attendant(Tick(self.number, self.now_ns, self.now_ns, False))
+            self.number += 1
+            self.now_ns += PERIOD_NS
+
+    def reasons(self):
+        return {verdict.reason for verdict in self.cycle.reports}
+
+
+@pytest.fixture
+def loop():
+    return Loop()
+
+
+def test_commands_reach_the_cycle_and_are_confirmed(loop):
+    loop.console.post(Kind.ENTER, ArmState.FLOAT)
+    loop.console.post(Kind.WATCH_TRIAL, 1)
+    loop.console.post(Kind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    number = loop.console.post(Kind.MOVE, values=GOAL)
+    loop.run(0.002)
+    assert loop.cycle.requests == [ArmState.FLOAT]
+    assert loop.cycle.is_recording
+    assert loop.cycle.biases == [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
+    assert loop.cycle.goals == [GOAL]
+    assert StatusBoard(loop.board.status).read().obeyed == number
+
+
+def test_the_loop_ends_when_it_is_told_to_leave(loop):
+    loop.run(0.01)
+    assert not loop.attendant.is_over
+    loop.console.post(Kind.LEAVE)
+    loop.run(0.002)
+    assert loop.attendant.is_over
+
+
+def test_the_end_of_the_loop_can_be_seen(loop):
+    loop.run(0.01)
+    assert StatusBoard(loop.board.status).read().is_running
+    loop.attendant.leave()
+    assert not StatusBoard(loop.board.status).read().is_running
+
+
+def test_a_beating_console_and_recorder_leave_the_arm_alone(loop):
+    loop.cycle.is_recording = True
+    loop.run(3.0)
+    assert loop.cycle.reports == []
+
+
+def test_a_silent_console_makes_the_arm_hold_within_half_a_second(loop):
+    loop.run(0.1)
+    loop.run(0.5, beating=())
+    assert loop.cycle.reports == []
+    loop.run(0.004, beating=())
+    assert loop.reasons() == {"console-silent"}
+    assert {verdict.action for verdict in loop.cycle.reports} == {Action.HOLD}
+
+
+def test_a_console_that_comes_back_is_believed(loop):
+    loop.run(0.1)
+    loop.run(0.6, beating=())
+    loop.cycle.reports.clear()
+    loop.run(0.1)
+    assert loop.cycle.reports == []
+
+
+def test_an_arm_left_alone_for_a_minute_rings_every_second(loop):
+    loop.run(0.1)
+    loop.run(59.9, beating=())
+    assert loop.rung == 0
+    loop.run(3.2, beating=())
+    assert loop.rung == 3
+    assert not loop.attendant.is_over
+
+
+def test_a_silent_recorder_stops_a_trial_only(loop):
+    loop.run(0.1)
+    loop.run(1.0, beating=(Role.CONSOLE,))
+    assert loop.cycle.reports == []
+    loop.cycle.is_recording = True
+    loop.run(0.002, beating=(Role.CONSOLE,))
+    assert loop.reasons() == {"recorder-silent"}
+
+
+def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
+    loop.run(0.1)
+    loop.attendant.is_orphaned = True
+    loop.run(0.002)
+    assert loop.reasons() == {"console-lost"}
+    loop.run(0.998)
+    assert loop.cycle.requests == []
+    loop.run(0.01)
+    assert set(loop.cycle.requests) == {ArmState.IDLE}
+    assert loop.attendant.is_over
+
+
+def test_the_loop_shows_that_it_is_alive_and_when_what_happened(loop):
+    loop.run(0.004)
+    assert loop.board.beats.last_ns(Role.CONTROL) == START_NS + PERIOD_NS
+    (first, second) = loop.board.timings.last(2)
+    assert int(second["number"]) == int(first["number"]) + 1
+    assert int(second["replies_ns"]) == START_NS + PERIOD_NS + 700_000
+    assert int(second["sent_ns"]) == Arm.sent_ns
+
+
+def test_what_the_devices_say_is_published_once_a_second(loop):
+    loop.run(0.002)
+    version = loop.board.health.version
+    assert json.loads(loop.board.health.read()) == {"puck": "warm"}
+    loop.run(0.99)
+    assert loop.board.health.version == version
+    loop.run(0.02)
+    assert loop.board.health.version != version

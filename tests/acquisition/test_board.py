@@ -1,0 +1,60 @@
+from pathlib import Path
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.board import Board, Role, pack_wrench, unpack_wrenches
+from acquisition.devices import WrenchSample
+from acquisition.memory import SharedMemory
+from acquisition.messages import CYCLE
+
+finite = st.floats(allow_nan=False)
+BOARD = Board.create()
+
+
+def test_two_who_map_the_same_memory_see_the_same():
+    one = Board.create()
+    other = Board(SharedMemory(one.memory.descriptor))
+    payload = (bytes(range(256)) * 3)[: CYCLE.size]
+    one.cycles.write(payload)
+    one.status.write(b"fine")
+    one.beats.beat(Role.READER, 7)
+    assert other.cycles.last(1).tobytes() == payload
+    assert other.status.read() == b"fine"
+    assert other.beats.last_ns(Role.READER) == 7
+
+
+def test_areas_do_not_overlap():
+    board = Board.create()
+    rings = (board.commands, board.cycles, board.wrenches, board.frames, board.timings)
+    for number, ring in enumerate(rings, 1):
+        size = ring.last(0).dtype.itemsize
+        for _ in range(ring.slots):
+            ring.write(bytes([number]) * size)
+    for slot in (board.status, board.recorder, board.health):
+        slot.write(b"\xff" * 8192)
+    for number, ring in enumerate(rings, 1):
+        records = ring.last(ring.slots)
+        assert len(records) == ring.slots - 1
+        assert set(records.tobytes()) == {number}
+    assert all(board.beats.last_ns(role) == 0 for role in Role)
+
+
+@given(
+    st.integers(0, 2**63),
+    st.integers(0, 2**32 - 1),
+    st.tuples(*[finite] * 6),
+    st.integers(0, 2**16 - 1),
+    st.booleans(),
+    st.booleans(),
+)
+def test_a_sample_survives_the_ring(t_ns, counter, wrench, status, valid, saturated):
+    sample = WrenchSample(t_ns, counter, wrench, status, valid, saturated)
+    ring = BOARD.wrenches
+    ring.write(pack_wrench(sample))
+    assert unpack_wrenches(ring.last(1)) == [sample]
+
+
+def test_the_memory_has_no_name_that_could_be_left_behind():
+    descriptor = BOARD.memory.descriptor
+    assert "memfd" in str(Path(f"/proc/self/fd/{descriptor}").readlink())

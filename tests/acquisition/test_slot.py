@@ -1,0 +1,43 @@
+import pytest
+
+from acquisition.shared import LINE, Slot
+
+
+@pytest.fixture
+def memory():
+    return memoryview(bytearray(LINE + 100))
+
+
+def test_a_slot_gives_the_newest_value_to_everyone_who_maps_it(memory):
+    writer, reader = Slot(memory), Slot(memory)
+    writer.write(b"old and long")
+    writer.write(b"new")
+    assert reader.read() == b"new"
+
+
+def test_a_slot_is_empty_before_its_first_value(memory):
+    assert Slot(memory).read() == b""
+
+
+def test_every_value_has_a_version_of_its_own(memory):
+    slot = Slot(memory)
+    versions = set()
+    for value in (b"a", b"a", b"b"):
+        slot.write(value)
+        versions.add(slot.version)
+    assert len(versions) == 3
+
+
+def test_a_value_that_is_being_written_is_not_read(memory):
+    slot = Slot(memory)
+    slot.write(b"whole")
+    memory[:8].cast("Q")[0] += 1  # a writer that was stopped in the middle
+    assert slot.read() == b""
+
+
+def test_what_does_not_fit_is_refused_and_the_old_value_stays(memory):
+    slot = Slot(memory)
+    slot.write(b"x" * 100)
+    with pytest.raises(ValueError, match="101 bytes"):
+        slot.write(b"y" * 101)
+    assert slot.read() == b"x" * 100

@@ -1,0 +1,64 @@
+"""One process of a running trial is killed; what the arm does, what is left."""
+
+import contextlib
+
+import numpy as np
+import pytest
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
+
+from acquisition.clock import NS_PER_S
+from acquisition.cycle import ArmState
+from acquisition.devices import SafetyMode
+from acquisition.messages import CYCLE
+from tests.processes.watching import CLOCK, is_running, session, until, wait
+
+pytestmark = pytest.mark.wall_clock
+SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
+REACTION = 0.6  # s
+LOSS = 0.5  # s of the running trial
+VICTIMS = ("recorder", "console", "sensor reader", "control")
+
+
+def moments(count):
+    rng = np.random.default_rng(20)
+    return [(v, float(s)) for v in VICTIMS for s in rng.uniform(0.3, 6.0, count)]
+
+
+def is_safe(seen):
+    """Return whether the arm holds or is braked, as loop or pucks say."""
+    if is_running(seen.pids["control"]):
+        return seen.status().control.state in SAFE
+    return seen.pucks_mode() in {SafetyMode.IDLE, SafetyMode.E_STOP}
+
+
+def last_cycle_ns(seen):
+    """Return when the last cycle that can be read was measured."""
+    (folder,) = seen.data.glob("sessions/*.fake")
+    whole = [*folder.glob("trials/T*.mcap"), *folder.glob("rejected/T*.mcap")]
+    whole = [path for path in whole if "truth" not in path.name]
+    (path,) = whole or folder.glob("trials/*.partial")
+    last = None
+    with path.open("rb") as stream, contextlib.suppress(McapError):
+        reader = NonSeekingReader(stream)
+        for _, _, message in reader.iter_messages("/cycle", log_time_order=False):
+            last = message.data
+    return int(np.frombuffer(last, CYCLE.dtype)["host_ns"][0])
+
+
+@pytest.mark.parametrize(("victim", "after"), moments(1))
+def test_a_killed_process_costs_half_a_second_at_most(tmp_path, victim, after):
+    with session(tmp_path / "data") as seen:
+        seen.wait_for_trial()
+        wait(after)
+        killed_ns = seen.kill(victim)
+        assert until(lambda: is_safe(seen), REACTION) is not None, seen.output()
+        assert until(lambda: not is_running(seen.process.pid), 30)
+        if victim != "console":
+            assert seen.process.wait(1) == 4, seen.output()
+            assert f"{victim} process ended" in seen.output()
+        gone = until(lambda: not any(is_running(pid) for pid in seen.pids.values()), 10)
+        assert gone, "a process was left behind"
+    lost = (killed_ns - last_cycle_ns(seen)) / NS_PER_S
+    assert lost <= LOSS
+    assert CLOCK.now_ns() > killed_ns

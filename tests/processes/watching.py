@@ -1,0 +1,148 @@
+"""A session in processes, seen from outside: who runs, what the arm does."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+
+from acquisition.board import Board
+from acquisition.clock import NS_PER_S, SystemClock
+from acquisition.devices import SafetyMode
+from acquisition.mailbox import StatusBoard
+from acquisition.memory import SharedMemory
+from fakes.can_socket import SocketBus
+
+ROOT = Path(__file__).parents[2]
+CLOCK = SystemClock()
+NAMES = {
+    "control": "traction-contro",  # the kernel keeps 15 characters
+    "recorder": "traction-record",
+    "sensor reader": "traction-reader",
+    "fake rig": "traction-fake",
+}
+START = "import sys; from experiments.cli import main; sys.exit(main())"
+
+
+def wait(seconds):
+    CLOCK.sleep_until(CLOCK.now_ns() + int(seconds * NS_PER_S))
+
+
+def until(condition, seconds):
+    """Wait until `condition()` is true; return its value, None after `seconds`."""
+    end_ns = CLOCK.now_ns() + int(seconds * NS_PER_S)
+    while CLOCK.now_ns() < end_ns:
+        if value := condition():
+            return value
+        wait(0.01)
+    return None
+
+
+def children_of(pid):
+    """Return {short name: pid} of the living children of `pid`."""
+    found = {}
+    for task in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (task / "stat").read_text()
+        except OSError:
+            continue
+        name = fields[fields.index("(") + 1 : fields.rindex(")")]
+        state, parent = fields[fields.rindex(")") + 2 :].split()[:2]
+        if int(parent) == pid and state != "Z":
+            found[name] = int(task.name)
+    return found
+
+
+def is_running(pid):
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state not in {"Z", "X"}
+
+
+class Session:
+    """A `traction run --fake` in a process of its own."""
+
+    def __init__(self, process, data):
+        self.process = process
+        self.data = data
+        self.pids = {}
+        self.board = None
+
+    def wait_for_trial(self):
+        """Return when a trial is being recorded."""
+        assert until(self._is_recording, 40), self.output()
+        children = children_of(self.process.pid)
+        self.pids = {name: children[short] for name, short in NAMES.items()}
+        self.board = Board(SharedMemory(self._open_board()))
+
+    def journal(self):
+        paths = list(self.data.glob("sessions/*/events.jsonl"))
+        if not paths:
+            return []
+        return [json.loads(line) for line in paths[0].read_text().splitlines()]
+
+    def status(self):
+        return StatusBoard(self.board.status).read()
+
+    def pucks_mode(self):
+        """Ask the simulated safety module for its mode, as another host on the bus."""
+        pid = self.pids["fake rig"]
+        (path,) = Path(tempfile.gettempdir()).glob(f"traction-{pid}-*/can")
+        with SocketBus(str(path)) as bus:
+            bus.send(
+                can.Message(arbitration_id=0x00A, is_extended_id=False, data=b"\x08")
+            )
+            while (message := bus.recv(0.2)) is not None:
+                if message.arbitration_id == 0x546 and message.data[0] == 0x88:
+                    return SafetyMode(message.data[2])
+        return None
+
+    def output(self):
+        return (self.data / "out.txt").read_text()
+
+    def kill(self, name):
+        """Kill the process `name`; return when [monotonic ns]."""
+        pid = self.process.pid if name == "console" else self.pids[name]
+        os.kill(pid, signal.SIGKILL)
+        return CLOCK.now_ns()
+
+    def _is_recording(self):
+        return any(entry["event"] == "trial-started" for entry in self.journal())
+
+    def _open_board(self):
+        """Open the memory through the process that has the arm."""
+        folder = Path(f"/proc/{self.pids['control']}/fd")
+        for descriptor in folder.iterdir():
+            if descriptor.readlink().name.startswith("memfd:traction ") or str(
+                descriptor.readlink()
+            ).startswith("/memfd:traction ("):
+                return os.open(descriptor, os.O_RDWR)
+        raise AssertionError("the board was not found")
+
+
+@contextmanager
+def session(data, *options):
+    """Start a session; whatever is left of it at the end is ended."""
+    data.mkdir(parents=True, exist_ok=True)
+    command = [sys.executable, "-c", START, "run", "S0", "--fake", "--trials", "1"]
+    command += ["--operator-script", "auto", "--data", str(data), *options]
+    with (data / "out.txt").open("w") as out:
+        process = subprocess.Popen(
+            command, cwd=ROOT, stdout=out, stderr=out, stdin=subprocess.DEVNULL
+        )
+    seen = Session(process, data)
+    try:
+        yield seen
+    finally:
+        left = [process.pid, *seen.pids.values()]
+        for pid in left:
+            if is_running(pid):
+                os.kill(pid, signal.SIGKILL)
+        process.wait(10)

@@ -1,0 +1,32 @@
+"""Puts every frame of the arm's bus on the tape, with the best time there is."""
+
+from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
+from acquisition.flight import FrameTape
+
+_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
+
+
+class FrameTap:
+    """Implements `wam.can_link.Tap`; times are monotonic [ns].
+
+    A bus stamps what it receives by UTC or by the monotonic clock [s], or not at all
+    (0.0); what has no stamp that can be believed is of now.
+    """
+
+    def __init__(self, tape: FrameTape, clock: Clock) -> None:
+        self._tape = tape
+        self._clock = clock
+        self._offset_ns = utc_offset_ns(clock)[0]
+
+    def __call__(self, can_id: int, data: bytes, stamp: float) -> None:
+        """Note a frame."""
+        self._tape.add(self._monotonic_ns(stamp), can_id, data)
+
+    def _monotonic_ns(self, stamp: float) -> int:
+        now_ns = self._clock.now_ns()
+        if stamp:
+            stamp_ns = round(stamp * NS_PER_S)
+            for t_ns in (stamp_ns - self._offset_ns, stamp_ns):
+                if 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
+                    return t_ns
+        return now_ns
