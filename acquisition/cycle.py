@@ -124,6 +124,7 @@ class Cycle:
         self._sample = Sample()
         self._wrench: WrenchSample | None = None
         self._wrench_ns = 0
+        self._speed = 0.0
         self._requested: ArmState | None = None
         self._goal: Vector | None = None
         self._reported: Verdict | None = None
@@ -157,7 +158,6 @@ class Cycle:
         """Run the cycle `tick`."""
         reading = self._arm.read(tick.now_ns)
         self.replies_ns = reading.arm_ns
-        is_new = self._take_wrench(tick.now_ns)
         status = self.status
         status.safety = self._arm.safety_mode()
         self._confirm_idle(reading)
@@ -165,16 +165,18 @@ class Cycle:
         self._begin_move(reading)
         tau, tau_gravity = self._torque(reading)
         sample = self._sample
-        speed = self._observer.observe(
-            reading, self._wrench if is_new else None, sample
-        )
-        verdict = self._judge(tick, reading, speed, tau)
+        verdict = self._judge(tick, reading, tau)
         if verdict.action is not Action.NONE:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
         if reading.missing_cycles == 0 and status.state is not ArmState.UNKNOWN:
             sent = self._arm.send(tau, tau_gravity)
+        # The torque has left; what follows is looked at by the next cycle's guard.
+        is_new = self._take_wrench(tick.now_ns)
+        self._speed = self._observer.observe(
+            reading, self._wrench if is_new else None, sample
+        )
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._sink(sample.payload())
 
@@ -191,7 +193,6 @@ class Cycle:
         if self._wrench_ns == 0:
             self._wrench_ns = now_ns
         age = now_ns - self._wrench_ns
-        self.status.ft_age_ns = age
         return self._wrench is not None and age <= self._limits.ft_stale_ns
 
     def _enter_requested(self, reading: ArmReading) -> None:
@@ -238,16 +239,16 @@ class Cycle:
             return _ZERO, _ZERO
         return self._law.torque(reading)
 
-    def _judge(
-        self, tick: Tick, reading: ArmReading, speed: float, tau: Vector
-    ) -> Verdict:
+    def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> Verdict:
         status = self.status
+        if self._wrench_ns:
+            status.ft_age_ns = tick.now_ns - self._wrench_ns
         self._was_active |= status.safety is SafetyMode.ACTIVE
         is_commanded = status.state not in {ArmState.IDLE, ArmState.UNKNOWN}
         seen = Observation(
             reading=reading,
             safety=status.safety,
-            foot_speed=speed,
+            foot_speed=self._speed,
             joint7_offset=self._law.joint7_offset(reading),
             ft_age_ns=status.ft_age_ns,
             tau=tau,

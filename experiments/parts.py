@@ -69,10 +69,10 @@ def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
     """Return the guard's limits of rig.toml."""
     limits = rig.limits
     return Limits(
-        q_lower=constants.q_lower,
-        q_upper=constants.q_upper,
-        qd=np.array(limits.speed),
-        tau=np.array(limits.torque),
+        q_lower=tuple(constants.q_lower.tolist()),
+        q_upper=tuple(constants.q_upper.tolist()),
+        qd=limits.speed,
+        tau=limits.torque,
         foot_speed=limits.foot_speed,
         joint7=limits.joint7_mrad * 1e-3,
         ft_stale_ns=round(limits.ft_stale_ms * MS),

@@ -13,9 +13,9 @@ from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
 MS = 1_000_000
 START_NS = 1_000 * MS
 LIMITS = Limits(
-    q_lower=np.full(7, -2.0),
-    q_upper=np.full(7, 2.0),
-    qd=np.full(7, 1.5),
+    q_lower=(-2.0,) * 7,
+    q_upper=(2.0,) * 7,
+    qd=(1.5,) * 7,
     tau=np.full(7, 30.0),
 )
 TORQUE = {
