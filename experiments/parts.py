@@ -33,6 +33,7 @@ from wam.health import health_facts
 from wam.joint_lock import LockGains
 from wam.model import ArmModel
 from wam.safety_limits import WARNING_SHARE, SafetyLimits
+from wam.soft_walls import SoftWalls, Walls
 from wam.tool import Tool, sensor_body
 
 MS = 1_000_000
@@ -78,6 +79,16 @@ def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
         ft_stale_ns=round(limits.ft_stale_ms * MS),
         ft_stop_ns=round(limits.ft_stop_ms * MS),
         late_per_second=limits.late_per_second,
+    )
+
+
+def build_walls(rig: RigSettings, constants: ArmConstants) -> Walls:
+    """Return the soft walls before the joint stops."""
+    return Walls(
+        lower=tuple(constants.q_lower.tolist()),
+        upper=tuple(constants.q_upper.tolist()),
+        torque=rig.limits.torque,
+        damping=tuple(constants.kd.tolist()),
     )
 
 
@@ -184,6 +195,7 @@ def build_attendant(parts: LoopParts) -> Attendant:
             model,
             control.virtual_mass,
             LockGains(kp=control.lock_kp, kd=control.lock_kd),
+            SoftWalls(build_walls(parts.rig, model.constants)),
         ),
         LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
         build_limits(parts.rig, model.constants),

@@ -6,6 +6,7 @@ from wam.gravity import VirtualMass, compensation
 from wam.joint_lock import JointLock, LockGains
 from wam.model import ArmModel
 from wam.move import JointMove, joint_pd
+from wam.soft_walls import SoftWalls
 
 _JOINT7 = 6
 
@@ -15,17 +16,23 @@ class FootController:
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
     their bounce. hold and damp: gravity plus joint damping, virtual mass ramped to 0.
-    Joint 7 is locked in all three. In hold the arm can be sent somewhere; joint PD then
-    follows the move and keeps the goal until another state is entered.
+    Joint 7 is locked in all three, and soft walls stand before the stops. In hold the
+    arm can be sent somewhere; joint PD then follows the move and keeps the goal until
+    another state is entered.
     """
 
     def __init__(
-        self, model: ArmModel, virtual_mass: float, gains: LockGains | None = None
+        self,
+        model: ArmModel,
+        virtual_mass: float,
+        gains: LockGains | None = None,
+        walls: SoftWalls | None = None,
     ) -> None:
         self._model = model
         self._target_mass = virtual_mass
         self._mass = VirtualMass()
         self._lock = JointLock(gains)
+        self._walls = walls
         self._damping = model.constants.kd
         self._is_damped = True
         self._move: JointMove | None = None
@@ -72,12 +79,18 @@ class FootController:
             rate = qd - reading.qd
             pd = joint_pd(constants.kp, constants.kd, q - reading.q, rate)
             pd[_JOINT7] += lock  # fades from the moment of its release
-            return gravity + pd, gravity
+            return self._walled(gravity + pd, reading), gravity
         tau = gravity.copy()
         if self._is_damped:
             tau -= self._damping * reading.qd
         tau[_JOINT7] = gravity[_JOINT7] + lock
-        return tau, gravity
+        return self._walled(tau, reading), gravity
+
+    def _walled(self, tau: Vector, reading: ArmReading) -> Vector:
+        if self._walls is None:
+            return tau
+        push = self._walls.torque(reading.q, reading.qd)
+        return tau if push is None else tau + push
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""

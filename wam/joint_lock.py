@@ -43,14 +43,17 @@ class JointLock:
     def engage(self, q7: float, now_ns: int) -> None:
         """Lock at `q7` [rad]; does nothing if the lock holds already.
 
-        A lock that is still letting go takes hold anew, from no stiffness at all.
+        A lock that is still letting go takes hold again with the strength it has left,
+        at a reference that gives the torque it gives now, and moves that to `q7`.
         """
         if self._is_engaged:
             return
+        left = self._stiffness_share(now_ns)
+        self._from = self.reference(now_ns) if left > 0.0 else q7
+        self._goal = q7
         self._is_engaged = True
-        self._from = self._goal = q7
         self._moved_ns = self._since_ns = now_ns
-        self._share = 0.0
+        self._share = left
 
     def move(self, q7: float, now_ns: int) -> None:
         """Let the reference go to `q7` [rad] at its largest speed, if engaged."""
@@ -89,5 +92,5 @@ class JointLock:
     def _stiffness_share(self, now_ns: int) -> float:
         grown = (now_ns - self._since_ns) * 1e-9 / RAMP
         if self._is_engaged:
-            return min(grown, 1.0)
+            return min(self._share + grown, 1.0)
         return max(self._share - grown, 0.0)

@@ -121,12 +121,28 @@ def test_a_lock_that_does_not_hold_cannot_be_moved(lock):
     assert lock.reference(FULL + S) == 0.4
 
 
-def test_a_lock_engaged_again_grows_again_at_its_new_place(lock):
+@pytest.mark.parametrize("faded", [0.0, 0.1, 0.4])
+def test_a_lock_engaged_again_while_it_fades_gives_no_bump(lock, faded):
+    again = FULL + int(faded * S)
     lock.release(FULL)
-    lock.engage(1.0, FULL)
+    before = lock.torque(0.43, 0.0, again)
+    assert before != 0.0
+    lock.engage(0.43, again)
+    assert lock.torque(0.43, 0.0, again) == pytest.approx(before, abs=1e-12)
+
+
+def test_a_lock_engaged_again_ends_at_its_new_place_in_full_strength(lock):
+    lock.release(FULL)
+    lock.engage(0.43, FULL + S // 10)
     assert lock.is_engaged
-    assert lock.torque(1.1, 0.0, FULL) == 0.0
-    assert lock.torque(1.01, 0.0, FULL + S) == pytest.approx(-0.2, abs=1e-12)
+    assert lock.torque(0.44, 0.0, FULL + S) == pytest.approx(-0.2, abs=1e-12)
+
+
+def test_a_lock_that_has_faded_begins_from_nothing_at_its_new_place(lock):
+    lock.release(FULL)
+    lock.engage(1.0, FULL + S)
+    assert lock.torque(1.1, 0.0, FULL + S) == 0.0
+    assert lock.torque(1.01, 0.0, FULL + 2 * S) == pytest.approx(-0.2, abs=1e-12)
 
 
 def test_a_fresh_lock_does_nothing():
