@@ -15,6 +15,7 @@ COMMANDS = {
     "status": "the matrix board, counted from verified files",
     "zero": "set the home position after confirmation",
     "bench": "what the loop achieves on this machine",
+    "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "what was said on the bus, in words",
     "report": "fit and compare models of recorded sessions, write the report",

@@ -30,6 +30,8 @@ class Prompt(Enum):
     """What the person is asked for."""
 
     SUPPORT = "support"
+    CLEAR = "clear"
+    MOVING = "moving"
     LIFT = "lift"
     READY = "ready"
     RECORDING = "recording"
@@ -71,7 +73,7 @@ class AutoKeys:
 
     def answer(self, asked: Asked) -> str:
         """Return a key as soon as it makes sense."""
-        if asked.prompt is Prompt.SUPPORT:
+        if asked.prompt in {Prompt.SUPPORT, Prompt.CLEAR}:
             return " "
         if asked.prompt is Prompt.LIFT:
             return "q" if asked.since > AUTO_PATIENCE else ""
@@ -163,6 +165,8 @@ class RehearsedHand:
             self._rehearsal.pendant("activate")
         elif asked.prompt is Prompt.LIFT:
             self._rehearsal.lift()
+        elif asked.prompt is Prompt.CLEAR:
+            self._rehearsal.let_go()
         elif asked.prompt is Prompt.READY:
             self._rehearsal.prepare(asked.trial + 1000 * (asked.attempt - 1))
             self._rehearsal.put_down()

@@ -26,6 +26,10 @@ class Rehearsing(Protocol):
         """Let the hand lift the foot above the far end."""
         ...
 
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        ...
+
     def put_down(self) -> None:
         """Let the hand put the foot down there."""
         ...
@@ -69,6 +73,10 @@ class RemoteRehearsal:
     def lift(self) -> None:
         """Let the hand lift the foot above the far end."""
         self._child.ask("lift")
+
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        self._child.ask("let_go")
 
     def put_down(self) -> None:
         """Let the hand put the foot down there."""

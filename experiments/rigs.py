@@ -14,6 +14,7 @@ from experiments.crews import Crew, InlineCrew, Jobs, ProcessCrew
 from experiments.parts import (
     LoopParts,
     build_arm,
+    build_law_model,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -83,10 +84,13 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     """
     tool = build_tool(settings.rig, row.foot)
     model = ArmModel(load_constants(), tool)
+    law_model = build_law_model(settings.rig, settings.gravity_text, tool)
     board = Board.create()
     rehearsal: Rehearsing | None = None
     if fake is not None and fake.is_fast:
-        clock, crew, rehearsal = _stepped(settings, row, fake.seed, model, board)
+        clock, crew, rehearsal = _stepped(
+            settings, row, fake.seed, (model, law_model), board
+        )
     else:
         clock = SystemClock()
         crew = ProcessCrew(_jobs(settings, row, fake, tool), board, clock)
@@ -119,6 +123,7 @@ def _jobs(
     control = {
         **common,
         "row": row.model_dump(mode="json"),
+        "gravity": settings.gravity_text,
         "can": rig.can.model_dump(mode="json"),
         "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
     }
@@ -152,7 +157,11 @@ def _scene_facts(row: TerrainRow, seed: int) -> dict[str, Any]:
 
 
 def _stepped(
-    settings: Settings, row: TerrainRow, seed: int, model: ArmModel, board: Board
+    settings: Settings,
+    row: TerrainRow,
+    seed: int,
+    models: tuple[ArmModel, ArmModel],
+    board: Board,
 ) -> tuple[Clock, Crew, Rehearsing]:
     """Return (clock, crew, handle) of a simulation that runs in this thread."""
     from fakes.clock import SteppedClock
@@ -161,6 +170,7 @@ def _stepped(
     from fakes.station import scene_of
 
     clock = SteppedClock()
+    model, law_model = models
     assert model.tool is not None
     scene = scene_of(_scene_facts(row, seed))
     is_on_bus = settings.rig.ft_sensor.kind == "barrett"
@@ -183,6 +193,7 @@ def _stepped(
             rig=settings.rig,
             row=row,
             model=model,
+            law_model=law_model,
             arm=arm,
             sensor=opened,
             board=board,

@@ -7,11 +7,11 @@ import numpy as np
 
 from acquisition.board import unpack_wrenches
 from acquisition.cycle import ArmState
-from acquisition.devices import SafetyMode
-from acquisition.errors import PreflightError, TractionError
+from acquisition.errors import TractionError
 from acquisition.guard import Verdict
 from acquisition.processes import ProcessLostError
 from acquisition.trial_file.writer import TrialHeader
+from experiments.activation import activate
 from experiments.archive import ENOUGH, Archive, Outcome
 from experiments.book import Book
 from experiments.company import FaultedError, StopAskedError
@@ -29,7 +29,6 @@ STILL_SPEED = 0.01  # m/s
 LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
 LIVE_SECONDS = 5.0  # between two lines of a running trial
 FAULTS_IN_A_ROW = 5  # end the session: something is wrong that redoing cannot mend
-PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 
 
@@ -57,7 +56,7 @@ class SessionRunner:
         self.book.note("session-started", terrain=row.name, trials=trials)
         code, reason = 1, "bug"
         try:
-            self._activate()
+            activate(self.stage)
             while not self.book.state.is_complete:
                 self._try_trial()
             code, reason = 0, "complete"
@@ -79,26 +78,6 @@ class SessionRunner:
         return code
 
     # --- phases -------------------------------------------------------------------
-
-    def _activate(self) -> None:
-        """Get torques ready, then wait for the pendant."""
-        self.control.request(ArmState.HOLD)
-        self.control.advance(0.1)
-        self._say("Press Shift-activate on the pendant, support the arm, then [space].")
-        ready = False
-        start = self.rig.clock.now_ns()
-        while True:
-            key = self.stage.tick(Prompt.SUPPORT)
-            ready = ready or key == " "
-            if ready and self.control.status.safety is SafetyMode.ACTIVE:
-                return
-            if (self.rig.clock.now_ns() - start) * 1e-9 > PATIENCE:
-                message = CATALOGUE["not-active"]
-                raise PreflightError(
-                    message.what.format(seconds=PATIENCE),
-                    hint=message.do,
-                    arm_state=message.arm,
-                )
 
     def _try_trial(self) -> None:
         """One trial; a fault that leaves the arm holding does not end the session."""

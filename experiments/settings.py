@@ -86,6 +86,13 @@ class ControlSection(_Section):
     lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
 
 
+class GravitySection(_Section):
+    """Which model of gravity floats the arm."""
+
+    model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
+    file: str = Field(default="gravity.toml", examples=["gravity.toml"])
+
+
 class LimitSection(_Section):
     """Where the guard steps in."""
 
@@ -130,6 +137,7 @@ class RigSettings(_Section):
     feet: Feet
     control: ControlSection
     limits: LimitSection
+    gravity: GravitySection = GravitySection(model="cad")
     safety: SafetySection = _POWER_UP
 
 
@@ -163,6 +171,7 @@ class Settings:
         rig_text: text of rig.toml, for the recording.
         matrix_text: text of matrix.toml.
         origin: "shipped default" or the folder of the files.
+        gravity_text: text of the gravity calibration; empty if none is used.
     """
 
     rig: RigSettings
@@ -170,6 +179,7 @@ class Settings:
     rig_text: str
     matrix_text: str
     origin: str
+    gravity_text: str = ""
 
     def row(self, terrain: str) -> TerrainRow:
         """Return the matrix row of `terrain`.
@@ -214,7 +224,11 @@ def load_settings(config: Path | None) -> Settings:
             f"matrix.toml: terrain {twice[0]!r} stands there twice.",
             hint="Every row needs a name of its own. Nothing was started.",
         )
-    return Settings(rig, matrix, rig_text, matrix_text, origin)
+    gravity_text = ""
+    if rig.gravity.model == "calibrated":
+        beside = config.parent if config is not None else Path()
+        gravity_text = _read(beside / rig.gravity.file)
+    return Settings(rig, matrix, rig_text, matrix_text, origin, gravity_text)
 
 
 def _read(path: Path) -> str:

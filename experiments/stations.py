@@ -25,6 +25,7 @@ from experiments.parts import (
     LoopParts,
     build_arm,
     build_attendant,
+    build_law_model,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -59,7 +60,9 @@ class ControlStation:
         self._row = TerrainRow.model_validate(settings["row"])
         self._is_simulated = bool(settings["is_simulated"])
         constants = load_constants()
-        self._model = ArmModel(constants, build_tool(self._rig, self._row.foot))
+        tool = build_tool(self._rig, self._row.foot)
+        self._model = ArmModel(constants, tool)
+        self._law_model = build_law_model(self._rig, settings["gravity"], tool)
         self._constants = constants
         self._arm: WamArm | None = None
         self._link: CanLink | None = None
@@ -119,6 +122,7 @@ class ControlStation:
             rig=self._rig,
             row=self._row,
             model=self._model,
+            law_model=self._law_model,
             arm=arm,
             sensor=self._sensor,
             board=self._station.board,

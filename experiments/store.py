@@ -138,6 +138,18 @@ def write_text(path: Path, text: str) -> None:
         temporary.replace(path)
 
 
+def write_new_text(path: Path, text: str) -> None:
+    """Write `text` into a new file at `path`; never replaces one.
+
+    Raises:
+        TrialFileError: it exists, or the disk is full or gone.
+    """
+    with _writing(path), path.open("xb") as file:
+        file.write(text.encode())
+        file.flush()
+        os.fsync(file.fileno())
+
+
 def move_file(source: Path, target: Path) -> None:
     """Give `source` the name `target` in another folder; never replaces a file.
 

@@ -83,6 +83,7 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         "tread": "true" if row.foot == "tread" else "false",
         "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
         "foot_mass_kg": repr(rig.model.tool.foot.mass),
+        "gravity_model": rig.settings.rig.gravity.model,
         "operator": facts.operator,
         "notes": "",
         "simulated": "true" if rig.is_simulated else "false",
@@ -99,6 +100,8 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
         "diff.patch": facts.diff,
     }
+    if rig.settings.gravity_text:
+        attachments["gravity.toml"] = rig.settings.gravity_text
     return TrialHeader(
         trial=trial,
         utc_offset_ns=offset,

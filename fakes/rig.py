@@ -187,6 +187,10 @@ class Rehearsal:
         """Let the hand carry the foot above the far end and hold it still."""
         self._rig.plant.hand.lift_to_start()
 
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        self._rig.plant.hand.let_go()
+
     def put_down(self) -> None:
         """Let the hand put the foot down at the far end."""
         self._rig.plant.hand.put_down(self._rig.ground.surface(0.0))

@@ -122,6 +122,7 @@ def rehearsal_handlers(rig: FakeRig) -> dict[str, Handler]:
     return {
         "prepare": rehearsal.prepare,
         "lift": lambda _: rehearsal.lift(),
+        "let_go": lambda _: rehearsal.let_go(),
         "put_down": lambda _: rehearsal.put_down(),
         "push": lambda _: rehearsal.push(),
         "pendant": rehearsal.pendant,

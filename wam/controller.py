@@ -1,5 +1,7 @@
 """The control law: gravity, virtual mass, joint-7 lock, damping in hold."""
 
+import numpy as np
+
 from acquisition.cycle import ArmState
 from acquisition.devices import ArmReading, Vector
 from wam.gravity import VirtualMass, compensation
@@ -9,6 +11,7 @@ from wam.move import JointMove, joint_pd
 from wam.soft_walls import SoftWalls
 
 _JOINT7 = 6
+MOVE_SHARE = 0.9  # of the torque limits that a move may use, gravity included
 
 
 class FootController:
@@ -33,6 +36,7 @@ class FootController:
         self._mass = VirtualMass()
         self._lock = JointLock(gains)
         self._walls = walls
+        self._largest = MOVE_SHARE * np.array(walls.limits) if walls else np.inf
         self._damping = model.constants.kd
         self._is_damped = True
         self._move: JointMove | None = None
@@ -79,7 +83,9 @@ class FootController:
             rate = qd - reading.qd
             pd = joint_pd(constants.kp, constants.kd, q - reading.q, rate)
             pd[_JOINT7] += lock  # fades from the moment of its release
-            return self._walled(gravity + pd, reading), gravity
+            # A move never asks for what the guard would stop it for.
+            tau = np.clip(gravity + pd, -self._largest, self._largest)
+            return self._walled(tau, reading), gravity
         tau = gravity.copy()
         if self._is_damped:
             tau -= self._damping * reading.qd

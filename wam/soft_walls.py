@@ -40,6 +40,11 @@ class SoftWalls:
         self._walls = walls
         self._armed = 0
 
+    @property
+    def limits(self) -> tuple[float, ...]:
+        """The torque limits of the joints [N m], seven."""
+        return self._walls.torque
+
     def torque(self, q: Vector, qd: Vector) -> Vector | None:
         """Return what the walls add at `q` [rad] and `qd` [rad/s], shapes (7,).
 

@@ -1,0 +1,1 @@
+"""Guided calibrations of the rig."""

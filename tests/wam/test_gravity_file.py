@@ -1,0 +1,65 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError
+from wam.gravity_file import (
+    GravityCalibration,
+    fits_tool,
+    gravity_from_toml,
+    gravity_to_toml,
+)
+from wam.tool import tool_facts
+
+
+def calibration(tool):
+    return GravityCalibration(
+        mus=np.arange(21.0).reshape(7, 3) / 7,
+        residual=0.0123,
+        rank=12,
+        foot="tread",
+        tool=tool_facts(tool),
+        measured_utc="2027-01-15T08:00:00Z",
+        poses=np.linspace(-1, 1, 14).reshape(2, 7),
+    )
+
+
+def test_a_calibration_survives_its_file_bit_for_bit(example_tool):
+    before = calibration(example_tool)
+    after = gravity_from_toml(gravity_to_toml(before), "gravity.toml")
+    assert (after.mus == before.mus).all()
+    assert (after.poses == before.poses).all()
+    assert after.tool == before.tool
+    names = ("residual", "rank", "foot", "measured_utc")
+    assert [getattr(after, n) for n in names] == [getattr(before, n) for n in names]
+
+
+def test_the_tool_of_the_calibration_fits_and_another_does_not(example_tool):
+    found = gravity_from_toml(gravity_to_toml(calibration(example_tool)), "g")
+    heavier = dataclasses.replace(example_tool.foot, mass=0.46)
+    assert fits_tool(found, example_tool)
+    assert not fits_tool(found, dataclasses.replace(example_tool, foot=heavier))
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda text: text.replace("mus = [", "mus = [1, "),
+        lambda text: text.replace("rank = 12", ""),
+        lambda text: text.replace("0.0,", "nan,"),
+        lambda text: text[: len(text) // 2],
+        lambda text: "",
+    ],
+)
+def test_a_damaged_file_is_refused_by_name(example_tool, spoil):
+    with pytest.raises(SettingsError, match=r"my\.toml is no gravity calibration"):
+        gravity_from_toml(spoil(gravity_to_toml(calibration(example_tool))), "my.toml")
+
+
+@given(st.text(max_size=200))
+def test_no_text_does_more_than_be_refused(text):
+    with pytest.raises(SettingsError):
+        gravity_from_toml(text, "g.toml")
