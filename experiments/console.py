@@ -2,22 +2,30 @@
 
 import io
 import os
+import shutil
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.live import Live
 
 GOOD, WARNING, BAD = "✔", "▲", "✘"
 
 
 class Console:
-    """Prints plain lines; the same without a terminal.
+    """Prints lines, and below them a panel that changes, where there is a terminal.
 
     Attributes:
         is_lost: nobody reads any more: the other end of the pipe was closed.
+        is_live: there is a terminal that can show a panel.
     """
 
     def __init__(self, *, color: bool = True) -> None:
         self.is_lost = False
         self._color = color and sys.stdout.isatty()
+        self.is_live = self._color and os.environ.get("TERM", "dumb") != "dumb"
+        self._live: Live | None = None
         for stream in (sys.stdout, sys.stderr):
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")  # a sign is worth no crash
@@ -27,7 +35,10 @@ class Console:
         if self.is_lost:
             return
         try:
-            print(text, flush=True)
+            if self._live is not None:
+                self._live.console.print(text, markup=False, highlight=False)
+            else:
+                print(text, flush=True)
         except BrokenPipeError:
             self.is_lost = True
             _discard_output()
@@ -38,7 +49,48 @@ class Console:
 
     def problem(self, text: str) -> None:
         """Print an error to stderr."""
+        self.end_panel()
         print(text, file=sys.stderr, flush=True)
+
+    @property
+    def width(self) -> int:
+        """Width of the terminal [characters], 80 where there is none."""
+        return shutil.get_terminal_size((80, 24)).columns
+
+    def panel(self, lines: Sequence[str]) -> None:
+        """Show `lines` below everything else, in place of those before them."""
+        if not self.is_live or self.is_lost:
+            return
+        from rich.text import Text
+
+        text = Text("\n".join(lines), no_wrap=True, overflow="ellipsis")
+        try:
+            if self._live is None:
+                self._live = self._begin_live()
+            self._live.update(text, refresh=True)
+        except (BrokenPipeError, OSError):
+            self.is_lost = True
+
+    def end_panel(self) -> None:
+        """Take the panel away; a second call does nothing."""
+        live, self._live = self._live, None
+        if live is not None:
+            live.stop()
+
+    def bell(self) -> None:
+        """Ring the terminal's bell, if there is a terminal."""
+        if self.is_live and not self.is_lost:
+            sys.stdout.write("\a")
+            sys.stdout.flush()
+
+    def _begin_live(self) -> "Live":
+        from rich.console import Console as RichConsole
+        from rich.live import Live
+
+        console = RichConsole(highlight=False, markup=False)
+        live = Live(console=console, auto_refresh=False, transient=True)
+        live.start()
+        return live
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Print a table with rich, in colour where there is a terminal."""

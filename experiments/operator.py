@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import select
 import sys
 from dataclasses import dataclass
 from enum import Enum
@@ -132,21 +130,6 @@ def _script_key(path: Path, number: int, words: list[str]) -> str:
     )
 
 
-class LineKeys:
-    """Reads what a person types, line by line, without waiting."""
-
-    def answer(self, asked: Asked) -> str:
-        """Return the typed line; an empty line counts as space."""
-        del asked
-        descriptor = sys.stdin.fileno()
-        if not select.select([descriptor], [], [], 0)[0]:
-            return ""
-        typed = os.read(descriptor, 256).decode(errors="ignore")
-        if not typed:
-            return "q"
-        return typed.strip().lower() or " "
-
-
 class RehearsedHand:
     """Moves the simulated hand and pendant as the prompts ask."""
 
@@ -180,14 +163,17 @@ def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
     Raises:
         SettingsError: a real session without a terminal, or a bad script.
     """
-    has_person = sys.stdin is not None and sys.stdin.isatty()
+    stdin = sys.stdin
+    has_person = stdin is not None and stdin.isatty()
     if script == "auto" or (script is None and is_fake and not has_person):
         return AutoKeys()
     if script is not None:
         return ScriptKeys(Path(script))
-    if not has_person:
+    if stdin is None or not has_person:
         raise SettingsError(
             "A real session needs a person at a terminal, and there is none.",
             hint="Run it in a terminal, or add --fake. Nothing was started.",
         )
-    return LineKeys()
+    from experiments.terminal import TerminalKeys
+
+    return TerminalKeys(stdin.fileno())

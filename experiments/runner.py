@@ -15,6 +15,7 @@ from experiments.activation import activate
 from experiments.archive import ENOUGH, Archive, Outcome
 from experiments.book import Book
 from experiments.company import FaultedError, StopAskedError
+from experiments.live import recording_screen
 from experiments.messages import CATALOGUE, Circumstances, fault_text, rest_text
 from experiments.operator import REJECT_REASONS, Prompt
 from experiments.review import Review, review_trial
@@ -174,6 +175,16 @@ class SessionRunner:
         self.recorder.start(path, header)
         self.recorder.event(20, "operator", "trial started")
         self.control.watch_trial(is_recording=True)
+        self.stage.company.console.bell()
+        self.stage.look(recording_screen(self.rig, name.kept, outcome))
+        try:
+            self._follow(name, outcome)
+        finally:
+            self.stage.look(None)
+            self.stage.company.console.bell()
+
+    def _follow(self, name: TrialName, outcome: Outcome) -> None:
+        """Let the trial run until it is over by itself or by key."""
         start = self.rig.clock.now_ns()
         watch = EndWatch(self.rig.frame.travel)
         said = 0.0

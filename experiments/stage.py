@@ -13,6 +13,7 @@ from experiments.rigs import Rig
 from experiments.trial import TrialName
 
 TICK = 0.02  # the console looks this often [s]
+REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _T = TypeVar("_T")
 
@@ -23,6 +24,8 @@ class Stage:
 
     rig: Rig
     company: Company
+    view: Callable[[int], list[str]] | None = None
+    _shown_ns: int = 0
     _asked: tuple[Prompt, int, int] | None = None
     _asked_at: int = 0
     _is_stopped: bool = False
@@ -41,6 +44,7 @@ class Stage:
     ) -> str:
         """Let 20 ms pass; return the key pressed, raise what stops everything."""
         self.control.advance(TICK)
+        self._show()
         verdict = self.control.status.verdict
         if verdict is not None:
             raise FaultedError(verdict)
@@ -61,6 +65,20 @@ class Stage:
         if key == "q" and prompt is not Prompt.REVIEW:
             raise StopAskedError
         return key
+
+    def look(self, view: Callable[[int], list[str]] | None) -> None:
+        """Show what `view(width)` returns eight times a second, None for nothing."""
+        self.view = view
+        self._shown_ns = 0
+        self.company.console.end_panel()
+
+    def _show(self) -> None:
+        console, now_ns = self.company.console, self.rig.clock.now_ns()
+        if self.view is None or not console.is_live:
+            return
+        if now_ns - self._shown_ns >= REFRESH_NS:
+            self._shown_ns = now_ns
+            console.panel(self.view(console.width))
 
     def raise_fault(self, name: TrialName, seconds: float) -> None:
         """Raise the rehearsed fault when its moment in trial `name` has come."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.stage import Stage
+    from experiments.terminal import keyboard
 
 EXAMPLES = """\
   traction calibrate gravity                what the arm weighs, with its tool
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     fake = FakeOptions(args.fast, seed=1) if args.fake else None
     rig = connect_rig(settings, row, fake)
     stop = StopFlag()
-    with logging_bus(rig, None, console), signals_ask(stop):
+    with logging_bus(rig, None, console), signals_ask(stop), keyboard(keys):
         run_preflight(rig, Path(args.data), console)
         hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
         stage = Stage(rig, Company(keys, console, stop, hand))

@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.runner import SessionRunner
     from experiments.settings import load_settings
     from experiments.stage import Stage
+    from experiments.terminal import keyboard
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -68,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {row.name}        {kind}")
         page = run_preflight(rig, Path(args.data), console)
-        with signals_ask(stop):
+        with signals_ask(stop), keyboard(keys):
             facts = _open_session(args, rig, page, console)
             hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
             company = Company(keys, console, stop, hand, fault)

@@ -10,11 +10,11 @@ from experiments.operator import (
     AUTO_PATIENCE,
     Asked,
     AutoKeys,
-    LineKeys,
     Prompt,
     RehearsedHand,
     choose_keys,
 )
+from experiments.terminal import TerminalKeys
 
 KNOWN = ("ft-stale", "ft-silent", "estop")
 
@@ -71,8 +71,9 @@ def test_a_real_session_needs_a_terminal(monkeypatch, stdin):
 def test_a_person_at_a_terminal_is_asked(monkeypatch):
     terminal = io.StringIO()
     terminal.isatty = lambda: True
+    terminal.fileno = lambda: 99
     monkeypatch.setattr(sys, "stdin", terminal)
-    assert isinstance(choose_keys(None, is_fake=False), LineKeys)
+    assert isinstance(choose_keys(None, is_fake=False), TerminalKeys)
 
 
 @pytest.mark.parametrize(

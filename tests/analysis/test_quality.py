@@ -1,0 +1,50 @@
+import numpy as np
+import pytest
+
+from analysis.quality import Coverage, coverage, quick_ratio, suggest
+
+
+class Trial:
+    """The kept samples of a trial."""
+
+    def __init__(self, v_t, F_n, F_t=None):
+        self.v_t, self.F_n = np.array(v_t, float), np.array(F_n, float)
+        self.F_t = np.array(F_n if F_t is None else F_t, float)
+
+
+def test_samples_are_counted_by_speed_and_load():
+    found = coverage([Trial([0.005, 0.02, 0.3], [1.0, 3.0, 20.0]), Trial([0.1], [7.0])])
+    expected = np.zeros((4, 4), int)
+    for cell in ((0, 0), (1, 1), (3, 3), (2, 2)):
+        expected[cell] = 1
+    assert (found.counts == expected).all()
+    assert found.fast_share == 0.25
+
+
+def test_speed_counts_in_both_directions():
+    assert coverage([Trial([-0.3], [1.0])]).counts[3, 0] == 1
+
+
+def test_the_emptiest_cell_a_person_can_aim_at_is_suggested():
+    counts = np.full((4, 4), 100)
+    counts[1, 2] = 1
+    assert suggest(Coverage(counts)) == "slower than 0.05 m/s, pressing harder"
+
+
+def test_nothing_is_suggested_when_every_aim_is_covered():
+    assert suggest(Coverage(np.full((4, 4), 100))) == ""
+
+
+def test_cells_nobody_can_aim_at_are_not_asked_for():
+    counts = np.full((4, 4), 100)
+    counts[3, 3] = counts[0, 0] = 0
+    assert suggest(Coverage(counts)) == ""
+
+
+def test_without_a_trial_nothing_is_suggested():
+    assert suggest(coverage([])) == ""
+
+
+def test_the_quick_ratio_is_the_slope_of_traction_over_load():
+    assert quick_ratio(Trial([0, 0], [2.0, 4.0], [1.0, 2.0])) == pytest.approx(0.5)
+    assert np.isnan(quick_ratio(Trial([0], [0.0])))

@@ -1,0 +1,128 @@
+import contextlib
+import os
+import pty
+import termios
+
+import pytest
+
+from experiments.operator import Asked, AutoKeys, Prompt
+from experiments.terminal import Cbreak, TerminalKeys, keyboard
+
+
+@pytest.fixture
+def terminal():
+    """Return (the person's end, the program's end) of a pseudo-terminal."""
+    person, program = pty.openpty()
+    yield person, program
+    for descriptor in (person, program):
+        with contextlib.suppress(OSError):
+            os.close(descriptor)
+
+
+def asked(prompt=Prompt.REVIEW):
+    return Asked(prompt, 1, 1, True, 0.0)
+
+
+def keys_of(terminal):
+    person, program = terminal
+    keys = TerminalKeys(program)
+    keys.answer(asked())  # the prompt is on the screen before anything is typed
+    return person, keys
+
+
+def local_flags(descriptor):
+    return termios.tcgetattr(descriptor)[3]
+
+
+def test_a_key_counts_without_enter_and_is_not_echoed(terminal):
+    person, program = terminal
+    with Cbreak(program):
+        keys = TerminalKeys(program)
+        keys.answer(asked())
+        os.write(person, b"k")
+        assert keys.answer(asked()) == "k"
+        assert not local_flags(program) & (termios.ICANON | termios.ECHO)
+
+
+@pytest.mark.parametrize("how", ["return", "raise", "twice"])
+def test_the_terminal_is_given_back_as_it_was(terminal, how):
+    _, program = terminal
+    before = termios.tcgetattr(program)
+    with contextlib.suppress(RuntimeError), Cbreak(program) as switched:
+        assert termios.tcgetattr(program) != before
+        if how == "raise":
+            raise RuntimeError
+        if how == "twice":
+            switched.restore()
+    assert termios.tcgetattr(program) == before
+
+
+def test_a_terminal_that_has_gone_is_left_alone():
+    person, program = pty.openpty()
+    os.close(person)
+    os.close(program)
+    with Cbreak(program) as switched:
+        switched.restore()
+    with pytest.raises(OSError, match="Bad file descriptor"):
+        os.fstat(program)
+
+
+@pytest.mark.parametrize(
+    ("typed", "answers"),
+    [
+        (b" ", [" "]),
+        (b"\n", [" "]),
+        (b"K", ["k"]),
+        (b"r2", ["r2"]),
+        (b"r9k", ["k"]),
+        (b"rr1", ["1"]),
+        (b"\x1b[A", ["[", "a"]),
+        (b"kq", ["k", "q"]),
+        ("é".encode()[:1], []),
+    ],
+)
+def test_keys_become_answers_one_at_a_time(terminal, typed, answers):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        os.write(person, typed)
+        found = [keys.answer(asked()) for _ in range(4)]
+    assert [answer for answer in found if answer] == answers
+
+
+def test_the_digit_of_a_reason_may_come_later(terminal):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        os.write(person, b"r")
+        assert keys.answer(asked()) == ""
+        os.write(person, b"3")
+        assert keys.answer(asked()) == "r3"
+
+
+def test_r_is_a_plain_key_outside_the_review(terminal):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        keys.answer(asked(Prompt.READY))
+        os.write(person, b"r")
+        assert keys.answer(asked(Prompt.READY)) == "r"
+
+
+def test_what_was_typed_before_a_prompt_is_not_meant_for_it(terminal):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        os.write(person, b"kkk")
+        assert keys.answer(asked(Prompt.READY)) == ""
+
+
+def test_a_keyboard_that_is_unplugged_quits(terminal):
+    person, keys = keys_of(terminal)
+    os.close(person)
+    assert keys.answer(asked()) == "q"
+
+
+def test_only_keys_of_a_terminal_switch_it_over(terminal):
+    _, program = terminal
+    before = termios.tcgetattr(program)
+    with keyboard(AutoKeys()):
+        assert termios.tcgetattr(program) == before
+    with keyboard(TerminalKeys(program)):
+        assert termios.tcgetattr(program) != before
