@@ -6,7 +6,7 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.verify import Verified
 from acquisition.trial_file.writer import TrialHeader
 from experiments.rigs import Rig
-from experiments.store import iso_utc, move_file, write_json
+from experiments.store import iso_utc, move_file, read_json, write_json
 from experiments.trial import SessionFacts, TrialName, write_flight, write_truth
 
 COMPLETE = frozenset({"travel", "key", "time-limit"})
@@ -81,6 +81,15 @@ class Archive:
             "when": "",
             "history": [],
         }
+
+    def kept_ratios(self) -> list[float]:
+        """Return the quick fits of the trials kept so far, from their sidecars."""
+        found: list[float] = []
+        for path in sorted(self.facts.folder.trials.glob("T*.json")):
+            ratio = read_json(path).get("ratio")
+            if isinstance(ratio, float):
+                found.append(ratio)
+        return found
 
     def keep(self, name: TrialName, sidecar: dict[str, object]) -> None:
         """Write the verdict `keep` beside the trial."""

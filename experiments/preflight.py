@@ -10,14 +10,22 @@ import numpy as np
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError, PreflightError, TractionError
 from acquisition.timing import SLOW_EXCHANGE_NS, loop_report
+from experiments import provenance
 from experiments.console import BAD, GOOD, WARNING, Console
 from experiments.crews import EXCHANGE_CYCLES
+from experiments.machine_checks import (
+    Finding,
+    check_code,
+    check_governor,
+    check_wrenches,
+)
 from experiments.messages import CATALOGUE
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, TerrainRow
 from wam.health import complaints, temperature_range
 
 LOOP_TEST = 5.0  # s
+STEPPED_TEST = 0.3  # s
 Add = Callable[[str, str, str], None]
 SESSION_GB = 0.9
 
@@ -73,14 +81,22 @@ def run_preflight(
         checks.append(Check(mark, name, text))
         console.check(mark, name, text)
 
+    def note(finding: Finding) -> None:
+        add(finding.mark, finding.name, finding.text)
+
     add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}")
+    note(check_code(provenance.collect()))
+    if not rig.is_stepped:
+        note(check_governor())
     check_disk(rig, data, add)
     _check_arm(rig, add)
     sensor = _check_sensor(rig, add)
     _check_exchange(rig, add)
     grants = _check_rights(rig, add)
+    wrenches = rig.board.wrenches.reader()
     rig.crew.begin()
     _check_loop(rig, seconds, add)
+    note(check_wrenches(wrenches.read(), rig.clock.now_ns()))
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
     return Preflight(tuple(checks), {**devices, **grants})
 
@@ -171,8 +187,8 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
 
 def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     """Run the loop for a while, the arm idle, and grade its cadence."""
-    if rig.is_stepped:
-        rig.crew.desk.advance(0.1)
+    if rig.is_stepped:  # it keeps time by definition
+        rig.crew.desk.advance(STEPPED_TEST)
         return
     timings = rig.crew.desk.timings()
     rig.crew.desk.advance(seconds)

@@ -224,8 +224,9 @@ class SessionRunner:
         )
         if outcome.status == "complete":
             path = self.facts.folder.trials / f"{name.kept}.mcap"
-            self._say_review(self.stage.aside(lambda: review_trial(path)))
-            return sidecar
+            review = self.stage.aside(lambda: review_trial(path))
+            self._say_review(review)
+            return {**sidecar, "ratio": review.known_ratio}
         self._reject(name, sidecar, f"interrupted: {outcome.reason}")
         self._say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
         if outcome.reason != "interrupted":
@@ -287,7 +288,7 @@ class SessionRunner:
         )
 
     def _say_review(self, review: Review) -> None:
-        for mark, text in review.lines():
+        for mark, text in review.lines(self.archive.kept_ratios()):
             self._say(f" {mark} {text}")
 
     def _tell_fault(self, verdict: Verdict) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.stage import Stage
-    from experiments.terminal import keyboard
 
 EXAMPLES = """\
   traction calibrate gravity                what the arm weighs, with its tool
@@ -49,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rigs import FakeOptions
     from experiments.settings import load_settings
     from experiments.stage import Stage
+    from experiments.terminal import keyboard
 
     if args.fast and not args.fake:
         raise SettingsError("--fast works only with --fake.", hint="Nothing was done.")

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.recorder import seal
+from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from experiments.console import GOOD, WARNING
@@ -39,7 +40,7 @@ def test_a_good_trial_is_reviewed_with_its_numbers(first_trial):
     assert review.joint7 < 0.020
     assert review.ratio == pytest.approx(0.8, abs=0.25)  # rubber on a plate
     marks = [mark for mark, _ in review.lines()]
-    assert marks[:2] == [GOOD, GOOD]
+    assert marks[:3] == [GOOD, GOOD, GOOD]
 
 
 def test_missing_cycles_are_counted_and_marked(first_trial, cycles, tmp_path):
@@ -54,7 +55,7 @@ def test_a_foot_that_turned_is_marked(first_trial, cycles, tmp_path):
     cycles["position"][1000:, 6] += 0.03
     review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles))
     assert review.joint7 == pytest.approx(0.03, abs=0.005)
-    assert review.lines()[1][0] == WARNING
+    assert review.lines()[2][0] == WARNING
 
 
 def test_a_trial_of_a_foot_at_rest_can_be_reviewed(first_trial, cycles, tmp_path):
@@ -62,11 +63,46 @@ def test_a_trial_of_a_foot_at_rest_can_be_reviewed(first_trial, cycles, tmp_path
     path = rewrite(first_trial, tmp_path / "T.mcap", cycles[:300])
     review = review_trial(path)
     assert review.kept < 250
-    assert review.lines()[2][0] == WARNING
+    assert review.lines()[3][0] == WARNING
 
 
 def test_a_trial_in_the_air_has_no_friction(first_trial, cycles, tmp_path):
     cycles["wrench_raw"][:] = cycles["wrench_raw"][:1]
     review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", cycles[:1000]))
     assert np.isnan(review.ratio)
-    assert review.lines()[2][1].endswith("median F_t/F_n -")
+    assert review.lines()[4] == (WARNING, "quick fit impossible: no load")
+
+
+@pytest.mark.parametrize(
+    ("flag", "is_set", "words"),
+    [
+        (Flag.FT_SATURATED, True, "sensor saturated in 5.0% of the cycles"),
+        (Flag.FT_FRESH, False, "sensor stale in 5.0% of the cycles"),
+    ],
+)
+def test_a_sensor_in_trouble_is_marked(
+    first_trial, cycles, tmp_path, flag, is_set, words
+):
+    few = cycles[:1000]
+    flags = few["flags"][:50]
+    few["flags"][:50] = flags | flag if is_set else flags & ~np.uint32(flag)
+    review = review_trial(rewrite(first_trial, tmp_path / "T.mcap", few))
+    assert review.lines()[1] == (WARNING, words)
+
+
+@pytest.mark.parametrize(
+    ("earlier", "mark", "words"),
+    [
+        ([], GOOD, ""),
+        ([0.1, 0.1], GOOD, ""),
+        ([0.75, 0.80, 0.85], GOOD, "(3 before: 0.80 ± 0.05)"),
+        ([0.1, 0.11, 0.12], WARNING, "(3 before: 0.11 ± 0.01)"),
+    ],
+)
+def test_the_quick_fit_is_held_against_the_trials_before(
+    first_trial, earlier, mark, words
+):
+    found, text = review_trial(first_trial).lines(earlier)[4]
+    assert found == mark
+    assert text.endswith(words)
+    assert ("before" in text) is bool(words)

@@ -1,0 +1,72 @@
+"""What the preflight says of the computer and of the running force sensor."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.sample import Record
+from experiments.console import GOOD, WARNING
+
+CPUS = Path("/sys/devices/system/cpu")
+FAST = "performance"
+OLD_MS = 6.0  # ms, a force sample that is older counts as stale
+NOISY = 0.5  # N, several times what a quiet sensor shows
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the page."""
+
+    mark: str
+    name: str
+    text: str
+
+
+def check_governor(cpus: Path = CPUS) -> Finding:
+    """Grade how the processors' clocks are governed."""
+    found: set[str] = set()
+    for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
+        try:
+            found.add(path.read_text(encoding="ascii", errors="replace").strip())
+        except OSError:
+            continue
+    if not found:
+        return Finding(GOOD, "CPU governor", "none on this machine")
+    if found == {FAST}:
+        return Finding(GOOD, "CPU governor", FAST)
+    names = ", ".join(sorted(found))
+    fix = "cpupower frequency-set -g performance"
+    return Finding(WARNING, "CPU governor", f"{names}: {fix}")
+
+
+def check_code(facts: dict[str, str]) -> Finding:
+    """Grade the version of the program; `facts` are those of provenance."""
+    commit = facts["commit"][:10]
+    if facts["dirty"] == "true":
+        text = f"{facts['software']} {commit}, changed since: the diff is recorded"
+        return Finding(WARNING, "code", text)
+    return Finding(GOOD, "code", f"{facts['software']} {commit}")
+
+
+def check_wrenches(samples: Record, now_ns: int) -> Finding:
+    """Grade rate, age and noise of force samples.
+
+    Args:
+        samples: newest records of the board's ring of wrenches, oldest first.
+        now_ns: monotonic time [ns].
+    """
+    name = "F/T samples"
+    times = samples["t_ns"].astype(np.int64) * 1e-9
+    if len(samples) < 2 or times[-1] <= times[0]:
+        return Finding(WARNING, name, f"{len(samples)} while the loop was tested")
+    rate = (len(samples) - 1) / float(times[-1] - times[0])
+    age = (now_ns - int(samples["t_ns"][-1])) * 1e-6
+    forces = samples["wrench"][-max(2, int(rate * 0.2)) :, :3]
+    noise = float(forces.std(axis=0).max())
+    saturated = int(samples["is_saturated"].sum())
+    text = f"{rate:.0f} Hz, age {age:.1f} ms, noise {noise:.2f} N"
+    if saturated:
+        text += f", {saturated} saturated"
+    is_fine = age < OLD_MS and noise < NOISY and not saturated
+    return Finding(GOOD if is_fine else WARNING, name, text)

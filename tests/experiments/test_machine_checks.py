@@ -1,0 +1,75 @@
+import numpy as np
+import pytest
+
+from acquisition.board import WRENCH_DTYPE
+from experiments.console import GOOD, WARNING
+from experiments.machine_checks import check_code, check_governor, check_wrenches
+
+MS = 1_000_000
+NOW_NS = 10**12
+
+
+def governed(folder, *names):
+    for number, name in enumerate(names):
+        place = folder / f"cpu{number}" / "cpufreq"
+        place.mkdir(parents=True)
+        (place / "scaling_governor").write_text(name + "\n")
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("names", "mark", "text"),
+    [
+        ((), GOOD, "none on this machine"),
+        (("performance", "performance"), GOOD, "performance"),
+        (
+            ("performance", "powersave"),
+            WARNING,
+            "performance, powersave: cpupower frequency-set -g performance",
+        ),
+    ],
+)
+def test_a_slow_governor_comes_with_its_fix(tmp_path, names, mark, text):
+    found = check_governor(governed(tmp_path, *names))
+    assert (found.mark, found.text) == (mark, text)
+
+
+def test_changed_code_is_marked():
+    facts = {"software": "traction 0.1", "commit": "0123456789abcdef", "dirty": "true"}
+    assert check_code(facts).mark == WARNING
+    assert check_code({**facts, "dirty": "false"}).mark == GOOD
+    assert "0123456789" in check_code(facts).text
+
+
+def samples(count=400, *, noise=0.05, age_ms=2.0):
+    records = np.zeros(count, WRENCH_DTYPE)
+    newest = NOW_NS - int(age_ms * MS)
+    records["t_ns"] = newest - 1_250_000 * np.arange(count)[::-1]
+    rng = np.random.default_rng(1)
+    records["wrench"] = rng.normal(0, noise, (count, 6)) + 40.0
+    return records
+
+
+def test_a_healthy_sensor_is_shown_with_rate_age_and_noise():
+    found = check_wrenches(samples(), NOW_NS)
+    assert found.mark == GOOD
+    assert found.text == "800 Hz, age 2.0 ms, noise 0.05 N"
+
+
+@pytest.mark.parametrize("trouble", [{"noise": 2.0}, {"age_ms": 9.0}])
+def test_noise_and_age_are_marked(trouble):
+    assert check_wrenches(samples(**trouble), NOW_NS).mark == WARNING
+
+
+def test_saturation_is_marked():
+    records = samples()
+    records["is_saturated"][3] = True
+    found = check_wrenches(records, NOW_NS)
+    assert found.mark == WARNING
+    assert found.text.endswith("1 saturated")
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_a_sensor_that_says_nothing_is_marked(count):
+    found = check_wrenches(samples(5)[:count], NOW_NS)
+    assert (found.mark, found.text) == (WARNING, f"{count} while the loop was tested")
