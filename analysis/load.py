@@ -70,6 +70,11 @@ class RecordedTrial:
         return self.metadata["trial"].get("simulated") == "true"
 
     @property
+    def is_complete(self) -> bool:
+        """Whether the recording was ended properly; False for a recovered one."""
+        return self.metadata["result"].get("complete") == "true"
+
+    @property
     def displacement(self) -> Array:
         """Distance of the sole from the far end along x_T [m], shape (n,)."""
         return self.frame.displacement(self.sole)
@@ -88,6 +93,8 @@ class RecordedTrial:
 
 def load_trial(path: Path) -> RecordedTrial:
     """Read a trial file and derive sole, force and traction.
+
+    A recovered file is read like any other; see `RecordedTrial.is_complete`.
 
     Raises:
         TrialFileError: the file is not a sound trial, or lacks its calibration.

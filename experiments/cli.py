@@ -18,6 +18,7 @@ COMMANDS = {
     "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "what was said on the bus, in words",
+    "recover": "save what is sound of trials that were not ended",
     "report": "fit and compare models of recorded sessions, write the report",
     "fit": "the same for tables that Traction did not record",
 }

@@ -2,59 +2,68 @@
 
 import struct
 import zlib
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+
+from mcap.opcode import Opcode
 
 from acquisition.errors import TrialFileError
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary, summary offsets, crc
 _DATA_END = struct.Struct("<BQI")  # opcode, length, crc
-_FOOTER_OPCODE = 2
-_DATA_END_OPCODE = 15
-_BLOCK_BYTES = 1 << 20
 
 
-def check_checksums(file: IO[bytes], size: int, path: Path) -> None:
-    """Hold both sections of an MCAP file of `size` bytes against their CRC-32.
+@dataclass(frozen=True, slots=True)
+class Sections:
+    """Where the parts of an MCAP file lie.
+
+    Attributes:
+        data_end: offset of the record that ends the data section.
+        summary: offset of the summary, right behind that record.
+        footer: offset of the footer, right behind the summary.
+    """
+
+    data_end: int
+    summary: int
+    footer: int
+
+
+def check_sections(data: bytes, path: Path) -> Sections:
+    """Hold both sections of a whole MCAP file against their CRC-32.
 
     The data section is all up to its end record, which stands right before the
     summary; the summary reaches to the checksum in the footer. Only these two notice
     a damaged attachment or metadata record.
 
     Raises:
-        TrialFileError: a checksum is wrong, missing, or not where it should be.
+        TrialFileError: a magic or checksum is wrong, missing, or not in its place.
     """
-    footer_at = size - len(MAGIC) - _FOOTER.size
-    opcode, _, summary_at, _, summary_crc = _read(file, footer_at, _FOOTER, path)
-    end_at = summary_at - _DATA_END.size
-    if opcode != _FOOTER_OPCODE or not len(MAGIC) <= end_at < footer_at:
-        raise TrialFileError(path, "has no footer where it should be")
-    opcode, _, data_crc = _read(file, end_at, _DATA_END, path)
-    if opcode != _DATA_END_OPCODE:
-        raise TrialFileError(path, "has no end of data where it should be")
-    if _crc(file, summary_at, footer_at + _FOOTER.size - 4) != summary_crc:
-        raise TrialFileError(path, "has a summary whose checksum is wrong")
-    if _crc(file, 0, end_at) != data_crc:
-        raise TrialFileError(path, "has data whose checksum is wrong")
-
-
-def _read(
-    file: IO[bytes], offset: int, form: struct.Struct, path: Path
-) -> tuple[int, ...]:
-    if offset < 0:
+    _check_magic(data, path)
+    footer = len(data) - len(MAGIC) - _FOOTER.size
+    if footer < 0:
         raise TrialFileError(path, "is too short for a trial file")
-    file.seek(offset)
-    return form.unpack(file.read(form.size))
+    opcode, _, summary, _, summary_crc = _FOOTER.unpack_from(data, footer)
+    end = summary - _DATA_END.size
+    if opcode != Opcode.FOOTER or not len(MAGIC) <= end <= footer - _DATA_END.size:
+        raise TrialFileError(path, "has no footer where it should be")
+    opcode, _, data_crc = _DATA_END.unpack_from(data, end)
+    if opcode != Opcode.DATA_END:
+        raise TrialFileError(path, "has no end of data where it should be")
+    whole = memoryview(data)
+    if zlib.crc32(whole[summary : footer + _FOOTER.size - 4]) != summary_crc:
+        raise TrialFileError(path, "has a summary whose checksum is wrong")
+    if zlib.crc32(whole[:end]) != data_crc:
+        raise TrialFileError(path, "has data whose checksum is wrong")
+    return Sections(end, summary, footer)
 
 
-def _crc(file: IO[bytes], start: int, end: int) -> int:
-    file.seek(start)
-    crc, left = 0, end - start
-    while left > 0:
-        block = file.read(min(left, _BLOCK_BYTES))
-        if not block:
-            break
-        crc = zlib.crc32(block, crc)
-        left -= len(block)
-    return crc
+def _check_magic(data: bytes, path: Path) -> None:
+    if len(data) < 2 * len(MAGIC) or not data.startswith(MAGIC):
+        raise TrialFileError(path, "is no MCAP file")
+    if not data.endswith(MAGIC):
+        raise TrialFileError(
+            path,
+            "is cut off: it does not end as an MCAP file does",
+            hint=f"Salvage it: traction recover {path}",
+        )

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.reader import TrialReader, as_trial_file_error
+from acquisition.trial_file.chunks import as_trial_file_error
+from acquisition.trial_file.reader import Rows, TrialReader
 from acquisition.trial_file.writer import WriterCounts
 
 PERIOD_NS = 2_000_000
@@ -25,6 +27,7 @@ class Verified:
         cycles: records of `/cycle`, 0 for a truth file.
         duration: from first to last cycle [s].
         worst_gap: longest time between two cycles [s].
+        is_complete: the recording was ended properly; False for a recovered file.
     """
 
     sha256: str
@@ -32,10 +35,14 @@ class Verified:
     cycles: int
     duration: float
     worst_gap: float
+    is_complete: bool
 
 
 def verify(path: Path, counts: WriterCounts | None = None) -> Verified:
     """Check magics, CRCs, counts, cadence, clock and attachments of `path`.
+
+    A recovered file may lack attachments, and its cadence is not judged: it is all
+    that is left of a recording, however that went.
 
     Args:
         path: a finished trial file, under its `.partial` name or its own.
@@ -56,7 +63,7 @@ def verify(path: Path, counts: WriterCounts | None = None) -> Verified:
         cycles, duration, worst = _check_cycles(reader)
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return Verified(digest, reader.size, cycles, duration, worst)
+    return Verified(digest, reader.size, cycles, duration, worst, reader.is_complete)
 
 
 def _check_attachments(reader: TrialReader) -> None:
@@ -66,34 +73,52 @@ def _check_attachments(reader: TrialReader) -> None:
             continue
         name = key.removeprefix("sha256:")
         found = reader.attachments.get(name)
+        if found is None and not reader.is_complete:
+            continue
         if found is None or hashlib.sha256(found).hexdigest() != digest:
             raise TrialFileError(reader.path, f"has no sound attachment {name}")
 
 
 def _check_cycles(reader: TrialReader) -> tuple[int, float, float]:
+    """Return (cycles, duration [s], worst gap [s])."""
     if "/cycle" not in reader.topic_counts():
         return 0, 0.0, 0.0
     rows = reader.cycles()
-    result = reader.metadata["result"]
     numbers = rows.data["cycle"].astype(np.int64)
     host_ns = rows.data["host_ns"].astype(np.int64)
+    _check_numbers(reader, numbers)
+    _check_clock(reader, rows, host_ns)
+    if len(numbers) < 2:
+        if reader.is_complete:
+            raise TrialFileError(reader.path, "holds fewer than two cycles")
+        return len(numbers), 0.0, 0.0
+    gaps = np.diff(host_ns)
+    if reader.is_complete:
+        _check_cadence(reader, gaps / np.diff(numbers))
+    duration = float(host_ns[-1] - host_ns[0]) * 1e-9
+    return len(numbers), duration, float(gaps.max()) * 1e-9
+
+
+def _check_numbers(reader: TrialReader, numbers: NDArray[np.int64]) -> None:
+    result = reader.metadata["result"]
     if len(numbers) != int(result["cycles_written"]):
         raise TrialFileError(reader.path, f"holds {len(numbers)} cycles, not as stated")
-    if len(numbers) < 2:
-        raise TrialFileError(reader.path, "holds fewer than two cycles")
     steps = np.diff(numbers)
     if bool((steps < 1).any()):
         raise TrialFileError(reader.path, "has cycles out of order")
     if int((steps - 1).sum()) != int(result["cycles_missed"]):
         raise TrialFileError(reader.path, "lacks other cycles than it states")
+
+
+def _check_clock(reader: TrialReader, rows: Rows, host_ns: NDArray[np.int64]) -> None:
     offset = int(reader.metadata["clock"]["utc_offset_ns"])
     if bool((rows.log_time.astype(np.int64) - host_ns != offset).any()):
         raise TrialFileError(reader.path, "has times that do not follow its clock")
-    gaps = np.diff(host_ns)
-    median = float(np.median(gaps / steps))
+
+
+def _check_cadence(reader: TrialReader, periods_ns: NDArray[np.float64]) -> None:
+    median = float(np.median(periods_ns))
     if abs(median - PERIOD_NS) > PERIOD_TOLERANCE * PERIOD_NS:
         raise TrialFileError(
             reader.path, f"has a median period of {median / 1e6:.3f} ms, not 2 ms"
         )
-    duration = float(host_ns[-1] - host_ns[0]) * 1e-9
-    return len(numbers), duration, float(gaps.max()) * 1e-9

@@ -55,6 +55,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings import load_settings
     from experiments.stage import Stage
     from experiments.terminal import keyboard
+    from experiments.wreckage import find_wreckage, held_open
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -68,13 +69,16 @@ def run(args: argparse.Namespace) -> int:
         fault = plan_fault(args.fault, rig.rehearsal) if args.fault else None
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {row.name}        {kind}")
+        for wreck in find_wreckage(Path(args.data)):
+            console.say(f"▲ {wreck.text()}")
         page = run_preflight(rig, Path(args.data), console)
         with signals_ask(stop), keyboard(keys):
             facts = _open_session(args, rig, page, console)
             hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
             company = Company(keys, console, stop, hand, fault)
             stage = Stage(rig, company)
-            code = SessionRunner(stage, facts).run(args.trials or row.trials)
+            with held_open(facts.folder):
+                code = SessionRunner(stage, facts).run(args.trials or row.trials)
     if company.fault is not None:
         console.say(
             f"▲ The fault {company.fault.name} was planned for "

@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.errors import TrialFileError
 from acquisition.messages import CYCLE
+from acquisition.trial_file.recover import recover
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from analysis.load import load_trial
 from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
@@ -133,6 +134,13 @@ def test_a_gap_has_no_velocity(tmp_path):
     rows = np.flatnonzero(np.isnan(loaded.velocity[:, 0]))
     assert rows.tolist() == [39, 40]
     assert loaded.series().dropped_rows == 2
+
+
+def test_a_recovered_trial_is_loaded_and_known_to_be_incomplete(trial, tmp_path):
+    write(tmp_path / "T.mcap", finish=False)
+    loaded = load_trial(recover(tmp_path / "T.mcap.partial").path)
+    assert (trial.is_complete, loaded.is_complete) == (True, False)
+    assert loaded.force.tobytes() == trial.force.tobytes()
 
 
 # --- hostile files --------------------------------------------------------------------

@@ -1,0 +1,153 @@
+"""Recovery: what is sound of a broken trial file, as a new file beside it."""
+
+import hashlib
+import os
+import struct
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.chunks import as_trial_file_error, read_file
+from acquisition.trial_file.copying import TrialCopy
+from acquisition.trial_file.publishing import publish_file
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.salvage import Salvage
+from acquisition.trial_file.verify import Verified, verify
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """What became of a file that was to be recovered.
+
+    Attributes:
+        source: that file, untouched.
+        path: the new file; the source itself where it was whole.
+        verified: what reading that file back has shown.
+        messages: how many it holds.
+        bytes_dropped: of the source, from its first broken record on.
+        seconds_dropped: recording that was in them, as far as can be seen [s].
+        reason: what is broken in the source; empty where it is whole.
+        is_new: the file was written now.
+    """
+
+    source: Path
+    path: Path
+    verified: Verified
+    messages: int
+    bytes_dropped: int = 0
+    seconds_dropped: float = 0.0
+    reason: str = ""
+    is_new: bool = False
+
+
+def recovered_path(source: Path) -> Path:
+    """Return where the recovered trial goes, e.g. T07.recovered.mcap."""
+    stem = source.name.removesuffix(".partial").removesuffix(".mcap")
+    return source.with_name(f"{stem}.recovered.mcap")
+
+
+def recover(source: Path) -> Recovery:
+    """Save everything up to the first broken record of `source` into a new file.
+
+    The new file is marked as incomplete, verified and read-only. A source that is
+    whole needs none, and one that was recovered before is not recovered again.
+
+    Raises:
+        TrialFileError: nothing can be saved, or another file stands in the way.
+    """
+    data = read_file(source)
+    try:
+        verified = verify(source)
+    except TrialFileError as error:
+        reason = error.reason
+    else:
+        return Recovery(source, source, verified, _message_count(source))
+    target = recovered_path(source)
+    facts = {
+        "source": os.fsencode(source.name).decode(errors="replace"),
+        "source_sha256": hashlib.sha256(data).hexdigest(),
+        "source_bytes": str(len(data)),
+        "reason": reason,
+    }
+    if target.exists():
+        return _earlier(source, target, facts)
+    try:
+        with tempfile.TemporaryDirectory(prefix=".recover-", dir=source.parent) as room:
+            return _recover(data, source, facts, Path(room) / target.name)
+    except OSError as error:
+        raise TrialFileError(
+            target,
+            f"cannot be written ({error.strerror})",
+            hint="The source is untouched.",
+        ) from error
+
+
+def _recover(
+    data: bytes, source: Path, facts: Mapping[str, str], written: Path
+) -> Recovery:
+    salvage = Salvage(data, source)
+    copy = _write(salvage, source, facts, written)
+    try:
+        verified = verify(written)
+    except TrialFileError as error:
+        raise TrialFileError(source, f"makes no trial: {error.reason}") from error
+    target = recovered_path(source)
+    publish_file(written, target)
+    return Recovery(
+        source=source,
+        path=target,
+        verified=verified,
+        messages=copy.messages,
+        bytes_dropped=int(copy.facts["bytes_dropped"]),
+        seconds_dropped=salvage.lost_seconds,
+        reason=copy.facts["reason"],
+        is_new=True,
+    )
+
+
+def _write(
+    salvage: Salvage, source: Path, facts: Mapping[str, str], written: Path
+) -> TrialCopy:
+    """Write what `salvage` gives into `written`, down to the disk."""
+    with written.open("xb") as file:
+        copy = TrialCopy(file, facts)
+        try:
+            for record in salvage:
+                copy.add(record)
+        except (struct.error, ValueError, OverflowError, MemoryError) as error:
+            raise TrialFileError(source, f"cannot be copied ({error})") from error
+        if not copy.messages or "trial" not in copy.metadata:
+            why = salvage.reason or facts["reason"]
+            raise TrialFileError(source, f"has nothing to save: it {why}")
+        copy.finish(salvage)
+        file.flush()
+        os.fsync(file.fileno())
+    return copy
+
+
+def _earlier(source: Path, target: Path, facts: Mapping[str, str]) -> Recovery:
+    """Return what an earlier recovery of this very file has given."""
+    found = TrialReader(target).metadata.get("recovered", {})
+    if found.get("source_sha256") != facts["source_sha256"]:
+        raise TrialFileError(
+            target,
+            f"exists already and was not made from {source.name} as it is now",
+            hint="Move it away to recover again; nothing is ever overwritten.",
+        )
+    with as_trial_file_error(target):
+        messages = int(found.get("messages_kept", ""))
+        dropped = int(found.get("bytes_dropped", ""))
+    return Recovery(
+        source=source,
+        path=target,
+        verified=verify(target),
+        messages=messages,
+        bytes_dropped=dropped,
+        reason=found.get("reason", facts["reason"]),
+    )
+
+
+def _message_count(path: Path) -> int:
+    return sum(TrialReader(path).topic_counts().values())

@@ -1,0 +1,115 @@
+"""traction recover: save what is sound of trials that were not ended."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from acquisition.trial_file.recover import Recovery
+    from experiments.console import Console
+
+EXAMPLES = """\
+  traction recover data/sessions/2027-03-14_S012_S10   every .partial below a folder
+  traction recover trials/T07.mcap.partial             one file"""
+
+_PARTIAL = "*.mcap.partial"
+_NOTHING_SAVED = 6  # exit code
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `recover`."""
+    parser.add_argument(
+        "files",
+        nargs="+",
+        metavar="FILE",
+        help="files, patterns such as 'T*.partial', or folders with .partial files",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Recover every file and return the exit code."""
+    from acquisition.errors import TrialFileError
+    from acquisition.trial_file.recover import recover
+    from experiments.console import Console
+
+    console = Console(color=not args.no_color)
+    sources = find_sources(args.files)
+    if not sources:
+        console.say(f"No {_PARTIAL} there: nothing to recover.")
+    failed = 0
+    for source in sources:
+        try:
+            recovery = recover(source)
+        except TrialFileError as error:
+            failed += 1
+            console.problem(f"✘ {error} The file is untouched.")
+        else:
+            _tell(recovery, console)
+    if len(sources) > 1:
+        console.say(
+            f"{len(sources)} files: {len(sources) - failed} done, {failed} not."
+        )
+    return _NOTHING_SAVED if failed else 0
+
+
+def find_sources(names: list[str]) -> list[Path]:
+    """Return the files that `names` mean, each once, in order.
+
+    Raises:
+        SettingsError: a name means no file.
+    """
+    from acquisition.errors import SettingsError
+
+    found: dict[Path, None] = {}
+    for name in names:
+        path = Path(name)
+        if path.is_dir():
+            matches = sorted(path.rglob(_PARTIAL))
+        elif path.exists():
+            matches = [path]
+        else:
+            matches = _matching(path)
+            if not matches:
+                raise SettingsError(
+                    f"There is no file {name}.",
+                    hint="Name a .partial file or a session folder. Nothing was done.",
+                )
+        found |= dict.fromkeys(matches)
+    return list(found)
+
+
+def _matching(pattern: Path) -> list[Path]:
+    """Return the files a quoted pattern means; the shell expands the others."""
+    if not any(sign in str(pattern) for sign in "*?["):
+        return []
+    relative = pattern.relative_to(pattern.anchor)
+    return sorted(p for p in Path(pattern.anchor).glob(str(relative)) if p.is_file())
+
+
+def _tell(recovery: Recovery, console: Console) -> None:
+    from experiments.console import GOOD, WARNING
+
+    source, verified = recovery.source, recovery.verified
+    held = f"{verified.cycles} cycles, {recovery.messages} messages"
+    if verified.cycles:
+        held = f"{verified.duration:.2f} s, {held}"
+    if recovery.path == source:
+        kind = "complete" if verified.is_complete else "sound, though incomplete"
+        console.say(f"{GOOD} {source}: is {kind}, nothing to recover ({held}).")
+        return
+    verb = "saved" if recovery.is_new else "was recovered before,"
+    console.say(f"{GOOD} {source}: {verb} {held} -> {recovery.path.name}, read-only.")
+    console.say(f"{WARNING} It {recovery.reason}. {lost_text(recovery)}")
+
+
+def lost_text(recovery: Recovery) -> str:
+    """Return what was lost in words, for the operator."""
+    if not recovery.bytes_dropped:
+        return "Lost: nothing that was on the disk. The source is kept."
+    lost = f"Lost: {recovery.bytes_dropped} bytes at the end"
+    if recovery.seconds_dropped > 0.0:
+        cycles = round(recovery.seconds_dropped * 500)
+        lost += f", {recovery.seconds_dropped:.2f} s or about {cycles} cycles"
+    return f"{lost}. The source is kept."

@@ -1,0 +1,333 @@
+"""Recovery: all before the first broken record, as a new file, never a traceback."""
+
+import errno
+import hashlib
+import os
+import stat
+import struct
+
+import numpy as np
+import pytest
+
+from acquisition.errors import TrialFileError
+from acquisition.messages import TRUTH
+from acquisition.recorder import seal
+from acquisition.sample import Flag
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.recover import recover, recovered_path
+from acquisition.trial_file.salvage import Salvage, recorded_seconds
+from acquisition.trial_file.verify import verify
+from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
+from tests.acquisition.ros import messages_of
+from tests.acquisition.trials import (
+    ATTACHMENTS,
+    START_NS,
+    flipped,
+    make_cycles,
+    make_header,
+    span_of,
+    spans,
+    write_trial,
+)
+
+MESSAGE_INDEX, CHUNK, ATTACHMENT = 7, 6, 9
+BLOCK = 50  # cycles in a chunk
+
+
+def partial_bytes(folder, cycles, block=BLOCK):
+    """Return the bytes of a `.partial` that a kill left behind."""
+    writer = write_trial(folder / "T01.mcap", cycles, block=block)
+    writer.close_partial()
+    return writer.partial.read_bytes()
+
+
+@pytest.fixture(scope="module")
+def cycles():
+    return make_cycles(300, skipped=(1020, 1021, 1170))
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory, cycles):
+    """Return the bytes of a `.partial` of six chunks."""
+    return partial_bytes(tmp_path_factory.mktemp("left"), cycles)
+
+
+@pytest.fixture(scope="module")
+def sealed(tmp_path_factory, cycles):
+    path = tmp_path_factory.mktemp("sealed") / "T01.mcap"
+    seal(write_trial(path, cycles, block=BLOCK), "travel")
+    return path.read_bytes()
+
+
+@pytest.fixture
+def put(tmp_path):
+    def put(data, name="T07.mcap.partial"):
+        path = tmp_path / name
+        path.write_bytes(data)
+        return path
+
+    return put
+
+
+def chunks(data):
+    """Return the chunks of a `.partial`, which has no magic at its end."""
+    return [s for s in spans(data + bytes(8)) if s.opcode == CHUNK]
+
+
+def salvaged_messages(data, path):
+    """Return the log time of every message salvaged from `data`."""
+    salvage = Salvage(data, path)
+    found = [r.log_time for r in salvage if hasattr(r, "log_time")]
+    return found, salvage
+
+
+# --- what is saved --------------------------------------------------------------------
+
+
+def test_a_file_cut_at_any_byte_of_its_last_chunk_keeps_all_before(tmp_path):
+    """Three chunks of two cycles each; the last one is cut everywhere."""
+    data = partial_bytes(tmp_path, make_cycles(6), block=2)
+    last = chunks(data)[-1]
+    whole, _ = salvaged_messages(data, tmp_path)
+    before, _ = salvaged_messages(data[: last.start], tmp_path)
+    assert 0 < len(before) < len(whole)
+    for end in range(last.start, last.end):
+        found, salvage = salvaged_messages(data[:end], tmp_path)
+        assert found == before, end
+        assert salvage.kept_bytes == last.start
+    assert salvaged_messages(data[: last.end], tmp_path)[0] == whole
+
+
+def test_a_file_cut_anywhere_gives_its_whole_chunks_or_is_refused(put, left, cycles):
+    ends = [span.end for span in chunks(left)]
+    rng = np.random.default_rng(3)
+    cuts = rng.integers(0, len(left), 40).tolist()
+    for cut in [*cuts, ends[0] - 1, ends[0], ends[-1]]:
+        path = put(left[:cut])
+        wanted = BLOCK * sum(end <= cut for end in ends)
+        if not wanted:
+            with pytest.raises(TrialFileError, match="nothing to save"):
+                recover(path)
+            continue
+        recovery = recover(path)
+        found = TrialReader(recovery.path).cycles().data
+        assert found["position"].tobytes() == cycles["position"][:wanted].tobytes()
+        assert recovery.verified.cycles == wanted
+        recovery.path.unlink()
+
+
+def test_every_topic_is_saved_as_it_was(put, sealed, left):
+    theirs = messages_of(put(sealed, "T01.mcap"))
+    saved = messages_of(recover(put(left)).path)
+    assert saved.keys() == theirs.keys()
+    for topic, messages in saved.items():
+        assert messages == theirs[topic][: len(messages)]
+    assert len(saved["/cycle"]) == 300
+
+
+def test_what_was_known_before_the_trial_is_saved(put, left):
+    reader = TrialReader(recover(put(left)).path)
+    assert reader.attachments == ATTACHMENTS
+    assert reader.metadata["trial"]["session"] == "S"
+    assert {"clock", "provenance", "channels"} <= reader.metadata.keys()
+
+
+def test_a_broken_chunk_ends_what_is_saved(put, sealed, cycles):
+    third = chunks(sealed)[2]
+    path = put(flipped(sealed, (third.body + third.end) // 2), "T01.mcap")
+    recovery = recover(path)
+    assert recovery.verified.cycles == 2 * BLOCK
+    assert recovery.bytes_dropped == len(sealed) - third.start
+    assert "chunk whose checksum" in recovery.reason or "decompress" in recovery.reason
+
+
+def test_a_chunk_that_passes_for_another_record_ends_it_too(put, sealed):
+    """Skipping what is unknown would leave a hole that looks like lost cycles."""
+    third = chunks(sealed)[2].start
+    for opcode in (MESSAGE_INDEX, 1, 0x86, 99):
+        data = bytearray(sealed)
+        data[third] = opcode
+        recovery = recover(put(bytes(data), f"T{opcode}.mcap"))
+        assert recovery.verified.cycles == 2 * BLOCK
+
+
+def test_a_damaged_attachment_costs_itself_alone(put, sealed):
+    at = span_of(sealed, ATTACHMENT).end - 10
+    recovery = recover(put(flipped(sealed, at), "T01.mcap"))
+    reader = TrialReader(recovery.path)
+    assert recovery.verified.cycles == 300
+    assert reader.attachments == {"arm_model.toml": ATTACHMENTS["arm_model.toml"]}
+    assert reader.metadata["recovered"]["attachments_dropped"] == "config.toml"
+
+
+def test_a_lost_summary_loses_nothing_else(put, sealed):
+    recovery = recover(put(sealed[:-50]))
+    assert (recovery.verified.cycles, recovery.bytes_dropped) == (300, 0)
+    assert TrialReader(recovery.path).metadata["result"]["stop_reason"] == "travel"
+
+
+def test_a_truth_file_is_recovered_too(tmp_path):
+    records = np.frombuffer(bytearray(TRUTH.template * 9), TRUTH.dtype)
+    records["host_ns"] = START_NS + np.arange(9)
+    path = tmp_path / "T07.truth.mcap"
+    writer = TrialWriter(path, make_header(), TRUTH_TOPICS)
+    writer.write_truth(records)
+    writer.flush()
+    writer.close_partial()
+    recovery = recover(writer.partial)
+    assert recovery.path.name == "T07.truth.recovered.mcap"
+    assert len(TrialReader(recovery.path).truth().data) == 9
+
+
+# --- what the new file says -----------------------------------------------------------
+
+
+def test_a_recovered_trial_is_readable_and_incomplete(put, left):
+    recovery = recover(put(left))
+    verified = verify(recovery.path)
+    assert verified == recovery.verified
+    assert verified.is_complete is TrialReader(recovery.path).is_complete is False
+    assert verified.cycles == 300
+
+
+def test_it_says_what_it_was_made_from(put, left):
+    cut = left[:-100]
+    recovery = recover(put(cut))
+    facts = TrialReader(recovery.path).metadata["recovered"]
+    assert facts["source"] == "T07.mcap.partial"
+    assert facts["source_sha256"] == hashlib.sha256(cut).hexdigest()
+    assert facts["source_bytes"] == str(len(cut))
+    assert int(facts["messages_kept"]) == recovery.messages > 300
+    kept = len(cut) - recovery.bytes_dropped
+    assert facts["reason"] == f"is cut off in the record at byte {kept}"
+
+
+def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
+    late = make_cycles(100, skipped=(1050, 1051))
+    late["flags"][::10] |= np.uint32(Flag.DEADLINE_MISSED)
+    path = put(partial_bytes(tmp_path, late))
+    result = TrialReader(recover(path).path).metadata["result"]
+    assert result == {
+        "complete": "false",
+        "stop_reason": "recovered",
+        "cycles_expected": "102",
+        "cycles_written": "100",
+        "cycles_missed": "2",
+        "late_cycles": "10",
+    }
+
+
+def test_what_was_lost_is_told_in_seconds(put, left):
+    """The head of the torn chunk still says how far it went."""
+    last = chunks(left)[-1]
+    recovery = recover(put(left[: last.end - 5]))
+    # 50 cycles of 2 ms in the lost chunk, none of them missed
+    assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
+
+
+def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):
+    last = chunks(left)[-1]
+    data = bytearray(left[: last.end - 5])
+    struct.pack_into("<Q", data, last.body + 8, 2**63)
+    assert recover(put(bytes(data))).seconds_dropped == 0.0
+
+
+def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
+    slow = make_cycles(100)
+    slow["host_ns"] = START_NS + np.arange(100) * 3_000_000
+    writer = write_trial(tmp_path / "T01.mcap", slow)
+    with pytest.raises(TrialFileError, match="median period"):
+        seal(writer, "travel")
+    recovery = recover(writer.partial)
+    assert (recovery.verified.cycles, recovery.bytes_dropped) == (100, 0)
+
+
+# --- files ----------------------------------------------------------------------------
+
+
+def test_the_source_stays_and_the_copy_is_read_only(put, left):
+    path = put(left)
+    recovery = recover(path)
+    assert path.read_bytes() == left
+    assert recovery.path == path.parent / "T07.recovered.mcap"
+    assert stat.S_IMODE(recovery.path.stat().st_mode) == 0o444
+    assert sorted(p.name for p in path.parent.iterdir()) == [
+        "T07.mcap.partial",
+        "T07.recovered.mcap",
+    ]
+
+
+def test_a_whole_file_is_said_to_be_whole(put, sealed):
+    path = put(sealed)
+    recovery = recover(path)
+    assert (recovery.path, recovery.is_new) == (path, False)
+    assert recovery.verified.is_complete
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_a_second_recovery_finds_the_first(put, left):
+    path = put(left)
+    first = recover(path)
+    written = first.path.stat()
+    second = recover(path)
+    assert (first.is_new, second.is_new) == (True, False)
+    assert (second.path, second.messages) == (first.path, first.messages)
+    assert first.path.stat() == written
+
+
+def test_another_recovered_file_is_never_overwritten(put, left):
+    path = put(left)
+    other = recover(path).path.read_bytes()
+    put(left[:-100])
+    with pytest.raises(TrialFileError, match="exists already"):
+        recover(path)
+    assert recovered_path(path).read_bytes() == other
+
+
+def test_a_full_disk_leaves_no_half_file(put, left, monkeypatch):
+    path = put(left)
+
+    def full(_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(TrialFileError, match="No space left") as caught:
+        recover(path)
+    assert caught.value.path == recovered_path(path)
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"\x89MCAP0\r\n", b"not a trial at all", bytes(99)]
+)
+def test_a_file_with_nothing_in_it_is_refused(put, data):
+    path = put(data)
+    with pytest.raises(TrialFileError, match="nothing to save"):
+        recover(path)
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_a_name_that_is_no_text_is_taken_all_the_same(put, left):
+    recovery = recover(put(left, os.fsdecode(b"T\xff07.mcap.partial")))
+    assert recovery.verified.cycles == 300
+
+
+@pytest.mark.parametrize(
+    ("source", "target"),
+    [
+        ("T07.mcap.partial", "T07.recovered.mcap"),
+        ("T07.truth.mcap.partial", "T07.truth.recovered.mcap"),
+        ("T07.mcap", "T07.recovered.mcap"),
+        ("odd", "odd.recovered.mcap"),
+    ],
+)
+def test_the_new_name_follows_from_the_old(tmp_path, source, target):
+    assert recovered_path(tmp_path / source) == tmp_path / target
+
+
+def test_the_length_of_a_recording_is_read_from_its_chunks(left):
+    # 303 cycles of 2 ms passed between the first and the last
+    assert recorded_seconds(left) == pytest.approx(302 * 0.002)
+    half = recorded_seconds(left[: chunks(left)[3].start + 3])
+    assert half == pytest.approx(151 * 0.002)
+    assert recorded_seconds(b"") == 0.0

@@ -1,0 +1,98 @@
+import pytest
+
+from acquisition.recorder import seal
+from acquisition.trial_file.reader import TrialReader
+from tests.acquisition.trials import make_cycles, write_trial
+from tests.experiments.program import traction
+
+
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    """Return the bytes of a `.partial` of 300 cycles in six chunks."""
+    path = tmp_path_factory.mktemp("left") / "T01.mcap"
+    writer = write_trial(path, make_cycles(300), block=50)
+    writer.close_partial()
+    return writer.partial.read_bytes()
+
+
+@pytest.fixture
+def folder(tmp_path, left):
+    """Return a session folder with a torn, an empty and a whole file."""
+    trials = tmp_path / "S012" / "trials"
+    trials.mkdir(parents=True)
+    (trials / "T07.mcap.partial").write_bytes(left[:-3000])
+    (trials / "T08.mcap.partial").write_bytes(left[:300])
+    writer = write_trial(trials / "T06.mcap", make_cycles(100))
+    seal(writer, "travel")
+    return tmp_path / "S012"
+
+
+def test_it_says_what_was_saved_and_lost(folder):
+    done = traction("recover", folder / "trials" / "T07.mcap.partial")
+    assert done.code == 0
+    assert "saved 0.50 s, 250 cycles, 351 messages -> T07.recovered.mcap" in done.out
+    assert (
+        "bytes at the end, 0.10 s or about 50 cycles. The source is kept." in done.out
+    )
+    reader = TrialReader(folder / "trials" / "T07.recovered.mcap")
+    assert not reader.is_complete
+
+
+def test_a_folder_stands_for_its_partial_files(folder):
+    done = traction("recover", folder)
+    assert (folder / "trials" / "T07.recovered.mcap").exists()
+    assert "T06" not in done.out
+    assert "2 files: 1 done, 1 not." in done.out
+
+
+def test_a_file_with_nothing_to_save_is_6_and_the_others_are_done(folder):
+    done = traction("recover", *sorted((folder / "trials").glob("*.partial"))[::-1])
+    assert done.code == 6
+    assert "T08.mcap.partial: has nothing to save" in done.err
+    assert "The file is untouched." in done.err
+    assert (folder / "trials" / "T07.recovered.mcap").exists()
+
+
+def test_a_pattern_in_quotes_is_understood(folder):
+    done = traction("recover", folder / "trials" / "T07*.partial")
+    assert done.code == 0
+    assert (folder / "trials" / "T07.recovered.mcap").exists()
+
+
+def test_a_file_named_twice_is_done_once(folder):
+    path = folder / "trials" / "T07.mcap.partial"
+    assert traction("recover", path, path).out.count("saved") == 1
+
+
+def test_a_whole_trial_says_so(folder):
+    done = traction("recover", folder / "trials" / "T06.mcap")
+    assert done.code == 0
+    assert "is complete, nothing to recover (0.20 s, 100 cycles" in done.out
+
+
+def test_recovering_again_says_that_it_was_done(folder):
+    path = folder / "trials" / "T07.mcap.partial"
+    traction("recover", path)
+    done = traction("recover", path)
+    assert done.code == 0
+    assert "was recovered before, 0.50 s, 250 cycles" in done.out
+
+
+def test_a_recovered_trial_needs_no_recovery(folder):
+    traction("recover", folder / "trials" / "T07.mcap.partial")
+    done = traction("recover", folder / "trials" / "T07.recovered.mcap")
+    assert done.code == 0
+    assert "is sound, though incomplete, nothing to recover" in done.out
+
+
+def test_a_name_that_means_nothing_is_a_usage_error_before_any_work(folder):
+    done = traction("recover", folder, folder / "T99.mcap.partial")
+    assert done.code == 2
+    assert "There is no file" in done.err
+    assert not (folder / "trials" / "T07.recovered.mcap").exists()
+
+
+def test_a_folder_without_partial_files_has_nothing_to_recover(tmp_path):
+    done = traction("recover", tmp_path)
+    assert done.code == 0
+    assert "nothing to recover" in done.out
