@@ -91,7 +91,8 @@ class Attendant:
         elif kind is Kind.SET_BIAS:
             cycle.set_bias(command.values[:6])
         elif kind is Kind.MOVE:
-            cycle.move_to(command.values[:7])
+            *goal, speed = command.values[:8]
+            cycle.move_to(tuple(goal), speed)
         else:
             self.is_over = True
         self._status.obeyed = command.number

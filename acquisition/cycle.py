@@ -46,11 +46,13 @@ class ControlLaw(Protocol):
         """Return (joint torques, their gravity part) [N m], shapes (7,)."""
         ...
 
-    def move_to(self, goal: Vector, reading: ArmReading) -> float:
+    def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
         """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
 
+        No joint is faster than `speed` [rad/s].
+
         Raises:
-            ValueError: the arm is not in hold, or `goal` cannot be reached.
+            ValueError: the arm is not in hold, or `goal` cannot be reached so.
         """
         ...
 
@@ -126,7 +128,7 @@ class Cycle:
         self._wrench_ns = 0
         self._speed = 0.0
         self._requested: ArmState | None = None
-        self._goal: Vector | None = None
+        self._move: tuple[Vector, float] | None = None
         self._reported: Verdict | None = None
         self._was_active = False
         self.is_recording = False
@@ -142,9 +144,12 @@ class Cycle:
         self._requested = state
         self.status.verdict = None
 
-    def move_to(self, goal: Sequence[float]) -> None:
-        """Ask for a move to joint positions `goal` [rad], seven; only in hold."""
-        self._goal = np.array(goal)
+    def move_to(self, goal: Sequence[float], speed: float) -> None:
+        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+
+        No joint is faster than `speed` [rad/s] on the way.
+        """
+        self._move = np.array(goal), speed
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
@@ -206,12 +211,12 @@ class Cycle:
             self._enter(state, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
-        goal = self._goal
-        if goal is None or reading.missing_cycles:
+        move = self._move
+        if move is None or reading.missing_cycles:
             return
-        self._goal = None
+        self._move = None
         try:
-            self._law.move_to(goal, reading)
+            self._law.move_to(*move, reading)
         except ValueError:
             self.report(Verdict(Action.HOLD, "move-refused"))
 

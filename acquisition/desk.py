@@ -108,9 +108,12 @@ class Desk:
                 return True
         return self.status.state is ArmState.IDLE
 
-    def move_to(self, goal: Sequence[float]) -> None:
-        """Ask for a move to joint positions `goal` [rad], seven; only in hold."""
-        self._asked = self._mailbox.post(Kind.MOVE, values=tuple(goal))
+    def move_to(self, goal: Sequence[float], speed: float) -> None:
+        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+
+        No joint is faster than `speed` [rad/s] on the way.
+        """
+        self._asked = self._mailbox.post(Kind.MOVE, values=(*goal, speed))
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Tell the loop what the sensor reads without load [N, N m], six numbers."""

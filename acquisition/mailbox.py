@@ -23,7 +23,7 @@ class Kind(IntEnum):
     ENTER = 1  # argument: an ArmState
     WATCH_TRIAL = 2  # argument: 1 while a trial is recorded
     SET_BIAS = 3  # values: the sensor's reading without load, six of them
-    MOVE = 4  # values: joint positions to go to, seven of them
+    MOVE = 4  # values: joint positions to go to, seven of them, and the speed
     LEAVE = 5  # end the loop; the arm is idle by then, or is made so
 
 

@@ -12,7 +12,6 @@ from acquisition.board import Board
 from acquisition.clock import Clock
 from acquisition.cycle import Cycle
 from acquisition.devices import WrenchSample, WrenchSensor
-from acquisition.errors import SettingsError
 from acquisition.flight import FrameTape
 from acquisition.guard import Limits
 from acquisition.sample import Flag
@@ -27,11 +26,9 @@ from ft_sensor.serial_link import SerialLink, SerialPort
 from wam.arm import WamArm
 from wam.arm_settings import ArmSettings
 from wam.can_link import CanLink
-from wam.constants import ArmConstants, Body, load_constants
+from wam.constants import ArmConstants, Body
 from wam.controller import FootController
 from wam.frame_tap import FrameTap
-from wam.gravity import gravity_model
-from wam.gravity_file import fits_tool, gravity_from_toml
 from wam.health import health_facts
 from wam.joint_lock import LockGains
 from wam.model import ArmModel
@@ -104,27 +101,6 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     if torque is None:
         torque = int(WARNING_SHARE * safety.torque_fault_units)
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
-
-
-def build_law_model(rig: RigSettings, gravity_text: str, tool: Tool) -> ArmModel:
-    """Return the arm as the control law weighs it; see [gravity] of rig.toml.
-
-    Raises:
-        SettingsError: the calibration is none, or was made with another tool.
-    """
-    constants = load_constants()
-    if rig.gravity.model == "cad":
-        return ArmModel(constants, tool)
-    if rig.gravity.model == "shipped":
-        return gravity_model(constants, tool, constants.mus, is_tool_included=False)
-    found = gravity_from_toml(gravity_text, rig.gravity.file)
-    if not fits_tool(found, tool):
-        raise SettingsError(
-            f"{rig.gravity.file} was measured with another tool (foot {found.foot}).",
-            hint="Run traction calibrate gravity with this foot, or set [gravity] "
-            'model = "cad" in rig.toml. Nothing was started.',
-        )
-    return gravity_model(constants, tool, found.mus, is_tool_included=True)
 
 
 def build_arm(

@@ -13,6 +13,7 @@ from acquisition.timing import SLOW_EXCHANGE_NS, loop_report
 from experiments import provenance
 from experiments.console import BAD, GOOD, WARNING, Console
 from experiments.crews import EXCHANGE_CYCLES
+from experiments.gravity_choice import gravity_words
 from experiments.machine_checks import (
     Finding,
     check_code,
@@ -84,7 +85,8 @@ def run_preflight(
     def note(finding: Finding) -> None:
         add(finding.mark, finding.name, finding.text)
 
-    add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}")
+    weight = gravity_words(rig.settings.rig, rig.gravity_text, rig.row.foot)
+    add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, gravity {weight}")
     note(check_code(provenance.collect()))
     if not rig.is_stepped:
         note(check_governor())

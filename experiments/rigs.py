@@ -11,10 +11,10 @@ from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
 from experiments.crews import Crew, InlineCrew, Jobs, ProcessCrew
+from experiments.gravity_choice import build_law_model, read_gravity
 from experiments.parts import (
     LoopParts,
     build_arm,
-    build_law_model,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -26,7 +26,7 @@ from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from wam.can_link import CanLink
 from wam.constants import load_constants
 from wam.model import ArmModel
-from wam.tool import Tool, tool_facts
+from wam.tool import tool_facts
 
 if TYPE_CHECKING:
     from fakes.serve import PuckServer
@@ -54,6 +54,7 @@ class Rig:
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
+        gravity_text: the gravity calibration in use; empty for none.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """
@@ -67,6 +68,7 @@ class Rig:
     frame: TerrainFrame
     row: TerrainRow
     settings: Settings
+    gravity_text: str
     rehearsal: Rehearsing | None
     is_stepped: bool
 
@@ -80,11 +82,15 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     """Return the rig for one session: on stepped time in this thread, else processes.
 
     Raises:
+        SettingsError: the gravity calibration cannot be used.
         LinkError: a process cannot open its bus or port.
     """
     tool = build_tool(settings.rig, row.foot)
     model = ArmModel(load_constants(), tool)
-    law_model = build_law_model(settings.rig, settings.gravity_text, tool)
+    gravity_text = read_gravity(settings)
+    law_model = build_law_model(
+        settings.rig, gravity_text, row.foot, is_simulated=fake is not None
+    )
     board = Board.create()
     rehearsal: Rehearsing | None = None
     if fake is not None and fake.is_fast:
@@ -93,7 +99,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         )
     else:
         clock = SystemClock()
-        crew = ProcessCrew(_jobs(settings, row, fake, tool), board, clock)
+        crew = ProcessCrew(_jobs(settings, row, fake, gravity_text), board, clock)
         if crew.fake is not None:
             rehearsal = RemoteRehearsal(crew.fake)
     payload = payload_of(tool)
@@ -107,13 +113,14 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         frame=terrain_frame(row),
         row=row,
         settings=settings,
+        gravity_text=gravity_text,
         rehearsal=rehearsal,
         is_stepped=fake is not None and fake.is_fast,
     )
 
 
 def _jobs(
-    settings: Settings, row: TerrainRow, fake: FakeOptions | None, tool: Tool
+    settings: Settings, row: TerrainRow, fake: FakeOptions | None, gravity_text: str
 ) -> Jobs:
     rig = settings.rig
     common: dict[str, Any] = {
@@ -123,7 +130,7 @@ def _jobs(
     control = {
         **common,
         "row": row.model_dump(mode="json"),
-        "gravity": settings.gravity_text,
+        "gravity": gravity_text,
         "can": rig.can.model_dump(mode="json"),
         "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
     }
@@ -133,7 +140,7 @@ def _jobs(
     if fake is not None:
         simulated = {
             "scene": _scene_facts(row, fake.seed),
-            "tool": tool_facts(tool),
+            "tool": tool_facts(build_tool(rig, row.foot)),
             "has_sensor": is_on_bus,
         }
     return Jobs(control, reader, simulated)

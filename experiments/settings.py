@@ -1,7 +1,7 @@
 """rig.toml and matrix.toml: read, checked, with an error that says what to write."""
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar, cast
@@ -17,6 +17,7 @@ Whole = Annotated[int, Field(strict=True)]
 _Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
 _Vector3 = tuple[_Near, _Near, _Near]
 _Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
+_Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _M = TypeVar("_M", bound=BaseModel)
 Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
 Mass = Annotated[Number, Field(gt=0, le=20)]
@@ -33,6 +34,19 @@ class CanSettings(_Section):
     interface: str = Field(examples=["socketcan"])
     channel: str = Field(examples=["can0"])
     bitrate: Whole = Field(gt=0, examples=[1000000])
+
+
+class ArmSection(_Section):
+    """This arm.
+
+    Attributes:
+        mech_at_home: absolute angles of the motors at the home position [counts], as
+            "traction zero" tells them; left out: the next zeroing is not checked.
+    """
+
+    mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
+        default=None, examples=[[1012, 340, 2761, 95, 4001, 1200, 2048]]
+    )
 
 
 class SensorSection(_Section):
@@ -87,10 +101,16 @@ class ControlSection(_Section):
 
 
 class GravitySection(_Section):
-    """Which model of gravity floats the arm."""
+    """Which model of gravity floats the arm.
+
+    "cad": masses of the drawings; "shipped": first moments of another arm;
+    "calibrated": those of `file`, a path from the folder of rig.toml.
+    """
 
     model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
-    file: str = Field(default="gravity.toml", examples=["gravity.toml"])
+    file: str = Field(
+        default="gravity.toml", min_length=1, max_length=4096, examples=["gravity.toml"]
+    )
 
 
 class LimitSection(_Section):
@@ -133,6 +153,7 @@ class RigSettings(_Section):
     """Everything in rig.toml."""
 
     can: CanSettings
+    arm: ArmSection = ArmSection()
     ft_sensor: SensorSection
     feet: Feet
     control: ControlSection
@@ -171,7 +192,7 @@ class Settings:
         rig_text: text of rig.toml, for the recording.
         matrix_text: text of matrix.toml.
         origin: "shipped default" or the folder of the files.
-        gravity_text: text of the gravity calibration; empty if none is used.
+        folder: where the files are that rig.toml names.
     """
 
     rig: RigSettings
@@ -179,7 +200,12 @@ class Settings:
     rig_text: str
     matrix_text: str
     origin: str
-    gravity_text: str = ""
+    folder: Path
+
+    def by_cad(self) -> "Settings":
+        """Return the same with the gravity of the drawings, for a calibration."""
+        cad = self.rig.gravity.model_copy(update={"model": "cad"})
+        return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
 
     def row(self, terrain: str) -> TerrainRow:
         """Return the matrix row of `terrain`.
@@ -224,11 +250,8 @@ def load_settings(config: Path | None) -> Settings:
             f"matrix.toml: terrain {twice[0]!r} stands there twice.",
             hint="Every row needs a name of its own. Nothing was started.",
         )
-    gravity_text = ""
-    if rig.gravity.model == "calibrated":
-        beside = config.parent if config is not None else Path()
-        gravity_text = _read(beside / rig.gravity.file)
-    return Settings(rig, matrix, rig_text, matrix_text, origin, gravity_text)
+    folder = config.parent if config is not None else Path()
+    return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
 
 
 def _read(path: Path) -> str:

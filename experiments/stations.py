@@ -21,11 +21,11 @@ from acquisition.processes import Station, name_process
 from acquisition.realtime import Wish, request
 from acquisition.shared_sensor import SharedSensor, publish
 from experiments.crews import ARM_INFO, measure_exchange
+from experiments.gravity_choice import build_law_model
 from experiments.parts import (
     LoopParts,
     build_arm,
     build_attendant,
-    build_law_model,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -62,7 +62,12 @@ class ControlStation:
         constants = load_constants()
         tool = build_tool(self._rig, self._row.foot)
         self._model = ArmModel(constants, tool)
-        self._law_model = build_law_model(self._rig, settings["gravity"], tool)
+        self._law_model = build_law_model(
+            self._rig,
+            settings["gravity"],
+            self._row.foot,
+            is_simulated=self._is_simulated,
+        )
         self._constants = constants
         self._arm: WamArm | None = None
         self._link: CanLink | None = None

@@ -100,8 +100,8 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
         "diff.patch": facts.diff,
     }
-    if rig.settings.gravity_text:
-        attachments["gravity.toml"] = rig.settings.gravity_text
+    if rig.gravity_text:
+        attachments["gravity.toml"] = rig.gravity_text
     return TrialHeader(
         trial=trial,
         utc_offset_ns=offset,

@@ -17,8 +17,9 @@ from wam.dialogue import Dialogue
 from wam.frames import MOTOR_NODES
 from wam.health import PuckHealth
 from wam.motion import Motion
+from wam.roll_call import pucks_do
 from wam.safety import SafetyModule
-from wam.startup import ArmInfo, StartUp, pucks_do
+from wam.startup import ArmInfo, StartUp
 from wam.traffic import Companion, CycleTraffic
 from wam.transmission import MOTORS, Transmission
 from wam.watch import BRAKED

@@ -7,7 +7,7 @@ from acquisition.devices import ArmReading, Vector
 from wam.gravity import VirtualMass, compensation
 from wam.joint_lock import JointLock, LockGains
 from wam.model import ArmModel
-from wam.move import JointMove, joint_pd
+from wam.move import TOP_SPEED, JointMove, joint_pd
 from wam.soft_walls import SoftWalls
 
 _JOINT7 = 6
@@ -53,23 +53,33 @@ class FootController:
         else:
             self._lock.release(now)
 
-    def move_to(self, goal: Vector, reading: ArmReading) -> float:
+    def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
         """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
 
-        Joint 7 is released for the move. Only in hold.
+        No joint is faster than `speed` [rad/s]. Joint 7 is released for the move. Only
+        in hold.
 
         Raises:
-            ValueError: the arm floats, or `goal` is beyond a stop or not finite.
+            ValueError: the arm floats, `goal` is beyond a stop or not finite, or
+                `speed` is not within 0..0.5 rad/s.
         """
         constants = self._model.constants
-        inside = (goal >= constants.q_lower) & (goal <= constants.q_upper)
         if not self._is_damped:
             raise ValueError("the arm moves in hold only")
-        if goal.shape != (7,) or not bool(inside.all()):
+        is_inside = goal.shape == (7,) and bool(
+            ((goal >= constants.q_lower) & (goal <= constants.q_upper)).all()
+        )
+        if not is_inside:
             raise ValueError(f"{goal} is no pose within the joint stops")
-        self._lock.release(reading.host_ns)
-        self._move = JointMove(reading.q.copy(), goal.copy())
-        self._move_ns = reading.host_ns
+        if not 0.0 < speed <= TOP_SPEED:
+            raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
+        now = reading.host_ns
+        start = reading.q.copy()
+        if self._move is not None:  # from where it is held, or the torque would jump
+            start = self._move.at((now - self._move_ns) * 1e-9)[0]
+        self._lock.release(now)
+        self._move = JointMove(start, goal.copy(), speed)
+        self._move_ns = now
         return self._move.duration
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -85,18 +95,14 @@ class FootController:
             pd[_JOINT7] += lock  # fades from the moment of its release
             # A move never asks for what the guard would stop it for.
             tau = np.clip(gravity + pd, -self._largest, self._largest)
-            return self._walled(tau, reading), gravity
-        tau = gravity.copy()
-        if self._is_damped:
-            tau -= self._damping * reading.qd
-        tau[_JOINT7] = gravity[_JOINT7] + lock
-        return self._walled(tau, reading), gravity
-
-    def _walled(self, tau: Vector, reading: ArmReading) -> Vector:
-        if self._walls is None:
-            return tau
-        push = self._walls.torque(reading.q, reading.qd)
-        return tau if push is None else tau + push
+        else:
+            tau = gravity.copy()
+            if self._is_damped:
+                tau -= self._damping * reading.qd
+            tau[_JOINT7] = gravity[_JOINT7] + lock
+        if self._walls is not None:
+            self._walls.apply(tau, reading)
+        return tau, gravity
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""

@@ -18,6 +18,7 @@ from wam.constants import GRAVITY, ArmConstants, Array, Body
 
 OBSERVABLE = 12  # numbers of the 21 that show in the torques
 LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
+LARGEST_CONDITION = 30.0  # of what is observable; the shipped poses have 7
 _SINGULAR = 1e-3  # of the largest singular value: below it a direction is not seen
 
 
@@ -86,46 +87,72 @@ class MomentFit:
         mus: first moments of least norm [kg m], shape (7, 3); with the tool that was
             fitted.
         rank: directions that the poses showed, 12 at best.
-        residual: rms of torque over all joints and poses [N m].
+        condition: largest over smallest of the singular values of those directions.
+        residuals: measured less explained torques [N m], shape (n, 7).
     """
 
     mus: Array
     rank: int
-    residual: float
+    condition: float
+    residuals: Array
+
+    @property
+    def residual(self) -> float:
+        """Rms of the residuals over all joints and poses [N m]."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
 
 
 def fit_moments(
     constants: ArmConstants, q: NDArray[np.float64], tau: NDArray[np.float64]
 ) -> MomentFit:
-    """Fit first moments to holding torques.
+    """Fit first moments to holding torques; `check_fit` says whether to trust them.
 
     Args:
         constants: of the arm.
         q: joint positions at rest [rad], shape (n, 7).
         tau: holding torques there, free of friction [N m], shape (n, 7).
-
-    Raises:
-        SettingsError: the poses show fewer than 12 directions, or no moments explain
-            the torques to 0.5 N m.
     """
     if q.shape != tau.shape or q.ndim != 2 or q.shape[1] != 7:
         raise ValueError(f"q and tau must be (n, 7), got {q.shape} and {tau.shape}")
     Y = np.vstack([regressor(constants, row) for row in q])
     mus, _, _, values = np.linalg.lstsq(Y, tau.ravel(), rcond=_SINGULAR)
     rank = int(np.count_nonzero(values > _SINGULAR * values[0]))
-    residual = float(np.sqrt(np.mean((Y @ mus - tau.ravel()) ** 2)))
-    if rank < OBSERVABLE:
+    return MomentFit(
+        mus=np.asarray(mus, np.float64).reshape(7, 3),
+        rank=rank,
+        condition=float(values[0] / values[rank - 1]),
+        residuals=tau - (Y @ mus).reshape(tau.shape),
+    )
+
+
+def check_fit(fit: MomentFit) -> None:
+    """Refuse a fit that would not float the arm.
+
+    Raises:
+        SettingsError: the poses show fewer than 12 directions or some of them poorly,
+            or no moments explain the torques to 0.5 N m.
+    """
+    if fit.rank < OBSERVABLE:
         raise SettingsError(
-            f"The poses show {rank} of {OBSERVABLE} directions of gravity.",
+            f"The poses show {fit.rank} of {OBSERVABLE} directions of gravity.",
             hint="Use more poses, or more different ones.",
         )
-    if residual > LARGEST_RESIDUAL:
+    if fit.condition > LARGEST_CONDITION:
         raise SettingsError(
-            f"The torques leave {residual:.2f} N m unexplained "
-            f"(limit {LARGEST_RESIDUAL}).",
+            f"The poses show gravity unevenly: condition {fit.condition:.0f} "
+            f"(limit {LARGEST_CONDITION:.0f}).",
+            hint="Use more poses, or more different ones.",
+        )
+    if not fit.residual <= LARGEST_RESIDUAL:
+        pose, joint = np.unravel_index(
+            np.abs(fit.residuals).argmax(), (len(fit.residuals), 7)
+        )
+        raise SettingsError(
+            f"The torques leave {fit.residual:.2f} N m unexplained "
+            f"(limit {LARGEST_RESIDUAL}), most at joint {joint + 1} in pose "
+            f"{pose + 1}.",
             hint="Was the arm touched, or the tool changed meanwhile?",
         )
-    return MomentFit(np.asarray(mus, np.float64).reshape(7, 3), rank, residual)
 
 
 def _rotation(constants: ArmConstants, joint: int, angle: float) -> Array:

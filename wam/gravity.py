@@ -2,10 +2,8 @@
 
 from dataclasses import replace
 
-import numpy as np
-
-from wam.constants import ArmConstants, Array, Body
-from wam.first_moments import links_of_moments
+from wam.constants import ArmConstants, Array
+from wam.first_moments import links_of_moments, moments_of_links
 from wam.model import ArmModel
 from wam.tool import Tool
 
@@ -56,22 +54,22 @@ def compensation(model: ArmModel, q: Array, virtual_mass: float) -> Array:
 
 
 def gravity_model(
-    constants: ArmConstants, tool: Tool, mus: Array, *, is_tool_included: bool
+    constants: ArmConstants, tool: Tool, mus: Array, fitted: Tool | None = None
 ) -> ArmModel:
     """Return a model whose gravity is that of first moments instead of masses.
 
-    Only its gravity and its frames mean something; its inertia does not.
+    Moments are linear in the bodies: those of the tool that was on the plate when they
+    were fitted are taken off, `tool` is put on. With the same tool nothing changes.
+    Only the model's gravity and frames mean something; its inertia does not.
 
     Args:
         constants: of the arm.
-        tool: sensor and foot.
-        mus: first moments [kg m], shape (7, 3): shipped ones of the links alone, or
-            calibrated ones.
-        is_tool_included: `mus` were fitted with this tool on; it is not added again.
+        tool: sensor and foot that are on the plate now.
+        mus: first moments [kg m], shape (7, 3).
+        fitted: what hung on the plate when they were fitted; None = nothing, as for
+            the shipped ones.
     """
-    weighed = replace(constants, links=links_of_moments(constants, mus))
-    if not is_tool_included:
-        return ArmModel(weighed, tool)
-    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
-    foot = replace(nothing, com=tool.foot.com)
-    return ArmModel(weighed, replace(tool, sensor=nothing, foot=foot))
+    if fitted is not None:
+        bodies = (fitted.sensor, fitted.foot)
+        mus = mus - (moments_of_links(constants, bodies) - moments_of_links(constants))
+    return ArmModel(replace(constants, links=links_of_moments(constants, mus)), tool)

@@ -6,7 +6,7 @@ import numpy as np
 
 from wam.constants import Array
 
-SPEED = 0.5  # rad/s
+TOP_SPEED = 0.5  # rad/s
 ACCELERATION = 0.5  # rad/s^2
 TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD part only
 
@@ -21,7 +21,7 @@ class JointMove:
 
     start: Array
     goal: Array
-    speed: float = SPEED
+    speed: float = TOP_SPEED
     acceleration: float = ACCELERATION
 
     @property

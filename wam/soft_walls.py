@@ -7,13 +7,13 @@ position lies on or past two stops, and an arm that starts there is not thrown o
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from acquisition.devices import Vector
+from acquisition.devices import ArmReading, Vector
 
 DEPTH = 0.1  # rad
 _REACH = 0.2  # rad in which the spring would reach the torque limit
-_ALL = (1 << 7) - 1
+# A wall takes a joint no further than this: beyond the limit the guard steps in, and
+# would blame the foot's mass.
+_SHARE = 0.95  # of the torque limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,29 +45,21 @@ class SoftWalls:
         """The torque limits of the joints [N m], seven."""
         return self._walls.torque
 
-    def torque(self, q: Vector, qd: Vector) -> Vector | None:
-        """Return what the walls add at `q` [rad] and `qd` [rad/s], shapes (7,).
+    def apply(self, tau: Vector, reading: ArmReading) -> None:
+        """Add to joint torques `tau` [N m], shape (7,), what the walls push.
 
-        None stands for nothing at all, which is nearly always.
-
-        Returns:
-            Torques [N m], shape (7,), never larger than the torque limits.
+        Never so much that a joint would get more than its torque limit in all.
         """
         walls = self._walls
-        pushed: dict[int, float] = {}
-        rows = zip(q.tolist(), walls.lower, walls.upper, strict=True)
+        rows = zip(reading.q.tolist(), walls.lower, walls.upper, strict=True)
         for joint, (angle, lower, upper) in enumerate(rows):
             depth = max(lower + DEPTH - angle, 0.0) - max(angle - upper + DEPTH, 0.0)
             if depth == 0.0:
-                self._armed |= 1 << joint
+                if reading.is_complete:  # an extrapolated position arms nothing
+                    self._armed |= 1 << joint
             elif self._armed >> joint & 1:
-                pushed[joint] = self._push(joint, depth, float(qd[joint]))
-        if not pushed:
-            return None
-        tau = np.zeros(7)
-        for joint, push in pushed.items():
-            tau[joint] = push
-        return tau
+                push = self._push(joint, depth, float(reading.qd[joint]))
+                tau[joint] = self._bounded(joint, float(tau[joint]), push)
 
     def _push(self, joint: int, depth: float, speed: float) -> float:
         """Return the torque of one wall; `depth` > 0 lies at the lower stop."""
@@ -78,4 +70,11 @@ class SoftWalls:
         brake = walls.damping[joint] * max(-inward * speed, 0.0)
         # The damper comes in with the spring, or touching the wall would be a blow.
         share = min(abs(depth) / DEPTH, 1.0)
-        return inward * min(spring + share * brake, limit)
+        return inward * (spring + share * brake)
+
+    def _bounded(self, joint: int, tau: float, push: float) -> float:
+        """Return `tau` with as much of `push` as the joint's limit leaves."""
+        most = _SHARE * self._walls.torque[joint]
+        if push > 0.0:
+            return max(tau, min(tau + push, most))
+        return min(tau, max(tau + push, -most))

@@ -1,6 +1,5 @@
 """The start-up of a WAM: who is on the bus, is it healthy, is it the right arm."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
@@ -11,6 +10,7 @@ from wam.dialogue import Dialogue
 from wam.frames import MOTOR_NODES, SAFETY_NODE, Group
 from wam.health import PuckHealth, ask_health
 from wam.pucks import (
+    MAGNETIC_ENCODER,
     MODERN,
     OLDEST_DRIVEN,
     POLES_OF_GIMBALS,
@@ -21,10 +21,12 @@ from wam.pucks import (
     device_of,
     property_number,
 )
+from wam.roll_call import call_roll, pucks_do
 from wam.safety import PendantWord, SafetyModule
 
 _VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
 _MS = 1_000_000
+_ABSOLUTE_SINCE = 118  # firmware from which MECH can be believed
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,8 @@ class PuckInfo:
         role: type in the low five bits, options above.
         cts: encoder counts per motor turn.
         ipnm: torque units per N m at the motor.
+        mech: absolute angle of the motor within its turn, 0..cts-1 [counts]; None =
+            it has no encoder that knows.
         was_asleep: the puck had to be woken.
         health: temperatures, voltage and error.
     """
@@ -46,6 +50,7 @@ class PuckInfo:
     role: int
     cts: int
     ipnm: int
+    mech: int | None
     was_asleep: bool
     health: PuckHealth
 
@@ -95,11 +100,11 @@ class StartUp:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        stats = self._enumerate()
-        safety_vers = self._find_safety(stats)
+        stats = call_roll(self._dialogue, self._clock, self._boot_ns)
+        safety_vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
+        _check_firmware("The safety module", safety_vers, MODERN)
         safety = SafetyModule(self._dialogue, self._clock, safety_vers)
         mode = safety.mode()
-        _check_present(stats, mode)
         safety.set_limits(self._limits)
         asleep = [node for node, stat in stats.items() if stat == Stat.RESET]
         self._wake(asleep)
@@ -118,27 +123,6 @@ class StartUp:
             is_zeroed=safety.is_zeroed(),
             late_replies=self._dialogue.late_replies,
         )
-
-    def _enumerate(self) -> dict[int, int]:
-        """Return STAT by node of everything that answers within 1 ms."""
-        found: dict[int, int] = {}
-        for node in range(1, 32):
-            stat = self._dialogue.ask(node, _STAT, _MS)
-            if stat is not None:
-                found[node] = stat
-        return found
-
-    def _find_safety(self, stats: dict[int, int]) -> int:
-        """Return the firmware of the safety module."""
-        if SAFETY_NODE not in stats:
-            others = ",".join(map(str, stats)) or "nobody"
-            raise PreflightError(
-                f"The safety module does not answer ({others} on the bus).",
-                hint="Check the arm's power, the CAN cable and its terminators.",
-            )
-        vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
-        _check_firmware("The safety module", vers, MODERN)
-        return vers
 
     def _wake(self, asleep: list[int]) -> None:
         """Wake nodes, keep silent while they boot, and see that they are there.
@@ -175,8 +159,11 @@ class StartUp:
                 f"Puck {node} reports CTS {cts}, IPNM {ipnm}; both must be positive.",
                 hint="The puck has lost its configuration; see Barrett's manual.",
             )
+        mech = None
+        if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
+            mech = self._get(node, "MECH", vers)
         health = ask_health(lambda number: self._dialogue.ask(node, number))
-        return PuckInfo(node, vers, role, cts, ipnm, was_asleep, health)
+        return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
 
     def _check_wrist(self, puck: PuckInfo) -> None:
         poles = self._get(puck.node, "POLES", puck.vers)
@@ -192,29 +179,6 @@ class StartUp:
         return self._dialogue.require(node, number, name)
 
 
-def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
-    """Raise PreflightError or DeviceFaultError unless seven healthy pucks answer."""
-    present = [node for node in MOTOR_NODES if node in stats]
-    missing = [node for node in MOTOR_NODES if node not in stats]
-    if missing and mode is SafetyMode.E_STOP:
-        raise PreflightError(
-            "The arm is in E-stop: its pucks have no power.",
-            hint="Release the stop, press Shift-idle, then start again.",
-        )
-    if missing:
-        others = f"{','.join(map(str, present))} do" if present else "none does"
-        raise PreflightError(
-            f"{pucks_do(missing)} not answer ({others}).",
-            hint="Check its cable or a puck in reset.",
-        )
-    ill = [n for n in present if stats[n] not in (Stat.RESET, Stat.READY)]
-    if ill:
-        raise DeviceFaultError(
-            f"{pucks_do(ill)} not work: STAT {stats[ill[0]]}.",
-            hint="Switch the arm off and on, then start again.",
-        )
-
-
 def _check_firmware(who: str, found: int, needed: int) -> None:
     """Raise DeviceFaultError for firmware whose properties have other numbers."""
     if found < needed:
@@ -222,9 +186,3 @@ def _check_firmware(who: str, found: int, needed: int) -> None:
             f"{who} has firmware {found}; {needed} or later is needed.",
             hint="Ask Barrett for newer firmware.",
         )
-
-
-def pucks_do(nodes: Sequence[int]) -> str:
-    """Return "Puck 5 does" or "Pucks 5,6 do"."""
-    names = ",".join(map(str, nodes))
-    return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"

@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
     from experiments.bus_log import logging_bus
     from experiments.console import GOOD, Console
+    from experiments.gravity_choice import read_gravity
     from experiments.preflight import connect_rig, run_preflight
     from experiments.rigs import FakeOptions
     from experiments.settings import load_settings
@@ -50,6 +51,7 @@ def run(args: argparse.Namespace) -> int:
         return _explain(args.explain, console)
     settings = load_settings(args.config)
     if args.config_only:
+        read_gravity(settings)
         console.check(GOOD, "config", f"{settings.origin}")
         for key, value in settings.rig.model_dump().items():
             console.say(f"   {key} = {value}")

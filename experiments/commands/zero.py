@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.console import Console
+    from experiments.rigs import Rig
+    from wam.startup import ArmInfo
 
 EXAMPLES = """\
   traction zero                             asks, then defines the home position
@@ -26,7 +28,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Define the home position after confirmation and return the exit code."""
-    from acquisition.errors import PreflightError, TractionError
     from experiments.console import GOOD, Console
     from experiments.preflight import connect_rig
     from experiments.rigs import FakeOptions
@@ -37,12 +38,7 @@ def run(args: argparse.Namespace) -> int:
     fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)
     try:
-        try:
-            info = rig.crew.start_arm()
-        except TractionError as error:
-            raise PreflightError(
-                error.message, hint=error.hint, arm_state="not touched"
-            ) from error
+        info = _start(rig)
         home = rig.model.constants.home
         mode = info.safety_mode.name.lower().replace("_", "-")
         console.check(GOOD, "arm", f"pucks 1-7 answer, safety {mode}")
@@ -51,11 +47,51 @@ def run(args: argparse.Namespace) -> int:
         if not args.yes and not _is_confirmed(console):
             console.say("Nothing was changed. ARM: idle, braked.")
             return 5
+        _check_encoders(rig, _start(rig), console)  # it was moved until now
         rig.crew.define_position(home.tolist())
         console.check(GOOD, "zero", "positions defined at home")
     finally:
         rig.crew.close()
     return 0
+
+
+def _start(rig: Rig) -> ArmInfo:
+    """Ask the arm who it is; raise PreflightError when it is not fit."""
+    from acquisition.errors import PreflightError, TractionError
+
+    try:
+        return rig.crew.start_arm()
+    except TractionError as error:
+        raise PreflightError(
+            error.message, hint=error.hint, arm_state="not touched"
+        ) from error
+
+
+def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
+    """Compare the absolute encoders with those of the last time, or say what to note.
+
+    Raises:
+        PreflightError: the arm is not where home was.
+    """
+    from experiments.console import GOOD, WARNING
+    from wam.home_check import check_home, home_error
+
+    before = rig.settings.rig.arm.mech_at_home
+    mech = [puck.mech for puck in info.pucks if puck.mech is not None]
+    if len(mech) < len(info.pucks):
+        if before is not None:
+            console.check(WARNING, "encoders", "not absolute: home is not checked")
+        return
+    if before is None:
+        console.say(
+            f"To check the next zeroing, in [arm] of rig.toml: mech_at_home = {mech}"
+        )
+        return
+    cts = [puck.cts for puck in info.pucks]
+    error = home_error(rig.model.constants.j2mp, cts, mech, before)
+    check_home(error)
+    worst = float(abs(error).max())
+    console.check(GOOD, "encoders", f"{worst:.4f} rad at most from the last home")
 
 
 def _is_confirmed(console: Console) -> bool:

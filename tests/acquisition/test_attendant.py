@@ -30,8 +30,8 @@ class Cycle:
     def report(self, verdict):
         self.reports.append(verdict)
 
-    def move_to(self, goal):
-        self.goals.append(goal)
+    def move_to(self, goal, speed):
+        self.goals.append((goal, speed))
 
     def set_bias(self, bias):
         self.biases.append(bias)
@@ -83,12 +83,12 @@ def test_commands_reach_the_cycle_and_are_confirmed(loop):
     loop.console.post(Kind.ENTER, ArmState.FLOAT)
     loop.console.post(Kind.WATCH_TRIAL, 1)
     loop.console.post(Kind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
-    number = loop.console.post(Kind.MOVE, values=GOAL)
+    number = loop.console.post(Kind.MOVE, values=(*GOAL, 0.25))
     loop.run(0.002)
     assert loop.cycle.requests == [ArmState.FLOAT]
     assert loop.cycle.is_recording
     assert loop.cycle.biases == [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
-    assert loop.cycle.goals == [GOAL]
+    assert loop.cycle.goals == [(GOAL, 0.25)]
     assert StatusBoard(loop.board.status).read().obeyed == number
 
 

@@ -94,8 +94,8 @@ def test_observers_look_after_every_portion(room):
 
 
 def test_goals_and_biases_are_posted_as_given(room):
-    room.desk.move_to(np.arange(7.0))
+    room.desk.move_to(np.arange(7.0), 0.25)
     room.desk.set_bias([1, 2, 3, 4, 5, 6])
     room.desk.advance(0.02)
-    assert room.commands[0].values[:7] == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert room.commands[0].values[:8] == (0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 0.25)
     assert room.commands[1].values[:6] == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)

@@ -169,6 +169,16 @@ SETTINGS = [
         "rig.toml: feet.tread.mass = 1e+300 - expected a number > 0 and <= 20",
     ),
     ("rig", ("speed = [1.5", "speed = [-1.5"), "rig.toml: limits.speed[0] = -1.5 - "),
+    (
+        "rig",
+        ("virtual_mass = 0.30", "virtual_mass = 2.01"),
+        "rig.toml: control.virtual_mass = 2.01 - expected a number >= 0 and <= 2",
+    ),
+    (
+        "rig",
+        ("virtual_mass = 0.30", "virtual_mass = -0.01"),
+        "rig.toml: control.virtual_mass = -0.01 - expected a number >= 0 and <= 2",
+    ),
 ]
 
 

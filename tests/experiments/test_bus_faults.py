@@ -166,10 +166,10 @@ def test_incomplete_cycles_are_rare_single_and_marked(endured):
     late = 0.02 if name == "reply-swapped" else 0.0  # one puck in every 50th cycle
     assert lacking.mean() == pytest.approx(late, abs=0.005)
     assert not (lacking[1:] & lacking[:-1]).any()
-    # The push is smooth to a few counts, 2e-4 rad undisturbed; joint 4 moves 5e-4 in
+    # The push is smooth to four counts of joint 4, 3.4e-4 rad, which moves 5e-4 in
     # a cycle, so a position of the cycle before would show twice that.
     kinks = np.abs(np.diff(cycles["position"], n=2, axis=0))
-    assert kinks.max() < 3e-4
+    assert kinks.max() < 5e-4
 
 
 def test_what_the_link_lost_is_written_into_the_trial(endured):

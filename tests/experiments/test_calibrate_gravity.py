@@ -1,13 +1,19 @@
 """The guided calibration of gravity through the whole program."""
 
+import signal
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import fakes.rig
+from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
+from experiments.operator import AutoKeys, Prompt
+from fakes.plant import PlantOptions
 from tests.experiments.program import traction, write_config
+from wam import gravity_poses
 from wam.constants import Body, load_constants
 from wam.first_moments import gravity_torque
 from wam.gravity_file import gravity_from_toml
@@ -28,77 +34,166 @@ def perturbed(constants):
     return replace(constants, links=links)
 
 
+class HeavierRig(fakes.rig.FakeRig):
+    """A rig whose arm weighs otherwise than the drawings say."""
+
+    made: ClassVar[list["HeavierRig"]] = []
+
+    def __init__(self, scene, constants, tool, clock, network=None):
+        # Nothing touches the ground, so one step per cycle is fine enough.
+        arm, options = perturbed(constants), PlantOptions(substeps=1)
+        self.truth = ArmModel(arm, tool)
+        super().__init__(scene, arm, tool, clock, options, network)
+        self.made.append(self)
+
+
+def calibrate(out, *options, press=None, is_quick=True):
+    """Calibrate a simulated arm; return what was said and the simulated rig.
+
+    `press(asked, rig)` is called at every look at the keys. Quick: the arm is faster,
+    goes less far and stops for a shorter time than a real one may.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(fakes.rig, "FakeRig", HeavierRig)
+        if is_quick:
+            patch.setattr(gravity, "SETTLE", 0.1)
+            patch.setattr(gravity, "AVERAGE", 0.1)
+            patch.setattr(gravity_poses, "POINT_SPEED", 0.6)
+            patch.setattr(gravity_poses, "APPROACH_SPEED", 0.1)
+            patch.setattr(gravity_poses, "_REACH", 0.6 * gravity_poses._REACH)
+        if press is not None:
+            usual = AutoKeys.answer
+
+            def answer(self, asked):
+                press(asked, HeavierRig.made[-1])
+                return usual(self, asked)
+
+            patch.setattr(AutoKeys, "answer", answer)
+        arguments = ("calibrate", "gravity", "--fake", "--fast", "--out", out)
+        return traction(*arguments, *options), HeavierRig.made[-1]
+
+
+def errors(text, rig):
+    """Return rms errors of torque [N m] with and without calibration, 50 poses."""
+    found = gravity_from_toml(text, "gravity.toml")
+    constants = load_constants()
+    rng = np.random.default_rng(5)
+    poses = rng.uniform(constants.q_lower, constants.q_upper, (50, 7))
+    wanted = np.array([rig.truth.gravity(q) for q in poses])
+    given = np.array([gravity_torque(constants, found.mus, q) for q in poses])
+    drawn = np.array([ArmModel(constants, rig.truth.tool).gravity(q) for q in poses])
+    return [np.sqrt(np.mean((tau - wanted) ** 2)) for tau in (given, drawn)]
+
+
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory):
-    """Return (what was printed, text of the file, true model) of one calibration."""
-    folder = tmp_path_factory.mktemp("calibrated")
-    seen = []
-
-    class Heavier(fakes.rig.FakeRig):
-        def __init__(self, scene, constants, tool, clock, *more, **options):
-            constants = perturbed(constants)
-            seen.append(ArmModel(constants, tool))
-            super().__init__(scene, constants, tool, clock, *more, **options)
-
-    out = folder / "gravity.toml"
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", Heavier)
-        patch.setattr(gravity, "SETTLE", 0.5)
-        done = traction(
-            "calibrate", "gravity", "--fake", "--fast", "--poses", 4, "--out", out
-        )
+    """Return (what was said, text of the file, simulated rig) of one calibration."""
+    out = tmp_path_factory.mktemp("calibrated") / "gravity.toml"
+    done, rig = calibrate(out, "--poses", 3)
     assert done.code == 0, done.err
-    return done, out.read_text(), seen[0]
+    return done, out.read_text(), rig
 
 
 def test_torques_of_a_perturbed_arm_are_recovered_where_nothing_was_measured(
     calibrated,
 ):
-    _, text, truth = calibrated
-    found = gravity_from_toml(text, "gravity.toml")
-    constants = load_constants()
-    rng = np.random.default_rng(5)
-    poses = rng.uniform(constants.q_lower, constants.q_upper, (50, 7))
-    wanted = np.array([truth.gravity(q) for q in poses])
-    given = np.array([gravity_torque(constants, found.mus, q) for q in poses])
-    uncorrected = np.array([ArmModel(constants, truth.tool).gravity(q) for q in poses])
-    assert np.sqrt(np.mean((given - wanted) ** 2)) < 0.1
-    assert np.sqrt(np.mean((uncorrected - wanted) ** 2)) > 0.3
+    with_it, without = errors(*calibrated[1:])
+    assert with_it < 0.1
+    assert without > 0.3  # the perturbation was worth a calibration
+
+
+@pytest.mark.long
+def test_the_whole_calibration_recovers_the_torques_at_its_own_pace(tmp_path):
+    out = tmp_path / "gravity.toml"
+    done, rig = calibrate(out, is_quick=False)
+    assert done.code == 0, done.err
+    assert errors(out.read_text(), rig)[0] < 0.1
 
 
 def test_the_person_is_told_to_clear_the_space_and_sees_the_residuals(calibrated):
     done, _, _ = calibrated
     assert "clear the space" in done.out
     assert "rank 12 of 12" in done.out
+    assert "SIMULATED" in done.out.splitlines()[0]
     assert done.out.rstrip().endswith("ARM: idle, braked.")
 
 
+def test_the_hand_is_off_the_arm_while_it_is_weighed(tmp_path):
+    hands = []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.MOVING and asked.since > 0.5:
+            hands.append(rig.plant.hand.is_holding)
+            signal.raise_signal(signal.SIGINT)
+
+    calibrate(tmp_path / "gravity.toml", press=press)
+    assert hands == [False]
+
+
+def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path):
+    speeds = []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.MOVING and asked.since > 1.0:
+            speeds.append(float(np.abs(rig.plant.qd).max()))
+            signal.raise_signal(signal.SIGINT)
+
+    done, rig = calibrate(tmp_path / "gravity.toml", press=press)
+    assert done.code == 130
+    assert speeds[0] > 0.1  # it was moving
+    assert "Stopped as asked. Nothing was written." in done.out
+    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert rig.network.safety_mode is SafetyMode.IDLE
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_arm_that_is_held_while_it_is_weighed_is_no_measurement(tmp_path):
+    def press(asked, rig):
+        if asked.prompt is Prompt.MOVING and asked.since > 1.0:
+            wave = np.sin(rig.plant.t_ns * 1e-9 * 13.0)
+            rig.plant.disturbance[3] = 5.0 * wave  # 10 mrad at the joint's stiffness
+
+    done, rig = calibrate(tmp_path / "gravity.toml", "--poses", 3, press=press)
+    assert done.code == 3
+    assert "while it was weighed (limit 0.02)" in done.err
+    assert rig.network.safety_mode is SafetyMode.IDLE
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_file_names_the_foot_that_was_fitted(calibrated):
-    _, text, truth = calibrated
+    _, text, rig = calibrated
     found = gravity_from_toml(text, "gravity.toml")
-    assert found.foot == "tread"
-    assert found.tool["foot"]["mass"] == truth.tool.foot.mass
-
-
-def test_a_calibration_is_used_and_refused_for_another_tool(calibrated, tmp_path):
-    _, text, _ = calibrated
-    use = ('model = "cad"', 'model = "calibrated"')
-    config = write_config(tmp_path, rig=use)
-    (tmp_path / "gravity.toml").write_text(text)
-    options = ("check", "--fake", "--fast", "--config", config, "--data", tmp_path)
-    assert traction(*options).code == 0
-    config.write_text(config.read_text().replace("mass = 0.45", "mass = 0.50", 1))
-    done = traction(*options)
-    assert done.code == 2
-    assert "gravity.toml was measured with another tool (foot tread)" in done.err
+    assert (found.foot, found.is_simulated) == ("tread", True)
+    assert found.tool.foot.mass == rig.truth.tool.foot.mass
+    assert found.poses.shape == found.torques.shape == (3, 7)
 
 
 def test_a_missing_calibration_is_named(tmp_path):
     use = ('model = "cad"', 'model = "calibrated"')
     config = write_config(tmp_path, rig=use)
-    done = traction("check", "--fake", "--fast", "--config", config)
+    for options in (("--fake", "--fast"), ("--config-only",)):
+        done = traction("check", *options, "--config", config)
+        assert done.code == 2
+        assert "gravity.toml cannot be read" in done.err
+
+
+def test_a_calibration_can_be_made_though_rig_toml_wants_one_already(tmp_path):
+    use = ('model = "cad"', 'model = "calibrated"')
+    config = write_config(tmp_path, rig=use)
+
+    def press(asked, rig):
+        signal.raise_signal(signal.SIGINT)
+
+    done, _ = calibrate(tmp_path / "g.toml", "--config", config, press=press)
+    assert done.code == 130
+
+
+def test_a_simulated_calibration_is_marked_and_lies_beside_rig_toml(tmp_path):
+    config = write_config(tmp_path)
+    (tmp_path / "gravity.fake.toml").write_text("mine")
+    done = traction("calibrate", "gravity", "--fake", "--fast", "--config", config)
     assert done.code == 2
-    assert "gravity.toml cannot be read" in done.err
+    assert f"{tmp_path / 'gravity.fake.toml'} exists" in done.err
 
 
 def test_a_file_is_never_overwritten(tmp_path):
@@ -110,8 +205,22 @@ def test_a_file_is_never_overwritten(tmp_path):
     assert out.read_text() == "mine"
 
 
+def test_a_folder_that_is_not_there_is_refused_before_the_arm_moves(tmp_path):
+    out = tmp_path / "nowhere" / "gravity.toml"
+    done = traction("calibrate", "gravity", "--fake", "--fast", "--out", out)
+    assert done.code == 2
+    assert "There is no folder" in done.err
+
+
 @pytest.mark.parametrize("poses", [2, 61])
 def test_a_silly_number_of_poses_is_refused(poses):
     done = traction("calibrate", "gravity", "--fake", "--fast", "--poses", poses)
     assert done.code == 2
     assert "expected a whole number 3..60" in done.err
+
+
+@pytest.mark.parametrize("option", [("--fast",), ("--operator-script", "auto")])
+def test_what_belongs_to_a_simulation_is_refused_on_the_real_arm(option):
+    done = traction("calibrate", "gravity", *option)
+    assert done.code == 2
+    assert "only with --fake" in done.err

@@ -1,4 +1,9 @@
+import re
+
+import pytest
+
 from experiments.cli import main
+from tests.experiments.program import traction, write_config
 
 
 def test_zero_defines_the_home_position_when_told_that_it_is_so(capsys):
@@ -25,3 +30,42 @@ def test_any_other_word_changes_nothing(capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", Keyboard())
     assert main(["zero", "--fake"]) == 5
     assert "Nothing was changed" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def noted():
+    """Return what the simulated arm's encoders say, as the first zeroing tells it."""
+    done = traction("zero", "--fake", "--yes")
+    found = re.search(r"mech_at_home = (\[[\d, ]+\])", done.out)
+    return [int(number) for number in found[1].strip("[]").split(",")]
+
+
+def zero_with(folder, mech):
+    comment = "# mech_at_home = [...] "
+    config = write_config(folder, rig=(comment, f"mech_at_home = {mech} # "))
+    return traction("zero", "--fake", "--yes", "--config", config)
+
+
+def test_the_absolute_encoders_are_told_to_check_the_next_zeroing(noted):
+    assert len(noted) == 7
+    assert all(0 <= count < 4096 for count in noted)
+
+
+def test_an_arm_at_its_old_home_is_zeroed(noted, tmp_path):
+    done = zero_with(tmp_path, noted)
+    assert done.code == 0, done.err
+    assert "0.0000 rad at most from the last home" in done.out
+
+
+def test_an_arm_that_is_not_at_its_old_home_is_not_zeroed(noted, tmp_path):
+    noted = [*noted[:3], (noted[3] + 900) % 4096, *noted[4:]]
+    done = zero_with(tmp_path, noted)
+    assert done.code == 3
+    assert done.err.startswith("Joint 4 is +0.077 rad from where home was last time")
+    assert "positions defined" not in done.out
+
+
+def test_encoders_that_are_none_are_refused_by_the_settings(noted, tmp_path):
+    done = zero_with(tmp_path, [*noted[:6], -1])
+    assert done.code == 2
+    assert "arm.mech_at_home" in done.err

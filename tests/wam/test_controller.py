@@ -1,3 +1,5 @@
+import sys
+
 import numpy as np
 import pytest
 
@@ -6,6 +8,7 @@ from acquisition.devices import ArmReading
 from wam.controller import FootController
 from wam.gravity import compensation
 from wam.joint_lock import LockGains
+from wam.soft_walls import SoftWalls, Walls
 
 S = 1_000_000_000
 DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])
@@ -126,3 +129,98 @@ def test_the_gains_of_the_lock_can_be_chosen(foot_model):
     law.enter(ArmState.FLOAT, reading(0.0))
     tau, gravity = law.torque(reading(5.0, q=moved(0.01)))
     assert tau[6] - gravity[6] == pytest.approx(-0.08, abs=1e-12)
+
+
+def with_walls(foot_model, torque=40.0):
+    """Return a law whose joint 4 stands before its upper wall, which is armed."""
+    constants = foot_model.constants
+    walls = Walls(
+        tuple(constants.q_lower.tolist()),
+        tuple(constants.q_upper.tolist()),
+        (torque,) * 7,
+        tuple(constants.kd.tolist()),
+    )
+    law = FootController(foot_model, MASS, walls=SoftWalls(walls))
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.torque(reading(0.0))
+    return law
+
+
+def folded(depth):
+    """Return a pose with joint 4 this deep in its upper wall [rad]."""
+    q = DOWN.copy()
+    q[3] = 3.1 - 0.1 + depth
+    return q
+
+
+@pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP])
+def test_a_wall_pushes_back_in_every_powered_state(foot_model, state):
+    law = with_walls(foot_model)
+    law.enter(state, reading(1.0))
+    tau, gravity = law.torque(reading(9.0, q=folded(0.05)))
+    assert tau[3] - gravity[3] == pytest.approx(-40.0 / 0.2 * 0.05)
+    assert np.delete(tau - gravity, 3) == pytest.approx(np.zeros(6), abs=1e-12)
+
+
+def test_a_wall_is_no_gravity(foot_model):
+    # What is cut where a motor is at its limit must never be the weight of the arm.
+    law = with_walls(foot_model)
+    gravity = law.torque(reading(9.0, q=folded(0.05)))[1]
+    assert gravity == pytest.approx(foot_model.gravity(folded(0.05)), abs=1e-12)
+
+
+def test_a_move_goes_no_faster_than_it_was_told(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN + np.array([0, 0, 0, 0.5, 0, 0, 0.2])
+    assert law.move_to(goal, 0.1, reading(1.0)) == pytest.approx(0.5 / 0.1 + 0.2)
+    assert law.move_to(goal, 0.5, reading(1.0)) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("speed", [0.0, -0.1, 0.51, float("nan")])
+def test_a_speed_that_is_none_is_refused(law, speed):
+    law.enter(ArmState.HOLD, reading(0.0))
+    with pytest.raises(ValueError, match="rad/s"):
+        law.move_to(DOWN, speed, reading(0.0))
+
+
+@pytest.mark.parametrize("goal", [np.full(7, 4.0), np.full(7, np.nan), np.zeros(6)])
+def test_a_goal_that_cannot_be_reached_is_refused(law, goal):
+    law.enter(ArmState.HOLD, reading(0.0))
+    with pytest.raises(ValueError, match="is no pose"):
+        law.move_to(goal, 0.5, reading(0.0))
+
+
+def test_a_floating_arm_is_not_moved(law):
+    law.enter(ArmState.FLOAT, reading(0.0))
+    with pytest.raises(ValueError, match="hold only"):
+        law.move_to(DOWN, 0.5, reading(0.0))
+
+
+def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.move_to(DOWN, 0.5, reading(0.0))
+    sagged = DOWN.copy()
+    sagged[1] += 0.001  # as far as an unknown weight of 2.5 N m pulls it
+    before = law.torque(reading(1.0, q=sagged))[0]
+    law.move_to(DOWN + 0.01, 0.5, reading(1.0, q=sagged))
+    after = law.torque(reading(1.0, q=sagged))[0]
+    assert after == pytest.approx(before, abs=1e-9)
+    assert before[1] - law.torque(reading(1.0))[0][1] == pytest.approx(-2.5, abs=0.1)
+
+
+def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
+    law = with_walls(foot_model)
+
+    def compute(cycles):
+        for i in range(cycles):
+            seconds = 1.0 + 0.002 * i
+            q = folded(0.05) if i % 2 else DOWN
+            law.torque(reading(seconds, q=q, qd7_raw=0.01))
+            law.joint7_offset(reading(seconds))
+
+    for state in (ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP):
+        law.enter(state, reading(0.0))
+        compute(50)  # whatever is made once is made now
+        before = sys.getallocatedblocks()
+        compute(2000)
+        assert sys.getallocatedblocks() - before < 100  # less than one in 20 cycles

@@ -5,7 +5,13 @@ import pytest
 
 from acquisition.errors import SettingsError
 from wam.constants import Body, load_constants
-from wam.first_moments import fit_moments, gravity_torque, moments_of_links
+from wam.first_moments import (
+    MomentFit,
+    check_fit,
+    fit_moments,
+    gravity_torque,
+    moments_of_links,
+)
 from wam.gravity import gravity_model
 from wam.model import ArmModel
 
@@ -77,7 +83,10 @@ def test_calibration_recovers_the_torques_of_a_perturbed_arm():
     rng = np.random.default_rng(5)
     measured = torques(arm, poses) + rng.normal(0.0, 0.02, (len(poses), 7))
     fit = fit_moments(CONSTANTS, poses, measured)
+    check_fit(fit)
     assert fit.rank == 12
+    assert fit.condition == pytest.approx(5.78, abs=0.01)  # of these nine poses
+    assert 0.0 < fit.residual < 0.03
     others = random_poses(50, seed=6)
     found = np.array([gravity_torque(CONSTANTS, fit.mus, q) for q in others])
     error = np.sqrt(np.mean((found - torques(arm, others)) ** 2))
@@ -88,8 +97,16 @@ def test_calibration_recovers_the_torques_of_a_perturbed_arm():
 
 def test_too_few_poses_are_refused():
     poses = CONSTANTS.gravity_poses[:2]
+    fit = fit_moments(CONSTANTS, poses, torques(CONSTANTS, poses))
     with pytest.raises(SettingsError, match="of 12 directions"):
-        fit_moments(CONSTANTS, poses, torques(CONSTANTS, poses))
+        check_fit(fit)
+
+
+def test_poses_that_show_a_direction_poorly_are_refused():
+    fit = MomentFit(CONSTANTS.mus, 12, 30.1, np.zeros((4, 7)))
+    with pytest.raises(SettingsError, match=r"condition 30 \(limit 30\)"):
+        check_fit(fit)
+    check_fit(dataclasses.replace(fit, condition=29.9))
 
 
 def test_torques_that_gravity_cannot_explain_are_refused():
@@ -97,7 +114,21 @@ def test_torques_that_gravity_cannot_explain_are_refused():
     spoiled = torques(CONSTANTS, poses)
     spoiled[::2, 1] += 6.0
     with pytest.raises(SettingsError, match="unexplained"):
-        fit_moments(CONSTANTS, poses, spoiled)
+        check_fit(fit_moments(CONSTANTS, poses, spoiled))
+
+
+def test_the_worst_joint_and_pose_are_named():
+    residuals = np.full((3, 7), 0.6)
+    residuals[1, 4] = -2.0
+    fit = MomentFit(CONSTANTS.mus, 12, 6.0, residuals)
+    with pytest.raises(SettingsError, match="most at joint 5 in pose 2"):
+        check_fit(fit)
+
+
+def test_a_residual_that_is_no_number_is_refused():
+    fit = MomentFit(CONSTANTS.mus, 12, 6.0, np.full((3, 7), np.nan))
+    with pytest.raises(SettingsError, match="unexplained"):
+        check_fit(fit)
 
 
 def test_shapes_must_agree():
@@ -106,9 +137,7 @@ def test_shapes_must_agree():
 
 
 def test_a_model_of_shipped_moments_weighs_what_they_say(example_tool):
-    model = gravity_model(
-        CONSTANTS, example_tool, CONSTANTS.mus, is_tool_included=False
-    )
+    model = gravity_model(CONSTANTS, example_tool, CONSTANTS.mus)
     bare = ArmModel(CONSTANTS)
     loaded = ArmModel(CONSTANTS, example_tool)
     for q in random_poses(10, seed=7):
@@ -117,13 +146,17 @@ def test_a_model_of_shipped_moments_weighs_what_they_say(example_tool):
         assert model.gravity(q) == pytest.approx(expected, abs=1e-11)
 
 
-def test_moments_fitted_with_the_tool_do_not_carry_it_twice(example_tool):
-    mus = moments_of_links(CONSTANTS, (example_tool.sensor, example_tool.foot))
-    model = gravity_model(CONSTANTS, example_tool, mus, is_tool_included=True)
-    loaded = ArmModel(CONSTANTS, example_tool)
+@pytest.mark.parametrize("mass", [0.45, 0.70])
+def test_moments_fitted_with_one_foot_serve_another(example_tool, mass):
+    foot = example_tool.foot
+    other = dataclasses.replace(foot, mass=mass, com=foot.com + 0.02)
+    session = dataclasses.replace(example_tool, foot=other)
+    mus = moments_of_links(CONSTANTS, (example_tool.sensor, foot))
+    model = gravity_model(CONSTANTS, session, mus, example_tool)
+    truth = ArmModel(CONSTANTS, session)
     for q in random_poses(10, seed=8):
-        assert model.gravity(q) == pytest.approx(loaded.gravity(q), abs=1e-11)
-        # the virtual mass still pulls at the foot's own centre
+        assert model.gravity(q) == pytest.approx(truth.gravity(q), abs=1e-11)
+        # the virtual mass pulls at the centre of the foot that is on
         assert model.weight_torque(q, 0.3) == pytest.approx(
-            loaded.weight_torque(q, 0.3), abs=1e-12
+            truth.weight_torque(q, 0.3), abs=1e-12
         )

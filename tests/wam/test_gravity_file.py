@@ -12,7 +12,6 @@ from wam.gravity_file import (
     gravity_from_toml,
     gravity_to_toml,
 )
-from wam.tool import tool_facts
 
 
 def calibration(tool):
@@ -21,9 +20,11 @@ def calibration(tool):
         residual=0.0123,
         rank=12,
         foot="tread",
-        tool=tool_facts(tool),
+        tool=tool,
         measured_utc="2027-01-15T08:00:00Z",
+        is_simulated=True,
         poses=np.linspace(-1, 1, 14).reshape(2, 7),
+        torques=np.linspace(-9, 8, 14).reshape(2, 7),
     )
 
 
@@ -32,8 +33,10 @@ def test_a_calibration_survives_its_file_bit_for_bit(example_tool):
     after = gravity_from_toml(gravity_to_toml(before), "gravity.toml")
     assert (after.mus == before.mus).all()
     assert (after.poses == before.poses).all()
-    assert after.tool == before.tool
-    names = ("residual", "rank", "foot", "measured_utc")
+    assert (after.torques == before.torques).all()
+    assert (after.tool.foot.inertia == before.tool.foot.inertia).all()
+    assert (after.tool.sole == before.tool.sole).all()
+    names = ("residual", "rank", "foot", "measured_utc", "is_simulated")
     assert [getattr(after, n) for n in names] == [getattr(before, n) for n in names]
 
 
@@ -50,13 +53,22 @@ def test_the_tool_of_the_calibration_fits_and_another_does_not(example_tool):
         lambda text: text.replace("mus = [", "mus = [1, "),
         lambda text: text.replace("rank = 12", ""),
         lambda text: text.replace("0.0,", "nan,"),
+        lambda text: text.replace("0.0,", "1e3,"),
+        lambda text: text.replace("is_simulated = true", "is_simulated = 1"),
+        lambda text: text.replace("torques = [", "torques = [[0,0,0,0,0,0,0],"),
+        lambda text: text.replace("mass = 0.45", 'mass = "heavy"'),
+        lambda text: text.replace("[tool.sensor]", "[tool.other]"),
+        lambda text: text.replace("residual = 0.0123", "residual = inf"),
         lambda text: text[: len(text) // 2],
         lambda text: "",
     ],
 )
 def test_a_damaged_file_is_refused_by_name(example_tool, spoil):
+    whole = gravity_to_toml(calibration(example_tool))
+    spoiled = spoil(whole)
+    assert spoiled != whole
     with pytest.raises(SettingsError, match=r"my\.toml is no gravity calibration"):
-        gravity_from_toml(spoil(gravity_to_toml(calibration(example_tool))), "my.toml")
+        gravity_from_toml(spoiled, "my.toml")
 
 
 @given(st.text(max_size=200))

@@ -1,21 +1,30 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
+from acquisition.errors import SettingsError
 from wam.constants import load_constants
 from wam.first_moments import regressor
 from wam.gravity_poses import (
-    FOLDED,
+    APPROACH_SPEED,
     MARGIN,
     OFFSET,
+    POINT_SPEED,
+    UPRIGHT,
     choose_poses,
     is_clear,
+    leg_speed,
+    lowest,
     plan_halts,
     way_seconds,
 )
 from wam.model import ArmModel
+from wam.move import JointMove
 
-FLOOR = 0.3
-START = np.array([0.0, 0.7, 0.0, 1.25, 0.0, 1.15, 0.0])
+FLOOR = 0.33
+TWISTED = (0.0, 1.0, -1.1, 2.9, -4.3, -1.2, 0.6)  # to rise it goes down first
+IN_CONTAINER = np.array([0.0, 0.7, 0.0, 1.25, 0.0, 1.15, 0.0])
 
 
 @pytest.fixture(scope="module")
@@ -25,27 +34,51 @@ def model(example_tool):
 
 @pytest.fixture(scope="module")
 def poses(model):
-    return choose_poses(model, 8, FLOOR)
+    return choose_poses(model, 12, FLOOR)
 
 
 @pytest.fixture(scope="module")
 def halts(model, poses):
-    return plan_halts(model, START, poses, FLOOR)
+    return plan_halts(model, IN_CONTAINER, poses, FLOOR)
 
 
-def test_eight_poses_show_all_of_gravity_well(model, poses):
+@pytest.mark.parametrize("count", [4, 12])
+def test_the_poses_show_all_of_gravity_well(model, count):
+    poses = choose_poses(model, count, FLOOR)
     Y = np.vstack([regressor(model.constants, q) for q in poses])
     values = np.linalg.svd(Y, compute_uv=False)
-    assert len(poses) == 8
-    assert values[11] > 0.03 * values[0]  # twelve directions, none of them faint
+    assert len(poses) == count
+    assert values[0] < 10.0 * values[11]  # twelve directions, none of them faint
 
 
-def test_the_sole_stays_above_the_floor_in_every_pose_and_on_the_way(model, halts):
-    here = START
-    for halt in halts[:-1]:  # the last one is where the arm began
-        assert model.sole_pose(halt.q)[0][2] > FLOOR - 0.1  # approaches add 0.06 rad
-        assert is_clear(model, here, halt.q, FLOOR - 0.1)
-        here = halt.q
+def test_the_arm_stays_above_the_floor_once_it_has_risen(model, halts):
+    for here, halt in pairwise(halts[:-1]):
+        path = here.q + np.linspace(0, 1, 50)[:, None] * (halt.q - here.q)
+        assert lowest(model, path).min() > FLOOR - 0.003
+
+
+def test_leaving_and_reaching_the_container_never_goes_below_its_own_height(
+    model, halts
+):
+    start = lowest(model, IN_CONTAINER[None])[0]
+    assert start < FLOOR
+    for a, b in ((IN_CONTAINER, halts[0].q), (halts[-2].q, halts[-1].q)):
+        path = a + np.linspace(0, 1, 50)[:, None] * (b - a)
+        assert lowest(model, path).min() > start - 0.003
+
+
+def test_a_way_that_dips_is_not_clear(model):
+    ends = np.array([TWISTED, UPRIGHT])
+    assert lowest(model, ends).min() == pytest.approx(0.115, abs=0.001)
+    assert not is_clear(model, ends[0], ends[1], FLOOR)
+    assert not is_clear(model, ends[1], ends[0], FLOOR)
+    assert is_clear(model, ends[0], ends[1], 0.0)  # it dips to 0.05 m
+
+
+def test_the_elbow_counts_too(model):
+    leaning = np.array([0.0, -1.5, 0.0, 1.6, 0.0, 0.0, 0.0])
+    assert model.sole_pose(leaning)[0][2] > 0.3
+    assert lowest(model, leaning[None])[0] < 0.0
 
 
 def test_halts_stay_away_from_the_joint_stops(model, halts):
@@ -55,21 +88,52 @@ def test_halts_stay_away_from_the_joint_stops(model, halts):
 
 
 def test_each_pose_is_approached_once_from_below_and_once_from_above(halts):
-    for number in range(8):
+    for number in range(12):
         at = [i for i, halt in enumerate(halts) if halt.pose == number]
         assert len(at) == 2
         sides = [halts[i - 1].q - halts[i].q for i in at]
         assert sides[0] == pytest.approx(np.full(7, -OFFSET))
         assert sides[1] == pytest.approx(np.full(7, OFFSET))
+        assert {halts[i].speed for i in at} == {APPROACH_SPEED}
+
+
+def test_sole_and_elbow_are_never_faster_than_they_may_be(model, halts):
+    here = IN_CONTAINER
+    for halt in halts:
+        move = JointMove(here, halt.q, halt.speed)
+        times = np.linspace(0, move.duration, 200)
+        sole = model.sole_path(np.array([move.at(t)[0] for t in times])).position
+        speed = np.linalg.norm(np.diff(sole, axis=0), axis=1).max() / times[1]
+        assert speed < 1.05 * POINT_SPEED  # looked at every 0.04 rad
+        here = halt.q
+
+
+def test_a_wide_sweep_is_slower_than_a_turn_of_the_wrist(model):
+    q = np.array([0.0, 1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    swing, turn = q.copy(), q.copy()
+    swing[0] += 1.0
+    turn[6] += 1.0
+    assert leg_speed(model, q, swing) < 0.4
+    assert leg_speed(model, q, turn) == 0.5
 
 
 def test_the_arm_ends_where_it_began(halts):
-    assert (halts[-1].q == START).all()
-    assert halts[-2].q.tolist() == list(FOLDED)
+    assert (halts[-1].q == IN_CONTAINER).all()
+    assert halts[-2].q.tolist() == list(UPRIGHT)
 
 
 def test_the_time_of_the_way_is_that_of_its_moves(halts):
-    assert way_seconds(START, halts) == pytest.approx(
-        way_seconds(START, halts[:5]) + way_seconds(halts[4].q, halts[5:])
+    assert way_seconds(IN_CONTAINER, halts) == pytest.approx(
+        way_seconds(IN_CONTAINER, halts[:5]) + way_seconds(halts[4].q, halts[5:])
     )
-    assert way_seconds(START, halts[:1]) > 0.0
+    assert way_seconds(IN_CONTAINER, halts[:1]) > 0.0
+
+
+def test_a_container_that_is_too_high_is_refused(model):
+    with pytest.raises(SettingsError, match=r"poses keep the arm above 1\.20 m"):
+        choose_poses(model, 12, 1.2)
+
+
+def test_an_arm_that_cannot_rise_is_refused(model, poses):
+    with pytest.raises(SettingsError, match="cannot rise"):
+        plan_halts(model, np.array(TWISTED), poses, FLOOR)

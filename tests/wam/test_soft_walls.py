@@ -1,8 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquisition.devices import ArmReading
+from experiments.parts import terrain_frame
+from experiments.settings import load_settings
+from fakes.rig import solve_start
 from wam.constants import load_constants
 from wam.soft_walls import DEPTH, SoftWalls, Walls
 
@@ -11,9 +17,30 @@ WALLS = Walls((-1.0,) * 7, (2.0,) * 7, (LIMIT,) * 7, (5.0,) * 7)
 STILL = np.zeros(7)
 
 
+def seen(q, qd=STILL, *, is_complete=True):
+    return ArmReading(
+        host_ns=0,
+        arm_ns=0,
+        counts=[0] * 7,
+        q=np.array(q),
+        qd=np.array(qd),
+        qd7_raw=0.0,
+        fresh=0x7F,
+        is_complete=is_complete,
+        missing_cycles=0,
+    )
+
+
+def pushed(walls, q, qd=STILL, tau=STILL):
+    """Return the torques with what the walls add to `tau`."""
+    result = np.array(tau, dtype=float)
+    walls.apply(result, seen(q, qd))
+    return result
+
+
 def armed():
     walls = SoftWalls(WALLS)
-    assert walls.torque(np.zeros(7), STILL) is None
+    assert not pushed(walls, STILL).any()
     return walls
 
 
@@ -24,66 +51,104 @@ def at(angle, joint=3):
 
 
 def test_nothing_pushes_in_the_middle():
-    assert armed().torque(np.full(7, 1.0), np.full(7, 3.0)) is None
+    assert not pushed(armed(), np.full(7, 1.0), np.full(7, 3.0)).any()
 
 
 @pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
 def test_the_spring_pushes_inward_and_gives_half_the_limit_at_the_stop(stop, sign):
-    tau = armed().torque(at(stop), STILL)
+    tau = pushed(armed(), at(stop))
     assert tau[3] == pytest.approx(sign * LIMIT / 2)
     assert not np.delete(tau, 3).any()
 
 
 def test_the_spring_begins_from_zero():
-    tau = armed().torque(at(2.0 - DEPTH + 1e-6), STILL)
-    assert abs(tau[3]) < 1e-3
+    tau = pushed(armed(), at(2.0 - DEPTH + 1e-6))
+    assert 0.0 < abs(tau[3]) < 1e-3
 
 
 def test_motion_into_the_wall_is_braked_and_motion_out_is_not():
     q, qd = at(1.95), np.zeros(7)
-    still = armed().torque(q, STILL)[3]
+    still = pushed(armed(), q)[3]
     qd[3] = 0.5
-    assert armed().torque(q, qd)[3] == pytest.approx(still - 0.5 * 5.0 * 0.5)
+    assert pushed(armed(), q, qd)[3] == pytest.approx(still - 0.5 * 5.0 * 0.5)
     qd[3] = -0.5
-    assert armed().torque(q, qd)[3] == still
+    assert pushed(armed(), q, qd)[3] == still
 
 
 def test_a_joint_that_starts_in_its_wall_is_not_thrown_out():
     walls = SoftWalls(WALLS)
-    assert walls.torque(at(2.05), STILL) is None
-    assert walls.torque(at(1.92), STILL) is None
-    walls.torque(at(1.5), STILL)
-    assert walls.torque(at(1.95), STILL)[3] < 0
+    assert not pushed(walls, at(2.05)).any()
+    assert not pushed(walls, at(1.92)).any()
+    pushed(walls, at(1.5))
+    assert pushed(walls, at(1.95))[3] < 0
+
+
+def test_an_extrapolated_position_arms_nothing():
+    walls = SoftWalls(WALLS)
+    walls.apply(np.zeros(7), seen(at(1.5), is_complete=False))
+    assert pushed(walls, at(1.95))[3] == 0.0
+
+
+def test_home_on_two_stops_gets_no_kick_and_its_walls_come_later():
+    constants = load_constants()
+    walls = SoftWalls(
+        Walls(
+            tuple(constants.q_lower.tolist()),
+            tuple(constants.q_upper.tolist()),
+            (LIMIT,) * 7,
+            (5.0,) * 7,
+        )
+    )
+    assert not pushed(walls, constants.home).any()
+    out = constants.home + np.array([0.0, 0.11, 0.0, -0.14, 0.0, 0.0, 0.0])
+    assert not pushed(walls, out).any()
+    tau = pushed(walls, constants.home)
+    assert tau[1] > 0.0
+    assert tau[3] < 0.0
 
 
 def test_each_joint_arms_its_own_walls():
     walls = SoftWalls(WALLS)
     q = at(1.95)
-    walls.torque(q, STILL)
+    pushed(walls, q)
     q[5] = -0.95
-    tau = walls.torque(q, STILL)
+    tau = pushed(walls, q)
     assert tau[3] == 0.0
     assert tau[5] > 0.0
+
+
+@pytest.mark.parametrize(("tau", "expected"), [(-4.0, -9.0), (-8.0, -9.5), (4.0, -1.0)])
+def test_a_wall_leaves_the_joint_within_its_limit(tau, expected):
+    assert pushed(armed(), at(2.0), tau=at(tau))[3] == pytest.approx(expected)
+
+
+def test_a_wall_takes_nothing_from_a_torque_beyond_the_limit():
+    assert pushed(armed(), at(2.0), tau=at(-12.0))[3] == -12.0
 
 
 @given(
     st.lists(st.floats(-5, 5), min_size=7, max_size=7),
     st.lists(st.floats(-50, 50), min_size=7, max_size=7),
+    st.floats(-LIMIT, LIMIT),
 )
-def test_a_wall_never_exceeds_the_limit_and_never_pushes_outward(q, qd):
-    q = np.array(q)
-    tau = armed().torque(q, np.array(qd))
-    if tau is not None:
-        assert np.abs(tau).max() <= LIMIT
-        assert (tau[q > 1.0] <= 0).all()
-        assert (tau[q < 0.0] >= 0).all()
+def test_a_wall_never_exceeds_the_limit_and_never_pushes_outward(q, qd, before):
+    tau = pushed(armed(), q, qd, np.full(7, before))
+    added = tau - before
+    assert np.abs(tau).max() <= LIMIT
+    assert (added[np.array(q) > 1.0] <= 0).all()
+    assert (added[np.array(q) < 0.0] >= 0).all()
 
 
-def test_no_pose_of_the_shipped_matrix_touches_a_wall():
-    from experiments.settings import load_settings
-
-    constants = load_constants()
+def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
+    constants = foot_model.constants
     for row in load_settings(None).matrix.terrains:
         q = np.array(row.start_q)
-        assert (q > constants.q_lower + DEPTH).all()
-        assert (q < constants.q_upper - DEPTH).all()
+        frame = terrain_frame(row)
+        for height in (0.06, 0.0):  # carried to the far end, then pushed across
+            for way in np.linspace(0.0, row.travel, 10):
+                x, y, z = (np.array(frame.far_end) + way * frame.axes()[0]).tolist()
+                q = solve_start(
+                    foot_model, replace(frame, far_end=(x, y, z)), q, height
+                )
+                assert (q > constants.q_lower + DEPTH).all()
+                assert (q < constants.q_upper - DEPTH).all()

@@ -1,0 +1,103 @@
+"""Which gravity floats the arm: [gravity] of rig.toml and the file behind it."""
+
+from pathlib import Path
+
+from acquisition.errors import SettingsError
+from experiments.parts import build_tool
+from experiments.settings import RigSettings, Settings
+from wam.constants import load_constants
+from wam.gravity import gravity_model
+from wam.gravity_file import GravityCalibration, fits_tool, gravity_from_toml
+from wam.model import ArmModel
+
+_LARGEST = 1_000_000  # bytes; a calibration has a few thousand
+_NOTHING = "Nothing was started."
+
+
+def gravity_path(settings: Settings) -> Path:
+    """Return where rig.toml has its gravity calibration, from its own folder."""
+    return settings.folder / settings.rig.gravity.file
+
+
+def read_gravity(settings: Settings) -> str:
+    """Return the text of the calibration that rig.toml chooses; "" for none.
+
+    Raises:
+        SettingsError: it cannot be read.
+    """
+    if settings.rig.gravity.model != "calibrated":
+        return ""
+    path = gravity_path(settings)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ValueError("it is too large")
+        return path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is no calibration"
+        raise SettingsError(
+            f"The gravity calibration {path} cannot be read ({reason}).",
+            hint="Make it with: traction calibrate gravity. Or set [gravity] model = "
+            f'"cad" in rig.toml. {_NOTHING}',
+        ) from error
+
+
+def build_law_model(
+    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool
+) -> ArmModel:
+    """Return the arm with `foot` on it as the control law weighs it.
+
+    A calibration contains the foot that was on. For another foot of rig.toml it is
+    corrected by the difference of the two. A foot or sensor whose numbers have changed
+    since is none that was fitted: which of them is wrong nobody can say, so it is
+    refused.
+
+    Raises:
+        SettingsError: the calibration is none, was made with another tool, or with a
+            simulated arm for a real one or conversely.
+    """
+    constants, tool = load_constants(), build_tool(rig, foot)
+    if rig.gravity.model == "cad":
+        return ArmModel(constants, tool)
+    if rig.gravity.model == "shipped":
+        return gravity_model(constants, tool, constants.mus)
+    found = gravity_from_toml(gravity_text, rig.gravity.file)
+    _check_kind(rig, found, is_simulated=is_simulated)
+    _check_tool(rig, found)
+    return gravity_model(constants, tool, found.mus, found.tool)
+
+
+def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
+    """Return the choice in words, for a session with `foot`."""
+    if rig.gravity.model != "calibrated":
+        return rig.gravity.model
+    found = gravity_from_toml(gravity_text, rig.gravity.file)
+    moved = "" if found.foot == foot else f", corrected from {found.foot} to {foot}"
+    return f"calibrated {found.measured_utc}, rms {found.residual:.2f} N m{moved}"
+
+
+def _check_kind(
+    rig: RigSettings, found: GravityCalibration, *, is_simulated: bool
+) -> None:
+    if found.is_simulated == is_simulated:
+        return
+    kinds = "simulated", "real"
+    theirs, ours = kinds if found.is_simulated else kinds[::-1]
+    raise SettingsError(
+        f"{rig.gravity.file} was measured on a {theirs} arm, this is a {ours} one.",
+        hint='Set [gravity] model = "cad" in rig.toml, or name another file. '
+        f"{_NOTHING}",
+    )
+
+
+def _check_tool(rig: RigSettings, found: GravityCalibration) -> None:
+    is_known = found.foot in type(rig.feet).model_fields
+    if is_known and fits_tool(found, build_tool(rig, found.foot)):
+        return
+    sensor, body = found.tool.sensor, found.tool.foot
+    raise SettingsError(
+        f"{rig.gravity.file} was measured with another tool: foot {found.foot} of "
+        f"{body.mass:.3f} kg at {body.com.tolist()}, sensor of {sensor.mass:.3f} kg; "
+        "rig.toml says otherwise.",
+        hint="Run traction calibrate gravity again, or set [gravity] model = "
+        f'"cad" in rig.toml. {_NOTHING}',
+    )

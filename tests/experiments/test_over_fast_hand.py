@@ -1,0 +1,112 @@
+"""A hand that is too fast: the guard damps the arm and never lets go of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.cycle import ArmState
+from acquisition.devices import SafetyMode
+from acquisition.guard import Action
+from experiments.rigs import FakeOptions, build_rig
+from experiments.settings import load_settings
+
+J1, J6 = 0, 5
+PULL = 8.0  # N m of the hand at joint 1
+# Low limits, so that the safety module has nothing to say yet.
+LIMITS = {
+    "overspeed": {"speed": (0.4, *[9.0] * 6)},
+    "foot-speed": {"foot_speed": 0.15, "speed": (9.0,) * 7},
+}
+
+
+class Bench:
+    """A simulated arm that floats, pulled at one joint."""
+
+    def __init__(self, **limits):
+        shipped = load_settings(None)
+        changed = shipped.rig.limits.model_copy(update=limits)
+        rig = shipped.rig.model_copy(update={"limits": changed})
+        settings = replace(shipped, rig=rig)
+        row = settings.row("TF")
+        self.rig = build_rig(settings, row, FakeOptions(is_fast=True, seed=1))
+        crew = self.rig.crew
+        self.desk = crew.desk
+        self.plant = self.rig.rehearsal._rig.plant
+        crew.start_arm()
+        crew.open_sensor()
+        crew.begin()
+        self.desk.request(ArmState.HOLD)
+        self.desk.advance(0.1)
+        self.rig.rehearsal.pendant("activate")
+        self.desk.advance(0.2)
+        self.desk.request(ArmState.FLOAT)
+        self.desk.advance(0.1)
+        self.plant.hand.let_go()
+
+    def pull(self, joint, torque):
+        """Pull at a joint until the guard says something; return its verdict."""
+        self.plant.disturbance[joint] = torque
+        for _ in range(100):
+            self.desk.advance(0.004)
+            if self.desk.status.verdict is not None:
+                break
+        return self.desk.status.verdict
+
+
+@pytest.fixture
+def build():
+    benches = []
+
+    def build_one(**limits):
+        benches.append(Bench(**limits))
+        return benches[-1]
+
+    yield build_one
+    for bench in benches:
+        bench.rig.crew.close()
+
+
+@pytest.mark.parametrize("reason", LIMITS)
+def test_an_arm_that_is_too_fast_is_damped(build, reason):
+    bench = build(**LIMITS[reason])
+    verdict = bench.pull(J1, PULL)
+    assert (verdict.reason, verdict.action) == (reason, Action.DAMP)
+    assert bench.desk.status.state is ArmState.DAMP
+
+
+@pytest.mark.parametrize("reason", LIMITS)
+def test_a_damped_arm_gets_its_weight_and_a_brake_and_never_zero_torque(build, reason):
+    bench = build(**LIMITS[reason])
+    bench.pull(J1, PULL)
+    bench.plant.disturbance[:] = 0.0
+    bench.desk.advance(0.2)
+    records = bench.desk.last(0.2)
+    brake = (records["torque_command"] - records["torque_gravity"])[:, J1]
+    speed = records["velocity"][:, J1]
+    moving = np.abs(speed) > 0.1
+    assert moving.sum() > 5
+    assert (brake[moving] * speed[moving] < 0.0).all()
+    assert np.abs(records["torque_command"][:, 1]).min() > 5.0  # the arm is held up
+
+
+def test_a_damped_arm_comes_to_rest_and_stays_active(build):
+    bench = build(**LIMITS["overspeed"])
+    bench.pull(J1, PULL)
+    bench.plant.disturbance[:] = 0.0
+    bench.desk.advance(2.0)
+    assert np.abs(bench.plant.qd).max() < 0.05
+    assert bench.desk.status.state is ArmState.DAMP
+    assert bench.desk.status.safety is SafetyMode.ACTIVE
+
+
+def test_an_arm_pressed_against_a_stop_is_held_off_by_the_soft_wall(build):
+    bench = build()
+    upper = bench.rig.model.constants.q_upper[J6]
+    for second in range(20):  # slowly, and held there
+        bench.plant.disturbance[J6] = min(0.1 * second, 0.8)
+        bench.desk.advance(0.2)
+    depth = bench.plant.q[J6] - (upper - 0.1)
+    # The hand and the foot's own weight against a spring of 2.5 N m in 0.2 rad.
+    assert 0.04 < depth < 0.09
+    assert bench.desk.status.verdict is None

@@ -1,0 +1,134 @@
+"""Start-up: who is late, who is missing, and what the encoders say."""
+
+from itertools import pairwise
+
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import PreflightError
+from fakes.network_options import NetworkOptions
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+from wam.frames import property_reply_id
+from wam.pucks import MAGNETIC_ENCODER, Role
+
+HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
+MS = 1_000_000
+GET_STAT = b"\x05"
+
+
+def start(rig):
+    return WamArm(rig.link, rig.clock).start()
+
+
+@pytest.mark.parametrize("late_ms", [3, 300, 900])
+@pytest.mark.parametrize("node", [5, 10])
+def test_a_device_whose_first_answer_is_late_is_found(node, late_ms):
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.faults.delay(property_reply_id(node), late_ms * MS)
+    info = start(rig)
+    assert info.nodes == (1, 2, 3, 4, 5, 6, 7, 10)
+    assert info.late_replies >= 1
+
+
+def test_a_puck_in_reset_is_waited_for_and_woken():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.link.send(5, bytes.fromhex("85 00 00 00 00 00"))  # silent for half a second
+    info = start(rig)
+    assert [p.node for p in info.pucks if p.was_asleep] == [5]
+    assert not info.is_zeroed  # it has lost its position
+
+
+def test_nothing_is_said_while_a_late_device_may_be_booting():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.silence(5)
+    with pytest.raises(PreflightError):
+        start(rig)
+    asked = [t for t, node, data in rig.sent if (node, data) == (5, GET_STAT)]
+    assert len(asked) == 3
+    times = sorted(t for t, _, _ in rig.sent)
+    for before, after in ((asked[0], asked[1]), (asked[1], asked[2])):
+        spoken = [t for t in times if before <= t <= after]
+        gaps = [b - a for a, b in pairwise(spoken)]
+        assert max(gaps) >= 1000 * MS
+
+
+def test_a_stopped_arm_is_not_waited_for():
+    rig = Rig(NetworkOptions(safety_mode=SafetyMode.E_STOP))
+    before = rig.clock.t_ns
+    with pytest.raises(PreflightError, match="E-stop"):
+        start(rig)
+    assert rig.clock.t_ns - before < 500 * MS
+
+
+def test_everything_that_is_missing_is_named_at_once():
+    rig = Rig()
+    for node in (2, 6, 10):
+        rig.network.silence(node)
+    with pytest.raises(PreflightError) as caught:
+        start(rig)
+    assert caught.value.message == (
+        "The safety module and pucks 2,6 do not answer (1,3,4,5,7 on the bus)."
+    )
+
+
+def test_an_empty_bus_is_named_as_one():
+    rig = Rig()
+    for node in (*range(1, 8), 10):
+        rig.network.silence(node)
+    with pytest.raises(PreflightError, match=r"does not answer \(nobody on the bus\)"):
+        start(rig)
+
+
+def test_an_arm_of_four_joints_is_recognised():
+    rig = Rig()
+    for node in (5, 6, 7):
+        rig.network.silence(node)
+    with pytest.raises(PreflightError) as caught:
+        start(rig)
+    assert caught.value.message == "Pucks 5,6,7 do not answer (1,2,3,4 do)."
+    assert "four-joint WAM" in caught.value.hint
+
+
+@pytest.mark.parametrize(("poles", "kind"), [(8, "gimbals"), (10, "something unknown")])
+def test_another_wrist_is_refused_by_its_poles(poles, kind):
+    rig = Rig(NetworkOptions(poles=(12, 12, 12, 12, 8, 8, poles)))
+    with pytest.raises(PreflightError) as caught:
+        start(rig)
+    assert f"{poles} poles: {kind}, a wrist has 6" in caught.value.message
+    assert "wrist only" in caught.value.hint
+
+
+def test_the_absolute_angle_of_every_motor_is_read():
+    info = start(Rig(counts=HOME_COUNTS))
+    assert [p.mech for p in info.pucks] == [count % 4096 for count in HOME_COUNTS]
+
+
+def test_an_absolute_angle_of_32_bits_is_read_whole():
+    # Optical encoders count 40960 per turn: more than a signed 16-bit word holds.
+    rig = Rig(NetworkOptions(cts=(40960,) * 7), (40000, 0, 0, 0, 0, 0, -1))
+    info = start(rig)
+    assert (info.pucks[0].mech, info.pucks[6].mech) == (40000, 40959)
+
+
+def test_older_firmware_has_no_absolute_angle():
+    rig = Rig(NetworkOptions(vers=(117, 118, 200, 200, 200, 200, 200)), HOME_COUNTS)
+    info = start(rig)
+    assert info.pucks[0].mech is None
+    assert info.pucks[1].mech == HOME_COUNTS[1] % 4096
+
+
+def test_a_puck_without_a_magnetic_encoder_has_no_absolute_angle():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.set_property(3, "ROLE", int(Role.TATER))
+    assert start(rig).pucks[2].mech is None
+    rig.network.set_property(3, "ROLE", MAGNETIC_ENCODER | Role.TATER)
+    assert start(rig).pucks[2].mech is not None
+
+
+def test_the_absolute_angle_outlives_the_zeroing():
+    rig = Rig(counts=(100, 200, 300, 400, 500, 600, 700))
+    arm = WamArm(rig.link, rig.clock)
+    before = [p.mech for p in arm.start().pucks]
+    arm.define_position(arm.transmission.joints([0.0] * 7))
+    assert [p.mech for p in arm.start().pucks] == before == list(rig.motors.position)
