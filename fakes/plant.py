@@ -3,9 +3,9 @@
 
     (M + dt D) qd' = M qd + dt (tau + J_s^T w_s + J_h^T w_h - nle),   q' = q + dt qd'
 
-M with drive inertia, D the secant of Coulomb and viscous friction taken implicitly,
-w_s the ground's force at the sole, w_h the hand's at the forearm. The implicit part is
-an addition to the armature, so one articulated-body pass solves it.
+nle at q and qd + dt qdd / 2, M with drive inertia, D the resistance of the joints taken
+implicitly, w_s the ground's wrench at the sole, w_h the hand's at the forearm. The
+implicit part is an addition to the armature, so one articulated-body pass solves it.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from fakes.contact import NO_CONTACT, Contact, Motion
-from fakes.hand import Hand, HandView
+from fakes.contact import NO_CONTACT, Motion
+from fakes.hand import Hand
+from fakes.joints import JointResistance
+from fakes.push import HandView
 from fakes.terrain import Terrain
 from fakes.truth import Truth
-from ft_sensor.payload import Payload, TerrainFrame, cross_matrix, payload_of
-from wam.constants import GRAVITY, ArmConstants, Array, Body
+from fakes.wrist import Wrench, Wrist
+from ft_sensor.payload import TerrainFrame
+from wam.constants import GRAVITY, ArmConstants, Array
 from wam.model import add_point, build_pinocchio, drive_inertia_matrix
 from wam.tool import Tool
 
@@ -29,9 +32,7 @@ FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
-_STOP_K, _STOP_B = 2000.0, 20.0  # joint stops: N m/rad, N m s/rad
-_EPSILON = 0.01  # rad/s, where Coulomb friction saturates
-_STANDSTILL = 1e-9  # rad/s, keeps the secant finite
+_NOTHING = (0.0,) * 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +40,9 @@ class PlantOptions:
     """How the simulated arm differs from an ideal one.
 
     Attributes:
-        friction: share of the joint friction identified on another arm.
+        friction: share of the joint friction identified on another arm (1 = all of
+            it). A real arm's is unknown; with more than about 0.1 the foot no longer
+            bounces back after a slip.
         substeps: steps per 2 ms cycle.
     """
 
@@ -48,7 +51,17 @@ class PlantOptions:
 
 
 class ArmPlant:
-    """Implements fakes.puck_bank.MotorSide with the dynamics of the whole arm."""
+    """Implements fakes.puck_bank.MotorSide with the dynamics of the whole arm.
+
+    Attributes:
+        q: joint positions [rad], shape (7,).
+        qd: joint velocities [rad/s], shape (7,).
+        disturbance: joint torques from outside [N m], shape (7,).
+        terrain: the ground; None = the foot hangs above nothing.
+        hand: the operator's.
+        t_ns: how far the world has gone on [ns].
+        truth: what really happened; None = not written down.
+    """
 
     def __init__(
         self,
@@ -60,60 +73,55 @@ class ArmPlant:
     ) -> None:
         options = options or PlantOptions()
         self._constants = constants
-        self._payload: Payload = payload_of(tool)
-        sole_in_sensor = self._payload.rotation.T @ (
-            tool.sole - np.array([0.0, 0.0, tool.sensor_height])
-        )
-        self._sole_cross = cross_matrix(sole_in_sensor)
-        self._com_cross = cross_matrix(self._payload.com)
-        model = build_pinocchio(constants, (tool.sensor, tool.foot))
-        self._build_hand(model, constants, constants.d[6] - _HAND_ABOVE_PLATE)
+        self._model = model = build_pinocchio(constants, (tool.sensor, tool.foot))
+        self._add_forearm(constants)
         self._sole = add_point(model, constants, "sole", tool.sole)
-        self._model = model
         self._data = model.createData()
         self._drive = np.diag(drive_inertia_matrix(constants)).copy()
-        self._coulomb = options.friction * constants.coulomb
-        self._viscous = options.friction * constants.viscous
+        self._resistance = JointResistance(constants, options.friction)
+        self._wrist = Wrist(tool, frame.axes(), CYCLE_NS * 1e-9)
+        self._substeps = options.substeps
         self._substep_ns = CYCLE_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
-        self._frame = frame
+        # Forces act at the beginning of each substep, on average here in a cycle [s].
+        self._midway = 0.5 * (CYCLE_NS - self._substep_ns) * 1e-9
         self._R = frame.axes()
-        self._A = np.zeros((9, 7))
+        self._R4 = np.kron(np.eye(4), self._R)
         self._origin = np.array(frame.far_end)
-        self._up = (self._R[:, 2] * FOREARM_MASS * GRAVITY).tolist()
-        self._middle = (constants.q_upper + constants.q_lower) / 2.0
-        self._reach = (constants.q_upper - constants.q_lower) / 2.0
-        self.q = q.copy()
-        self.qd = np.zeros(7)
+        self._up: list[float] = (self._R[:, 2] * FOREARM_MASS * GRAVITY).tolist()
         self._to_units = np.array(constants.ipnm, dtype=float)
         self._tau = np.zeros(7)
         self._is_held = True
-        self.disturbance = np.zeros(7)  # joint torques from outside [N m]
+        self.q, self.qd, self._qdd = q.copy(), np.zeros(7), np.zeros(7)
+        self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
         self.hand = Hand(self._dt)
         self.t_ns = 0
-        self._sole_at = self._hand_at = self._tilt = (0.0, 0.0, 0.0)
         self.truth: Truth | None = None
-        self._cycle_force, self._sum_force = np.zeros(3), np.zeros(3)
-        self._cycle_v, self._cycle_a = np.zeros(3), np.zeros(3)
-        self._parts = 0
+        self._sum = _NOTHING  # of the ground's wrench over a cycle
+        self._ground = [0.0] * 6  # its mean
+        self._push = (0.0, 0.0, 0.0)
         pin.computeJointJacobians(model, self._data, self.q)
-        self._wanted = self._hand_rotation()
+        hand = pin.updateFramePlacement(model, self._data, self._hand)
+        self._wanted = hand.rotation.copy()
+        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn.
+        self._A = np.zeros((12, 7))
+        self._rates = [0.0] * 12
         self._linearise()
+        self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
 
-    def _build_hand(
-        self, model: "pin.Model", constants: ArmConstants, height: float
-    ) -> None:
-        alpha = constants.alpha[5]
+    def _add_forearm(self, constants: ArmConstants) -> None:
+        """Add the hand's frame on link 6 and the mass of a forearm in it."""
+        model = self._model
+        alpha, height = constants.alpha[5], constants.d[6] - _HAND_ABOVE_PLATE
         c, s = np.cos(alpha), np.sin(alpha)
         tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
         link = pin.SE3(tilt, np.array([constants.a[5], 0.0, constants.d[5]]))
         placement = link * pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
         frame = pin.Frame("hand", 6, 0, placement, pin.FrameType.OP_FRAME)
         self._hand = model.addFrame(frame)
-        arm = Body(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
-        inertia = pin.Inertia(arm.mass, arm.com, arm.inertia)
-        model.appendBodyToJoint(6, placement.act(inertia), pin.SE3.Identity())
+        arm = pin.Inertia(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
+        model.appendBodyToJoint(6, placement.act(arm), pin.SE3.Identity())
 
     # --- what the pucks see -------------------------------------------------------
 
@@ -137,40 +145,38 @@ class ArmPlant:
         """Hold the joints (braked), or let them follow torque or fall."""
         self._is_held = is_braked and is_powered
         if self._is_held:
-            self.qd = np.zeros(7)
+            self.qd, self._qdd = np.zeros(7), np.zeros(7)
+            self._rates = [0.0] * 12
         if is_braked or not is_powered:
             self._tau = np.zeros(7)
 
     # --- what the sensor feels ----------------------------------------------------
 
-    def sensor_load(self, t_ns: int) -> tuple[float, float, float, float, float, float]:
+    def sensor_load(self, t_ns: int) -> Wrench:
         """Return the load on the wrist sensor in its own frame [N, N m].
 
-        f = F_c + m_b (g_w - a): ground, weight and inertia of what hangs below.
+        Its mean over the cycle that ended last.
         """
         self.advance(t_ns)
-        placement = self._data.oMf[self._sole]
-        to_sensor = (placement.rotation @ self._payload.rotation).T
-        contact = to_sensor @ (self._R.T @ self._cycle_force)
-        fall = -GRAVITY * to_sensor[:, 2] - to_sensor @ (self._R.T @ self._cycle_a)
-        weight = self._payload.mass * fall
-        sign = self._payload.sign
-        fx, fy, fz = (sign * (contact + weight)).tolist()
-        moment = self._sole_cross @ contact + self._com_cross @ weight
-        tx, ty, tz = (sign * moment).tolist()
-        return fx, fy, fz, tx, ty, tz
+        return self._wrist.load()
 
     # --- the world ----------------------------------------------------------------
 
     @property
     def is_touching(self) -> bool:
         """Whether the ground carries anything."""
-        return bool(self._cycle_force[2] > 0.05)
+        return self._ground[2] > 0.05
+
+    @property
+    def contact_force(self) -> tuple[float, float, float]:
+        """Force of the ground on the foot in the terrain frame, mean of a cycle [N]."""
+        x, y, z = self._ground[:3]
+        return x, y, z
 
     @property
     def foot_speed(self) -> float:
         """Speed of the sole [m/s]."""
-        return float(np.linalg.norm(self._cycle_v))
+        return float(np.linalg.norm(self._rates[:3]))
 
     def start_truth(self) -> None:
         """Begin to write down what really happens."""
@@ -182,108 +188,86 @@ class ArmPlant:
         self.truth = Truth()
         return taken
 
-    def _hand_rotation(self) -> Array:
-        placement = pin.updateFramePlacement(self._model, self._data, self._hand)
-        return placement.rotation.copy()
-
     def _step(self) -> None:
         if self.t_ns % CYCLE_NS == 0:
             self._linearise()
         self.t_ns += self._substep_ns
-        dt = self._dt
-        sx, sy, sz, hx, hy, hz, wx, wy, wz = (self._A @ self.qd).tolist()
+        sx, sy, sz, fx, fy, fz, hx, hy, hz, wx, wy, wz = self._rates
         x, y, z = self._sole_at
-        motion = Motion(x, y, z, sx, sy, sz)
-        contact = self.terrain.step(dt, motion) if self.terrain else NO_CONTACT
+        contact = NO_CONTACT
+        if self.terrain is not None:
+            motion = Motion(x, y, z, sx, sy, sz, fx, fy, fz)
+            contact = self.terrain.step(self._dt, motion)
         view = HandView((x, y, z), (sx, sy, sz), self._hand_at, (hx, hy, hz))
-        push = self.hand.step(view)
+        self._push = push = self.hand.step(view)
+        F_t, F_y, F_n, M_x, M_y, M_z = contact
+        a, b, c, d, e, f = self._sum
+        self._sum = (a - F_t, b + F_y, c + F_n, d + M_x, e + M_y, f + M_z)
         if not self._is_held:
             k, b = _GRIP if self.hand.is_holding else _NO_GRIP
-            ex, ey, ez = self._tilt
             ux, uy, uz = self._up
-            wrench = np.array(
-                (
-                    -contact.F_t,
-                    contact.F_y,
-                    contact.F_n,
-                    push[0] + ux,
-                    push[1] + uy,
-                    push[2] + uz,
-                    k * ex - b * wx,
-                    k * ey - b * wy,
-                    k * ez - b * wz,
-                )
-            )
-            self._integrate(self._tau + self.disturbance + wrench @ self._A)
-            px, py, pz = self._hand_at
-            self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
-            self._hand_at = (px + dt * hx, py + dt * hy, pz + dt * hz)
-            self._tilt = (ex - dt * wx, ey - dt * wy, ez - dt * wz)
-        self._account((x, y, z), (sx, sy, sz), contact, push)
+            ex, ey, ez = self._tilt
+            ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
+            held = (push[0] + ux, push[1] + uy, push[2] + uz)
+            turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
+            self._integrate(np.array((*ground, *held, *turned)))
+        if self.t_ns % CYCLE_NS == 0:
+            self._end_cycle()
 
     def _linearise(self) -> None:
         """Take positions and Jacobians anew, once per cycle.
 
         Within the 2 ms sole and hand move along them; the joints themselves and their
-        dynamics are never linearised. Rows of A: sole, hand, turn of the hand, in the
-        terrain frame.
+        dynamics are never linearised. Everything is in the terrain frame.
         """
-        model, data, R = self._model, self._data, self._R
+        model, data, R, A = self._model, self._data, self._R, self._A
         pin.computeJointJacobians(model, data, self.q)
         sole = pin.updateFramePlacement(model, data, self._sole)
         hand = pin.updateFramePlacement(model, data, self._hand)
-        J_h = pin.getFrameJacobian(model, data, self._hand, _AXES)
-        A = self._A
-        A[:3] = R @ pin.getFrameJacobian(model, data, self._sole, _AXES)[:3]
-        A[3:6] = R @ J_h[:3]
-        A[6:] = R @ J_h[3:]
-        x, y, z = (R @ (sole.translation - self._origin)).tolist()
-        self._sole_at = (x, y, z)
-        x, y, z = (R @ (hand.translation - self._origin)).tolist()
-        self._hand_at = (x, y, z)
+        self._foot_rotation = sole.rotation.copy()
+        sole_at, hand_at = sole.translation.copy(), hand.translation.copy()
         E = self._wanted @ hand.rotation.T
+        pin.computeJointJacobians(model, data, self.q + self._midway * self.qd)
+        pin.updateFramePlacement(model, data, self._sole)
+        pin.updateFramePlacement(model, data, self._hand)
+        J_s = pin.getFrameJacobian(model, data, self._sole, _AXES)
+        J_h = pin.getFrameJacobian(model, data, self._hand, _AXES)
+        A[:] = self._R4 @ np.concatenate((J_s, J_h))
+        self._rates = A.dot(self.qd).tolist()
+        x, y, z = R.dot(sole_at - self._origin).tolist()
+        self._sole_at = (x, y, z)
+        x, y, z = R.dot(hand_at - self._origin).tolist()
+        self._hand_at = (x, y, z)
         turn = (E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1])
-        x, y, z = (0.5 * (R @ np.array(turn))).tolist()
-        self._tilt = (x, y, z)
+        x, y, z = R.dot(turn).tolist()
+        self._tilt = (0.5 * x, 0.5 * y, 0.5 * z)
 
-    def _integrate(self, tau: Array) -> None:
-        """Advance joints by one substep under `tau` (without gravity), friction."""
-        qd, dt, model = self.qd, self._dt, self._model
-        speed = np.abs(qd) + _STANDSTILL
-        D = self._coulomb * np.tanh(speed / _EPSILON) / speed + self._viscous
+    def _integrate(self, wrench: Array) -> None:
+        """Advance by one substep under `wrench` on foot and hand, shape (12,)."""
+        q, qd, dt, model = self.q, self.qd, self._dt, self._model
+        D, resistance = np.array(self._resistance.at(q.tolist(), qd.tolist()))
         model.armature = self._drive + dt * D
-        tau = tau - D * qd
-        if (np.abs(self.q - self._middle) > self._reach).any():
-            tau += self._stops(qd)
-        qdd = pin.aba(model, self._data, self.q, qd, tau)
+        tau = self._tau + self.disturbance + wrench.dot(self._A) + resistance
+        # Velocities stand half a step behind positions; the speed-dependent part of
+        # the dynamics takes them where the positions are, or a free swing loses energy.
+        now = qd + 0.5 * dt * self._qdd
+        self._qdd = qdd = pin.aba(model, self._data, q, now, tau)
         self.qd = qd + dt * qdd
-        self.q = self.q + dt * self.qd
+        self.q = q + dt * self.qd
+        self._rates = rates = self._A.dot(self.qd).tolist()
+        sx, sy, sz, _, _, _, hx, hy, hz, wx, wy, wz = rates
+        x, y, z = self._sole_at
+        self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
+        x, y, z = self._hand_at
+        self._hand_at = (x + dt * hx, y + dt * hy, z + dt * hz)
+        x, y, z = self._tilt
+        self._tilt = (x - dt * wx, y - dt * wy, z - dt * wz)
 
-    def _stops(self, qd: Array) -> Array:
-        beyond = np.minimum(self._constants.q_upper - self.q, 0.0) + np.maximum(
-            self._constants.q_lower - self.q, 0.0
-        )
-        return _STOP_K * beyond - _STOP_B * qd * (beyond != 0.0)
-
-    def _account(
-        self,
-        position: tuple[float, float, float],
-        velocity: tuple[float, float, float],
-        contact: Contact,
-        push: tuple[float, float, float],
-    ) -> None:
-        self._sum_force += (-contact.F_t, contact.F_y, contact.F_n)
-        self._parts += 1
-        if self.t_ns % CYCLE_NS:
-            return
-        self._cycle_force = self._sum_force / self._parts
-        self._sum_force = np.zeros(3)
-        self._parts = 0
-        v = np.array(velocity)
-        self._cycle_a = (v - self._cycle_v) / (CYCLE_NS * 1e-9)
-        self._cycle_v = v
+    def _end_cycle(self) -> None:
+        self._ground = ground = [total / self._substeps for total in self._sum]
+        self._sum = _NOTHING
+        self._wrist.end_cycle(self._foot_rotation, ground, self._rates[:6])
         if self.truth is not None:
-            along, across, normal = self._cycle_force.tolist()
-            force = (-along, across, normal)
-            row = (*self.q.tolist(), *position, *velocity, *force, *push)
-            self.truth.add(self.t_ns, row)
+            force = (-ground[0], ground[1], ground[2])
+            foot = (*self._sole_at, *self._rates[:3])
+            self.truth.add(self.t_ns, (*self.q.tolist(), *foot, *force, *self._push))

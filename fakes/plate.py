@@ -5,15 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fakes.contact import (
-    DAMPING_MASS,
-    NO_CONTACT,
-    Contact,
-    LateralBristle,
-    Motion,
-    height_at,
-    smooth_profile,
-)
+from fakes.contact import DAMPING_MASS, NO_CONTACT, Contact, Motion
+from fakes.footing import Footing
+from fakes.profile import smooth_profile, value_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,16 +30,21 @@ PLATES = {
 }
 
 
+_K_LATERAL = 2200.0  # N/m
+_COP_SPREAD, _COP_LENGTH = 0.003, 0.010  # of the centre of pressure [m]
+
+
 class Plate:
     """A flat plate with LuGre friction per newton of normal force."""
 
     def __init__(self, parameters: PlateParameters, rng: np.random.Generator) -> None:
         self._p = parameters
         self._bristle = 0.0
+        self._pressed = 0.0
         self._c_n = 2.0 * parameters.zeta * math.sqrt(parameters.k_n * DAMPING_MASS)
         self._level = math.exp(0.02 * float(rng.standard_normal()))
-        self._texture = smooth_profile(rng, 0.03)
-        self._lateral = LateralBristle(2200.0)
+        self._texture = (1.0 + 0.03 * smooth_profile(rng, 0.03)).tolist()
+        self._footing = Footing(_K_LATERAL, _COP_SPREAD, _COP_LENGTH, rng)
 
     @property
     def stiffness(self) -> float:
@@ -59,24 +58,35 @@ class Plate:
 
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
-        return {"mu_k": self._p.mu_k * self._level, "b": self._p.b}
+        return {
+            "mu_s": self._p.mu_s * self._level,
+            "mu_k": self._p.mu_k * self._level,
+            "v_S": self._p.v_S,
+            "b": self._p.b,
+        }
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bristle by `dt` and return the force."""
         p = self._p
         if motion.z >= 0.0:
-            self._bristle = 0.0
-            self._lateral.release()
+            self._bristle = self._pressed = 0.0
+            self._footing.release()
             return NO_CONTACT
         F_n = max(0.0, -p.k_n * motion.z - self._c_n * motion.vz)
         v = motion.vx
-        m = self._level * (1.0 + 0.03 * height_at(self._texture, motion.x))
+        m = self._level * value_at(self._texture, motion.x)
         g = (p.mu_k + (p.mu_s - p.mu_k) * math.exp(-((v / p.v_S) ** 2))) * m
+        before = self._bristle
+        if F_n > self._pressed:
+            # Pressing harder stiffens the bristle; its force stays, or the stretch of a
+            # light touch would be paid back with the energy of a heavy one.
+            before *= self._pressed / F_n
+        self._pressed = F_n
         # backward Euler in z: the bristle is stiff at high speed
-        z = (self._bristle + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
+        z = (before + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
         limit = p.mu_s * m / p.s0
         z = min(max(z, -limit), limit)
-        dz = (z - self._bristle) / dt
+        dz = (z - before) / dt
         self._bristle = z
         F_t = F_n * (p.s0 * z + p.s1 * dz) + p.b * v * min(1.0, F_n)
-        return Contact(F_t, self._lateral.step(motion.y, p.mu_k * F_n), F_n)
+        return self._footing.step(dt, motion, F_t, F_n, p.mu_k)

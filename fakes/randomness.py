@@ -2,13 +2,30 @@
 
 import math
 import zlib
+from typing import NamedTuple
 
 import numpy as np
+
+
+class TrialGenerators(NamedTuple):
+    """The generator of one trial, divided so that none waits for another's draws.
+
+    How often the sensor is read then changes nothing for ground and hand.
+    """
+
+    ground: np.random.Generator
+    hand: np.random.Generator
+    sensor: np.random.Generator
 
 
 def trial_generator(seed: int, terrain: str, trial: int) -> np.random.Generator:
     """Return the generator of one trial: same arguments, same numbers."""
     return np.random.default_rng([seed, zlib.crc32(terrain.encode()), trial])
+
+
+def trial_generators(seed: int, terrain: str, trial: int) -> TrialGenerators:
+    """Return the generator of one trial, divided among ground, hand and sensor."""
+    return TrialGenerators(*trial_generator(seed, terrain, trial).spawn(3))
 
 
 class NormalStream:

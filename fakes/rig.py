@@ -9,14 +9,15 @@ from acquisition.clock import Clock
 from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from fakes.can_bus import FakeCanBus
+from fakes.container import Container
 from fakes.faults import mend_network, network_faults
 from fakes.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.ft_streams import BotaOptions, BotaStream
-from fakes.hand import Pace
 from fakes.network_options import NetworkOptions
 from fakes.plant import CYCLE_NS, ArmPlant, PlantOptions
 from fakes.pucks import PuckNetwork
-from fakes.randomness import trial_generator
+from fakes.push import Pace
+from fakes.randomness import trial_generators
 from fakes.safety_module import PendantAction
 from fakes.sensor_errors import SensorErrors
 from fakes.serial_port import FakeSerialPort
@@ -105,9 +106,9 @@ class FakeRig:
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
         found = replace(network or NetworkOptions(), mt=constants.mt)
-        rng = trial_generator(scene.seed, scene.terrain, 0)
+        self.rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if found.has_sensor else ()
-        self.errors = SensorErrors(rng, *kind)
+        self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
         self.bus = FakeCanBus(self.network, clock)
@@ -118,7 +119,6 @@ class FakeRig:
             clock.now_ns(),
         )
         self._port: FakeSerialPort | None = None
-        self._lay(rng)
 
     def open_port(self) -> FakeSerialPort:
         """Return the sensor's serial port, opened now."""
@@ -149,13 +149,13 @@ class FakeRig:
 
     def rake(self, trial: int) -> None:
         """Rake the bed for `trial`: everything random starts anew."""
-        self.rng = trial_generator(self.scene.seed, self.scene.terrain, trial)
-        self._lay(self.rng)
-
-    def _lay(self, rng: np.random.Generator) -> None:
         scene = self.scene
-        self.rng = rng
-        self.ground = make_terrain(scene.stones, scene.foot, scene.frame.incline, rng)
+        self.random = trial_generators(scene.seed, scene.terrain, trial)
+        self.ground = Container(
+            make_terrain(
+                scene.stones, scene.foot, scene.frame.incline, self.random.ground
+            )
+        )
         self.plant.terrain = self.ground
 
 
@@ -184,7 +184,11 @@ class Rehearsal:
         self._rig.rake(trial)
 
     def lift(self) -> None:
-        """Let the hand carry the foot above the far end and hold it still."""
+        """Let the hand carry the foot above the far end and hold it still for a tare.
+
+        The sensor shows its offset and noise only, until the next push.
+        """
+        self._rig.errors.settle()
         self._rig.plant.hand.lift_to_start()
 
     def let_go(self) -> None:
@@ -198,8 +202,8 @@ class Rehearsal:
     def push(self) -> None:
         """Let the hand push the foot across; the tare error of a trial begins here."""
         rig = self._rig
-        rig.errors.new_trial(rig.rng)
-        rig.plant.hand.push(self._pace, rig.rng)
+        rig.errors.new_trial(rig.random.sensor)
+        rig.plant.hand.push(self._pace, rig.random.hand)
         rig.plant.start_truth()
 
     def pendant(self, button: PendantAction) -> None:

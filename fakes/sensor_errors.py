@@ -33,10 +33,11 @@ TORQUE_ERRORS = ErrorScale(bias=0.01, drift=0.01, white=0.01, resolution=0.001)
 
 
 class SensorErrors:
-    """What the sensor adds to the truth: bias, drift, noise and steps.
+    """What the sensor adds to the truth: offset, bias, drift, noise and steps.
 
-    Low-frequency error dominates on purpose: white noise alone averages away. Bias and
-    drift are drawn anew for each trial, all from the one generator given.
+    The offset stays for a session; a tare takes it away. Bias and drift are a trial's:
+    what its tare did not take away. Low-frequency error dominates on purpose: white
+    noise alone averages away.
     """
 
     def __init__(
@@ -46,7 +47,9 @@ class SensorErrors:
         torque: ErrorScale = TORQUE_ERRORS,
     ) -> None:
         self._scales = (force,) * 3 + (torque,) * 3
+        self._offset = [0.0] * 6
         self.new_trial(rng)
+        self._offset, self._bias = self._bias, [0.0] * 6
 
     def new_trial(self, rng: np.random.Generator) -> None:
         """Draw bias and drift from `rng`, and everything after from it too."""
@@ -56,8 +59,17 @@ class SensorErrors:
             OrnsteinUhlenbeck(s.drift, s.drift_time, 0.0, self._normals)
             for s in self._scales
         ]
+        self._is_settled = False
         self._step_ns = 0
         self._t_ns: int | None = None
+
+    def settle(self) -> None:
+        """Show offset, noise and steps only, until the next trial.
+
+        The error of a trial is what remains after its tare. A tare that saw the bias
+        of the trial before would add it to the next one's.
+        """
+        self._is_settled = True
 
     def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
         """Return what is shown at `t_ns` under `wrench` [N, N m], shape (6,)."""
@@ -65,14 +77,20 @@ class SensorErrors:
         self._t_ns = t_ns
         next_normal = self._normals.next
         shown: list[float] = []
-        for load, scale, bias, drift in zip(
-            wrench, self._scales, self._bias, self._drifts, strict=True
-        ):
-            value = load + bias + drift.step() + scale.white * next_normal()
+        rows = zip(wrench, self._scales, self._offset, self._slow(), strict=True)
+        for load, scale, offset, slow in rows:
+            value = load + offset + slow + scale.white * next_normal()
             step = scale.resolution
             shown.append(round(value / step) * step if step else value)
         fx, fy, fz, tx, ty, tz = shown
         return fx, fy, fz, tx, ty, tz
+
+    def _slow(self) -> list[float]:
+        """Return what the last tare has left: bias and drift [N, N m]."""
+        if self._is_settled:
+            return [0.0] * 6
+        pairs = zip(self._bias, self._drifts, strict=True)
+        return [bias + drift.step() for bias, drift in pairs]
 
     def _pace_drifts(self, step_ns: int) -> None:
         """Let the drifts step by `step_ns`; samples come at an almost even pace."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from fakes.contact import Contact, Motion
 from fakes.plate import PLATES, Plate
-from fakes.stones import STONES, StoneBed
+from fakes.stone_sizes import STONES
+from fakes.stones import StoneBed
 
 
 class Terrain(Protocol):
@@ -21,8 +22,12 @@ class Terrain(Protocol):
         """Return the height of the undisturbed ground at `x` [m]."""
         ...
 
+    def truth(self) -> dict[str, float]:
+        """Return the parameters in force [SI]."""
+        ...
+
     def step(self, dt: float, motion: Motion) -> Contact:
-        """Advance the contact by `dt` [s] and return the force."""
+        """Advance the contact by `dt` [s] and return what it does to the foot."""
         ...
 
 

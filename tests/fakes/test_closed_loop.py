@@ -118,7 +118,7 @@ def test_the_foot_presses_with_the_weight_of_the_virtual_mass(build):
     forces = []
     for _ in range(500):
         loop.step(1, is_commanded=True)
-        forces.append(loop.rig.plant._cycle_force[2])
+        forces.append(loop.rig.plant.contact_force[2])
     assert np.mean(forces) == pytest.approx(mass * 9.81, abs=0.05)
 
 
@@ -138,7 +138,7 @@ def test_the_arm_goes_where_it_is_sent(build):
     loop.start(ArmState.HOLD)
     loop.step(100, is_commanded=True)
     goal = loop.reading.q + np.array([0.2, -0.1, 0.1, -0.2, 0.2, -0.1, 0.2])
-    duration = loop.law.move_to(goal, loop.reading)
+    duration = loop.law.move_to(goal, 0.5, loop.reading)
     fastest = 0.0
     for _ in range(round((duration + 1.0) * 500)):
         loop.step(1, is_commanded=True)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
-from fakes.hand import LIFT, Hand, HandView, Pace, Phase
+from fakes.container import FREE, Container
+from fakes.hand import LIFT, Hand, Phase
 from fakes.plate import PLATES, Plate
+from fakes.push import PACES, HandView, Pace
 from tests.fakes.scenes import float_for, make_plant, release, sole
 
 AT_REST = HandView((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)
@@ -47,6 +49,73 @@ def test_the_hand_pushes_the_foot_across(plant):
     assert x[-1] > 0.03
     assert max(np.abs(np.diff(x))) / 0.002 < 0.8  # slower than the guard allows
     assert abs(sole(plant)[1]) < 0.02
+
+
+def crossing(plant, pace, seconds):
+    """Push across at `pace`; return sole positions and ground forces per cycle."""
+    plant.hand.put_down(plant.terrain.surface(0.0))
+    for _ in float_for(plant, 1.5, virtual_mass=0.3):
+        pass
+    plant.hand.push(pace, np.random.default_rng(2))
+    world = float_for(plant, seconds, virtual_mass=0.3)
+    rows = [(*sole(p), *p.contact_force) for p in world]
+    return np.array(rows)
+
+
+def test_a_slow_hand_is_slower_than_a_fast_one(plant):
+    ways = {}
+    for name in ("slow", "steady", "fast"):
+        hand = Hand(0.0005)
+        hand.push(PACES[name], np.random.default_rng(3))
+        for _ in range(8000):
+            force = hand.step(AT_REST)[0]
+        ways[name] = force
+    assert ways["slow"] < ways["steady"] < ways["fast"]
+
+
+def test_a_clumsy_hand_touches_the_frame_and_lifts_the_foot(plant):
+    plant.terrain = Container(plant.terrain)
+    rows = crossing(plant, PACES["clumsy"], 12.0)
+    x, y, z, _, F_y, F_n = rows.T
+    assert y.max() > FREE
+    assert np.abs(F_y[y > FREE]).max() > 3.0  # far beyond the grip of the plate
+    on_the_way = (x > 0.28) & (x < 0.32)
+    assert z[on_the_way].max() > 0.010
+    assert (F_n[on_the_way] == 0.0).any()
+    assert x[-1] > 0.34  # and goes on
+
+
+def test_a_steady_hand_neither_touches_the_frame_nor_lifts(plant):
+    plant.terrain = Container(plant.terrain)
+    rows = crossing(plant, PACES["steady"], 8.0)
+    assert np.abs(rows[:, 1]).max() < 0.5 * FREE
+    assert (rows[500:, 5] > 0.0).all()
+
+
+def view(x=0.0, vx=0.0):
+    return HandView((x, 0.0, 0.0), (vx, 0.0, 0.0), (x, 0.0, 0.0), (vx, 0.0, 0.0))
+
+
+def test_a_hand_gives_way_after_a_slip_but_not_before_it_could_know():
+    hand = Hand(0.0005)
+    hand.push(Pace(), np.random.default_rng(5))
+    for _ in range(10_000):
+        hand.step(view())
+    slip = [hand.step(view(0.010, 0.15))[0] for _ in range(1000)]
+    start, early, late = (np.mean(part) for part in np.split(slip, [90, 190]))
+    assert early == pytest.approx(start, abs=2.0)  # nobody reacts within 0.1 s
+    # at most half of the 20 N or so before the slip are left
+    assert np.mean(slip[-200:]) < start - 6.0
+    assert late < early
+
+
+def test_a_stuck_hand_presses_harder_up_to_its_strongest():
+    hand = Hand(0.0005)
+    hand.push(Pace(), np.random.default_rng(6))
+    force = np.array([hand.step(view())[0] for _ in range(40_000)])  # 20 s
+    # spring 22 N and damper 18 N s/m times the wanted speed, give or take tremor
+    assert 18.0 < force[4000:5000].mean() < 27.0
+    assert 36.0 < force[-2000:].mean() < 46.0
 
 
 def test_a_hand_that_let_go_does_nothing(plant):

@@ -6,7 +6,14 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from fakes.hand import Phase
 from fakes.network_options import NetworkOptions
-from fakes.randomness import NormalStream, OrnsteinUhlenbeck, Tremor, trial_generator
+from fakes.push import PACES
+from fakes.randomness import (
+    NormalStream,
+    OrnsteinUhlenbeck,
+    Tremor,
+    trial_generator,
+    trial_generators,
+)
 from fakes.rig import Rehearsal, solve_start
 from ft_sensor.payload import TerrainFrame
 from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
@@ -71,6 +78,53 @@ def test_every_trial_is_raked_anew_and_again_the_same(rig_and_clock):
     assert first != second
     assert bed(1) == first
     assert rig.plant.terrain is rig.ground
+
+
+def pushed(trials, pace=None):
+    """Push in `trials` one after the other; return truth and errors of the last."""
+    rig, clock = make_rig()
+    hand = Rehearsal(rig, pace)
+    for trial in trials:
+        hand.lift()
+        hand.prepare(trial)
+        hand.push()
+        clock.sleep_until(clock.now_ns() + S)
+        truth = hand.take_truth()
+    shown = [rig.errors.apply(k * CYCLE_NS, (0.0,) * 6) for k in range(50)]
+    rig.bus.shutdown()
+    return truth["hand_force"].tobytes(), truth["contact_force"].tobytes(), shown
+
+
+def test_a_trial_repeats_itself_whatever_was_before_it():
+    assert pushed([2]) == pushed([1, 3, 2])
+    assert pushed([2])[0] != pushed([3])[0]
+
+
+def test_the_hand_of_a_rehearsal_has_the_pace_it_was_given():
+    assert pushed([1], PACES["steady"]) == pushed([1])
+    assert pushed([1], PACES["fast"])[0] != pushed([1])[0]
+
+
+def test_a_tare_takes_away_nothing_of_the_trial_and_leaves_nothing_of_the_last():
+    rig, _ = make_rig()
+    hand = Rehearsal(rig)
+
+    def mean():
+        shown = [rig.errors.apply(k * CYCLE_NS, (0.0,) * 6)[:3] for k in range(1000)]
+        return np.mean(shown, axis=0)
+
+    tares, remains = [], []
+    for trial in (1, 2, 3):
+        hand.lift()
+        tares.append(mean())
+        hand.prepare(trial)
+        hand.push()
+        remains.append(mean() - tares[-1])
+    rig.bus.shutdown()
+    # white noise of 0.3 N, averaged over 1000 samples: 0.01 N
+    assert np.ptp(tares, axis=0).max() < 0.05
+    assert np.abs(remains).max() > 0.15
+    assert np.ptp(remains, axis=0).min() > 0.05
 
 
 def test_the_pendant_is_pressed_through_the_rehearsal(rig_and_clock):
@@ -197,6 +251,16 @@ def test_tremor_has_unit_strength_at_nine_and_a_half_hertz():
     spectrum = np.abs(np.fft.rfft(x)) ** 2
     frequency = np.fft.rfftfreq(x.size, 0.0005)
     assert 8.0 < np.average(frequency, weights=spectrum) < 12.0
+
+
+def test_ground_hand_and_sensor_of_a_trial_do_not_wait_for_each_other():
+    alone = trial_generators(1, "S0", 1).hand.random(5).tolist()
+    shared = trial_generators(1, "S0", 1)
+    shared.ground.random(100)
+    shared.sensor.random(100)
+    assert shared.hand.random(5).tolist() == alone
+    first = {generator.random() for generator in trial_generators(1, "S0", 1)}
+    assert len(first) == 3
 
 
 def test_trials_of_other_terrains_or_numbers_have_other_generators():

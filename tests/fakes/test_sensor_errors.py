@@ -78,3 +78,25 @@ def test_drift_over_a_gap_is_that_of_the_time_passed(gap_s):
     assert np.corrcoef(before, after)[0, 1] == pytest.approx(
         np.exp(-gap_s / 3.0), abs=0.08
     )
+
+
+def test_what_remains_after_a_tare_has_the_spread_of_bias_and_drift():
+    force = ErrorScale(bias=0.24, drift=0.22, white=0.0, resolution=0.0)
+    errors = SensorErrors(np.random.default_rng(0), force, QUIET)
+    remains = []
+    for trial in range(400):
+        errors.settle()
+        tare = np.array(errors.apply(trial * MS, (0.0,) * 6)[:3])
+        errors.new_trial(np.random.default_rng(trial))
+        remains.append(np.array(errors.apply(trial * MS, (0.0,) * 6)[:3]) - tare)
+    # 1200 values: known to 2 %; a tare that saw the last trial's would show 0.46 N
+    assert np.std(remains) == pytest.approx(np.hypot(0.24, 0.22), rel=0.08)
+
+
+def test_a_settled_sensor_stands_still_but_for_its_noise():
+    force = ErrorScale(bias=0.24, drift=0.22, white=0.0, resolution=0.0)
+    errors = SensorErrors(np.random.default_rng(0), force, QUIET)
+    errors.settle()
+    shown = {errors.apply(k * 100 * MS, (0.0,) * 6) for k in range(20)}
+    assert len(shown) == 1
+    assert any(shown.pop())  # there is an offset for the tare to take away

@@ -3,10 +3,12 @@ import math
 import numpy as np
 import pytest
 
-from fakes.contact import LateralBristle, Motion
+from fakes.contact import NO_CONTACT, Motion
+from fakes.footing import Bristle, Footing
 from fakes.plate import PLATES, Plate
 from fakes.randomness import trial_generator
-from fakes.stones import STONES, StoneBed, slope_factor
+from fakes.stone_sizes import STONES, slope_factor
+from fakes.stones import StoneBed
 from fakes.terrain import make_terrain
 
 DT = 0.0005
@@ -50,7 +52,7 @@ def test_a_plate_sticks_better_than_it_slides():
 
 def test_a_plate_does_not_pull_a_lifted_foot():
     plate = Plate(PLATES["tread"], rng())
-    assert plate.step(DT, Motion(0.0, 0.0, 1e-6, 0.1, 0.1, 0.0)) == (0.0, 0.0, 0.0)
+    assert plate.step(DT, Motion(0.0, 0.0, 1e-6, 0.1, 0.1, 0.0)) == NO_CONTACT
 
 
 def test_no_ground_ever_pulls_the_foot_down():
@@ -116,14 +118,57 @@ def test_a_slope_weakens_a_bed():
     assert 0.7 < factors[-1] < 0.9
 
 
-def test_a_lateral_bristle_is_a_spring_up_to_its_limit():
-    bristle = LateralBristle(1000.0)
+def test_a_bristle_is_a_spring_up_to_its_limit():
+    bristle = Bristle(1000.0)
     assert bristle.step(0.0, 2.0) == 0.0
     assert bristle.step(0.001, 2.0) == pytest.approx(-1.0)
-    assert bristle.step(0.010, 2.0) == pytest.approx(-2.0)
-    assert bristle.step(0.009, 2.0) == pytest.approx(-1.0)  # from the new anchor
+    assert bristle.step(0.009, 2.0) == pytest.approx(-2.0)
+    assert bristle.step(-0.001, 2.0) == pytest.approx(-1.0)  # from where it slipped to
     bristle.release()
-    assert bristle.step(0.009, 2.0) == 0.0
+    assert bristle.step(0.0, 2.0) == 0.0
+
+
+def test_a_bristle_that_was_let_slip_does_not_stretch_again_by_pressing():
+    bristle = Bristle(1000.0)
+    bristle.step(0.002, 2.0)
+    assert bristle.step(0.0, 0.5) == pytest.approx(-0.5)
+    assert bristle.step(0.0, 2.0) == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_sole_resists_turning_up_to_3_cm_times_the_normal_force(axis):
+    footing = Footing(2200.0, 0.0, 0.01, rng())  # pressed at the centre of the sole
+    rate = [0.0, 0.0, 0.0]
+    rate[axis] = 1.0
+    turn = Motion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, *rate)
+    first = footing.step(0.001, turn, 0.0, PRESS, 0.6)[3:]
+    assert first[axis] == pytest.approx(-10.0 * 0.001)
+    for _ in range(100):
+        last = footing.step(0.001, turn, 0.0, PRESS, 0.6)[3:]
+    assert last[axis] == pytest.approx(-0.03 * PRESS)
+    assert np.abs(last).sum() == pytest.approx(0.03 * PRESS)  # and about no other axis
+    assert footing.step(0.001, turn, 0.0, 0.0, 0.6) == NO_CONTACT
+
+
+def test_force_acts_at_the_centre_of_pressure():
+    footing = Footing(2200.0, 0.010, 0.01, rng())
+    for x in (0.0, 0.1, 0.2):
+        aside = Motion(x, 0.0, 0.0, 0.0, 0.002, 0.0)
+        F_t, F_y, F_n, *moment = footing.step(DT, aside, 3.0, PRESS, 0.6)
+        arm = (*footing.centre_of_pressure(x), 0.0)
+        assert moment == pytest.approx(np.cross(arm, (-F_t, F_y, F_n)))
+        assert arm[0] != 0.0
+
+
+def test_the_centre_of_pressure_wanders_as_far_as_it_should():
+    offsets = []
+    for seed in range(10):
+        footing = Footing(2200.0, 0.010, 0.01, rng(seed))
+        track = np.linspace(0.0, 0.45, 451)
+        offsets.append([footing.centre_of_pressure(x) for x in track])
+    spread = np.array(offsets).std(axis=(0, 1))
+    # 4.5 m of track have some 250 independent centimetres: 5 % at one sigma
+    assert spread == pytest.approx([0.010, 0.010], rel=0.2)
 
 
 @pytest.mark.parametrize("stones", ["small", "big", "none"])

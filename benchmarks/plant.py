@@ -1,0 +1,276 @@
+# pyright: reportMissingImports=false
+"""What one 2 ms cycle of the simulated arm costs, in contact on small stones.
+
+A trial on level ground is simulated once to note what every part was given, once again
+to time whole cycles, and then each part by itself is given the same. Medians are over
+cycles in contact; integration is what the other parts leave of the whole.
+"""
+
+import argparse
+import gc
+import json
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from fakes.contact import Contact, Motion
+from fakes.plant import CYCLE_NS, ArmPlant
+from fakes.push import HandView, Pace, Push, Vector3
+from fakes.randomness import TrialGenerators, trial_generators
+from fakes.rig import solve_start
+from fakes.terrain import Terrain, make_terrain
+from fakes.truth import Truth
+from ft_sensor.payload import TerrainFrame
+from wam.constants import Body, load_constants
+from wam.gravity import compensation
+from wam.model import ArmModel, add_point, build_pinocchio
+from wam.tool import Tool, box_inertia, sensor_body
+
+GOAL_US = 160.0  # per cycle of four substeps
+SUBSTEPS = 4
+_EFFECTIVE_MASS = 0.30  # kg
+_SETTLING = 1000  # cycles in which the foot is put down
+_SEED, _TERRAIN, _TRIAL = 1, "S0", 1
+_FRAME = TerrainFrame(0.0, 0.0, (0.70, 0.0, 0.12), 0.45)
+_START = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One part of a cycle as measured [us]; `share` is that of the whole's median."""
+
+    name: str
+    median_us: float
+    p99_us: float
+    share: float
+
+
+@dataclass(slots=True)
+class Notes:
+    """What the parts were given, one entry per substep; states per cycle."""
+
+    motions: list[Motion] = field(default_factory=list)
+    views: list[HandView] = field(default_factory=list)
+    states: list[tuple[np.ndarray, np.ndarray]] = field(default_factory=list)
+    is_touching: list[bool] = field(default_factory=list)
+
+
+class _NotedGround:
+    """A ground that notes how the foot moved on it."""
+
+    def __init__(self, notes: Notes) -> None:
+        self._notes = notes
+        self._ground = _ground()
+        self.stiffness = self._ground.stiffness
+        self.surface, self.truth = self._ground.surface, self._ground.truth
+
+    def step(self, dt: float, motion: Motion) -> Contact:
+        self._notes.motions.append(motion)
+        return self._ground.step(dt, motion)
+
+
+def main() -> int:
+    """Measure and print; the exit code says nothing about the figures."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument(
+        "--cycles", type=_positive, default=4000, metavar="N", help="of a trial (4000)"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead")
+    args = parser.parse_args()
+    parts = measure(args.cycles)
+    if args.json:
+        is_met = parts[0].median_us <= GOAL_US
+        rows = [asdict(part) for part in parts]
+        facts = {"cycles": args.cycles, "goal_us": GOAL_US, "is_met": is_met}
+        print(json.dumps({**facts, "parts": rows}, indent=2))
+    else:
+        _print_table(parts, args.cycles)
+    return 0
+
+
+def measure(cycles: int) -> list[Part]:
+    """Simulate `cycles` of a push and return whole and parts."""
+    notes = Notes()
+    for _ in _run(cycles, notes):
+        pass
+    gc.collect()
+    gc.disable()
+    try:
+        timed = {
+            "whole": list(_run(cycles, None)),
+            "Pinocchio": _time(_pinocchio(notes), cycles),
+            "contact": _time(_contact(notes), cycles),
+            "hand": _time(_hand(notes), cycles),
+            "truth": _time(_truth(notes), cycles),
+        }
+    finally:
+        gc.enable()
+    timed["integration"] = [
+        whole - sum(rest) for whole, *rest in zip(*timed.values(), strict=True)
+    ]
+    kept = {
+        name: [
+            us for us, touches in zip(row, notes.is_touching, strict=True) if touches
+        ]
+        for name, row in timed.items()
+    }
+    whole = statistics.median(kept["whole"])
+    return [_part(name, row, whole) for name, row in kept.items()]
+
+
+def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
+    """Simulate a push; yield what each cycle took [us]."""
+    model = ArmModel(load_constants(), _tool())
+    plant = _plant(model)
+    plant.terrain = _ground() if notes is None else _NotedGround(notes)
+    plant.set_braking(is_braked=False, is_powered=True)
+    plant.hand.put_down(plant.terrain.surface(0.0))
+    for _ in range(_SETTLING):
+        _cycle(plant, model)
+    if notes is not None:
+        notes.motions.clear()
+        _note_views(plant, notes)
+    plant.hand.push(Pace(), _random().hand)
+    plant.start_truth()
+    for _ in range(cycles):
+        if notes is not None:
+            notes.states.append((plant.q, plant.qd))
+        yield _cycle(plant, model)
+        if notes is not None:
+            notes.is_touching.append(plant.is_touching)
+
+
+def _note_views(plant: ArmPlant, notes: Notes) -> None:
+    step = plant.hand.step
+
+    def noted(view: HandView) -> Vector3:
+        notes.views.append(view)
+        return step(view)
+
+    plant.hand.step = noted
+
+
+def _cycle(plant: ArmPlant, model: ArmModel) -> float:
+    """Let one cycle pass under gravity compensation; return what it took [us]."""
+    constants = model.constants
+    tau = compensation(model, plant.q, _EFFECTIVE_MASS)
+    motor = np.linalg.solve(constants.j2mp.T, tau)
+    plant.set_torques(np.rint(motor * np.array(constants.ipnm)).astype(int).tolist())
+    begin = time.perf_counter_ns()
+    plant.advance(plant.t_ns + CYCLE_NS)
+    return (time.perf_counter_ns() - begin) * 1e-3
+
+
+def _time(run: Callable[[int], None], cycles: int) -> list[float]:
+    took: list[float] = []
+    for cycle in range(cycles):
+        begin = time.perf_counter_ns()
+        run(cycle)
+        took.append((time.perf_counter_ns() - begin) * 1e-3)
+    return took
+
+
+def _pinocchio(notes: Notes) -> Callable[[int], None]:
+    """Return the calls of the library that a cycle makes."""
+    constants, tool = load_constants(), _tool()
+    model = build_pinocchio(constants, (tool.sensor, tool.foot))
+    frames = [add_point(model, constants, name, tool.sole) for name in ("a", "b")]
+    data = model.createData()
+    tau = np.zeros(7)
+
+    def run(cycle: int) -> None:
+        q, qd = notes.states[cycle]
+        for _ in range(2):
+            pin.computeJointJacobians(model, data, q)
+            for frame in frames:
+                pin.updateFramePlacement(model, data, frame)
+        for frame in frames:
+            pin.getFrameJacobian(model, data, frame, _AXES)
+        for _ in range(SUBSTEPS):
+            pin.aba(model, data, q, qd, tau)
+
+    return run
+
+
+def _contact(notes: Notes) -> Callable[[int], None]:
+    ground, dt = _ground(), CYCLE_NS * 1e-9 / SUBSTEPS
+
+    def run(cycle: int) -> None:
+        for motion in notes.motions[SUBSTEPS * cycle : SUBSTEPS * (cycle + 1)]:
+            ground.step(dt, motion)
+
+    return run
+
+
+def _hand(notes: Notes) -> Callable[[int], None]:
+    dt = CYCLE_NS * 1e-9 / SUBSTEPS
+    push = Push(Pace(), _random().hand, notes.views[0], dt)
+
+    def run(cycle: int) -> None:
+        for view in notes.views[SUBSTEPS * cycle : SUBSTEPS * (cycle + 1)]:
+            push.step(view)
+
+    return run
+
+
+def _truth(notes: Notes) -> Callable[[int], None]:
+    truth = Truth()
+
+    def run(cycle: int) -> None:
+        q = notes.states[cycle][0]
+        view = notes.views[SUBSTEPS * cycle]
+        row = (*q.tolist(), *view.sole, *view.sole_v, *view.hand, *view.hand_v)
+        truth.add(cycle, row)
+
+    return run
+
+
+def _tool() -> Tool:
+    foot = Body(0.45, np.array([0.01, 0.0, 0.062]), box_inertia(0.45, (0.1, 0.06, 0.1)))
+    return Tool(sensor_body(), foot, np.array([0.01, 0.0, 0.112]))
+
+
+def _plant(model: ArmModel) -> ArmPlant:
+    q = solve_start(model, _FRAME, _START, 0.02)
+    return ArmPlant(model.constants, _tool(), _FRAME, q)
+
+
+def _random() -> TrialGenerators:
+    return trial_generators(_SEED, _TERRAIN, _TRIAL)
+
+
+def _ground() -> Terrain:
+    return make_terrain("small", "tread", _FRAME.incline, _random().ground)
+
+
+def _part(name: str, took: list[float], whole: float) -> Part:
+    middle = statistics.median(took)
+    late = sorted(took)[math.ceil(0.99 * len(took)) - 1]
+    return Part(name, middle, late, middle / whole)
+
+
+def _print_table(parts: list[Part], cycles: int) -> None:
+    print(f"{'part':14}{'p50 us':>10}{'p99 us':>10}{'share':>8}")
+    for part in parts:
+        print(
+            f"{part.name:14}{part.median_us:10.1f}{part.p99_us:10.1f}{part.share:8.2f}"
+        )
+    verdict = "met" if parts[0].median_us <= GOAL_US else "missed"
+    print(f"{cycles} cycles; goal {GOAL_US:.0f} us per cycle: {verdict}")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if number < 1:
+        raise argparse.ArgumentTypeError("expected a whole number above 0")
+    return number
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,36 @@
+"""Random profiles along the container, tabulated on a grid of a millimetre."""
+
+import numpy as np
+
+GRID = 0.001  # spacing of the tables [m]
+_MARGIN = 0.2  # the tables begin this far before the far end [m]
+_POINTS = 1200
+_LAST = _POINTS - 1.001
+
+
+def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
+    """Return unit-variance noise on the grid: white, smoothed by a Gaussian.
+
+    Its autocorrelation at a distance x is exp(-x^2 / (2 length)^2).
+
+    Args:
+        rng: where the noise comes from.
+        length: standard deviation of the Gaussian [m].
+    """
+    reach = max(int(4.0 * length / GRID), 1)
+    taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) * GRID / length) ** 2)
+    noise = rng.standard_normal(_POINTS + 2 * reach)
+    return np.convolve(noise, taps / np.sqrt((taps**2).sum()), "valid")
+
+
+def locate(x: float) -> tuple[int, float]:
+    """Return (row, share of the next row) of `x` [m] in every table."""
+    position = min(max((x + _MARGIN) / GRID, 0.0), _LAST)
+    row = int(position)
+    return row, position - row
+
+
+def value_at(table: list[float], x: float) -> float:
+    """Return a tabulated profile at `x` [m], linear between the points."""
+    row, share = locate(x)
+    return table[row] + share * (table[row + 1] - table[row])

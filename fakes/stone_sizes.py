@@ -1,0 +1,64 @@
+"""The two sizes of stones, and what a slope does to a bed of them."""
+
+import math
+from dataclasses import dataclass
+
+_REPOSE = math.radians(40.0)  # angle of repose of dumped crushed stone
+
+
+@dataclass(frozen=True, slots=True)
+class StoneParameters:
+    """A bed of one stone size.
+
+    Attributes:
+        d50: grain size [m].
+        N: contacts that share the load.
+        J0: mean capacity of a jam [N].
+        k_J: shape of its Gamma distribution.
+        k_n: normal stiffness of the bed [N/m].
+        run: mean free run to the next jam [d50].
+        k_run: shape of its Gamma distribution.
+        disp: spread of the contacts' engagement [d50].
+        gap: mean gap to the next seat after a contact broke [d50].
+        s_inf: slip sinkage in the end [d50].
+        k_w: shape of the load sharing's Gamma distribution.
+        sigma_k: spread of the contacts' stiffness (log).
+        cop: spread of the centre of pressure [m rms].
+        K_t: tangential stiffness of all contacts [N/m].
+        zeta: normal damping ratio.
+    """
+
+    d50: float
+    N: int
+    J0: float
+    k_J: float
+    k_n: float
+    run: float
+    k_run: float
+    disp: float
+    gap: float
+    s_inf: float
+    k_w: float
+    sigma_k: float
+    cop: float
+    K_t: float = 2200.0
+    zeta: float = 0.35
+
+
+STONES = {
+    "small": StoneParameters(
+        0.019, 7, 12.0, 6.0, 2500.0, 0.60, 2.0, 0.05, 0.10, 0.12, 2.5, 0.35, 0.010
+    ),
+    "big": StoneParameters(
+        0.037, 4, 12.5, 4.5, 3000.0, 0.50, 1.6, 0.04, 0.08, 0.10, 2.0, 0.45, 0.015
+    ),
+}
+
+
+def slope_factor(incline: float) -> float:
+    """Return eta: how much a slope [rad] weakens the bed.
+
+    Half the reduction of a free slope: the walls of the container support the bed.
+    """
+    loss = 0.5 * math.tan(incline) / math.tan(_REPOSE)
+    return math.cos(incline) * (1.0 - loss)
