@@ -91,7 +91,7 @@ def test_slips_of_a_usual_trial_neither_warn_nor_fault(first_trial):
 
 
 def test_the_page_shows_firmware_zero_and_temperatures(tmp_path):
-    done = traction("check", "--fake", "--data", tmp_path)
+    done = traction("check", "--fake", "--fast", "--data", tmp_path)
     assert "firmware 200, zeroed, 33-35 °C" in done.out
     assert "idle, firmware 200" in done.out
 
