@@ -7,6 +7,7 @@ for its last words - and nothing else: no terminal, no signals of the terminal's
 import ctypes
 import importlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -28,6 +29,7 @@ _START = (
 )
 # One thread per process: a pool of the linear algebra library would preempt the loop.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+_RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
 _LAST_WORDS = 4000  # characters of a child's standard error
 _PATIENCE = 3.0  # s a child gets to end by itself
 
@@ -122,7 +124,8 @@ class Child:
         if code is not None and code < 0:
             return f"killed by {signal.Signals(-code).name}"
         words = self.last_words().strip().splitlines()
-        return words[-1] if words else f"exit code {code}"
+        raised = [line for line in words if _RAISED.match(line)]
+        return (raised or words or [f"exit code {code}"])[-1]
 
     def last_words(self) -> str:
         """Return the end of what it wrote to its standard error."""

@@ -183,9 +183,8 @@ class ArmPlant:
         self.truth = Truth()
 
     def take_truth(self) -> Truth:
-        """Return what happened since the last call."""
-        taken = self.truth or Truth()
-        self.truth = Truth()
+        """Return what happened since `start_truth`; nothing more is written down."""
+        taken, self.truth = self.truth or Truth(), None
         return taken
 
     def _step(self) -> None:

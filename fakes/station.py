@@ -26,7 +26,7 @@ from wam.constants import load_constants
 from wam.tool import tool_of
 
 PRIORITY = 70
-TRUTH_ROWS = 100  # in one answer; the bus waits meanwhile
+TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
 LINGER_NS = 5_000_000_000  # an arm whose console has died is braked within this
 TICK_NS = 2_000_000
 # A stall of the machine stops the simulated world too: it is no lost heartbeat.
@@ -139,7 +139,11 @@ def _truth_part(rig: FakeRig) -> str:
     truth = rig.plant.truth
     if truth is None:
         return ""
-    records = truth_records(truth.take(TRUTH_ROWS), rig.scene.frame)
+    part = truth.take(TRUTH_ROWS)
+    if not part.t_ns:
+        rig.plant.truth = None
+        return ""
+    records = truth_records(part, rig.scene.frame)
     return base64.b64encode(records.tobytes()).decode()
 
 

@@ -10,6 +10,9 @@ from ft_sensor.payload import TerrainFrame
 from wam.constants import Array
 
 
+MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
+
+
 class Truth:
     """What really happened, one row per cycle; terrain frame where not said.
 
@@ -21,19 +24,27 @@ class Truth:
 
     def __init__(self) -> None:
         self.t_ns: list[int] = []
+        self._taken = 0
         self._values: list[float] = []
 
     def add(self, t_ns: int, values: Sequence[float]) -> None:
-        """Append one row."""
+        """Append one row; one that nobody takes does not grow for ever."""
+        if len(self.t_ns) >= MOST_ROWS:
+            return
         self.t_ns.append(t_ns)
         self._values.extend(values)
 
     def take(self, rows: int) -> "Truth":
-        """Take the oldest rows away, `rows` at most, and return them."""
+        """Return the oldest rows that were not taken yet, `rows` at most.
+
+        They stay in memory until the next truth begins: to move all others down for
+        every few rows would keep the bus waiting.
+        """
         taken = Truth()
-        taken.t_ns, self.t_ns = self.t_ns[:rows], self.t_ns[rows:]
-        cut = rows * self.COLUMNS
-        taken._values, self._values = self._values[:cut], self._values[cut:]
+        start, stop = self._taken, self._taken + rows
+        taken.t_ns = self.t_ns[start:stop]
+        taken._values = self._values[start * self.COLUMNS : stop * self.COLUMNS]
+        self._taken += len(taken.t_ns)
         return taken
 
     def table(self) -> Array:
