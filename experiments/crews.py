@@ -256,6 +256,17 @@ class ProcessCrew:
             if not (child is self._control and self.desk.loop.is_running)
         }
 
+    @property
+    def bus_path(self) -> str:
+        """Path of the served bus of a simulated rig."""
+        return str(self._jobs.control["can"]["channel"])
+
+    def end_loop(self) -> None:
+        """Let the loop end; the process with the arm answers again."""
+        self.desk.leave()
+        while self.desk.loop.is_running and self._control.is_alive:
+            self._clock.sleep_until(self._clock.now_ns() + PERIOD_NS)
+
     def processes(self) -> dict[str, int]:
         """Return the numbers of the processes by name."""
         return {name: child.pid for name, child in self._children.items()}

@@ -1,0 +1,136 @@
+"""The recorder under load: losses, backlog, processor and memory of its process.
+
+    python benchmarks/recorder.py [--seconds 60] [--rate 500] [--json]
+
+A pacing writer fills the board as a loop would, `--rate` cycles a second with two force
+samples and thirteen frames each, bit patterns changing so that compression has work.
+"""
+
+import argparse
+import json
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.board import Board, pack_wrench
+from acquisition.clock import NS_PER_S, SystemClock
+from acquisition.devices import WrenchSample
+from acquisition.flight import FrameTape
+from acquisition.loop import PERIOD_NS
+from acquisition.messages import CYCLE
+from acquisition.processes import Child
+from acquisition.recorder_process import RemoteRecorder
+from acquisition.sample import Sample
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.writer import TrialHeader
+
+MAIN = "acquisition.recorder_process:main"
+BURST_NS = 10_000_000
+PAGE_KB = os.sysconf("SC_PAGE_SIZE") / 1024
+HEADER = TrialHeader(
+    trial={"session": "bench"},
+    utc_offset_ns=0,
+    offset_uncertainty_ns=0,
+    provenance={},
+    attachments={},
+    robot_description="",
+    has_frames=True,
+)
+
+
+class Load:
+    """Writes what a loop would write, cycle after cycle."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self._sample = Sample()
+        self._tape = FrameTape(board.frames)
+        self._noise = np.random.default_rng(1).normal(size=(997, 7))
+        self.cycles = 0
+
+    def cycle(self, now_ns: int) -> None:
+        """Write one cycle of monotonic time `now_ns`."""
+        sample, number = self._sample, self.cycles
+        sample.cycle[0] = number
+        sample.host_ns[0] = now_ns
+        sample.position[:] = self._noise[number % 997]
+        sample.velocity[:] = self._noise[number % 991]
+        self._board.cycles.write(sample.payload())
+        for _ in range(2):
+            wrench = WrenchSample(now_ns, number, (1.0,) * 6, 0, True, False)
+            self._board.wrenches.write(pack_wrench(wrench))
+        for frame in range(13):
+            self._tape.add(now_ns, 0x400 + frame, number.to_bytes(8, "little"))
+        self.cycles += 1
+
+
+def usage(pid: int) -> tuple[float, float]:
+    """Return (CPU seconds, resident memory [KiB]) of a process."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    ticks = os.sysconf("SC_CLK_TCK")
+    return (int(fields[11]) + int(fields[12])) / ticks, int(fields[21]) * PAGE_KB
+
+
+def run(seconds: float, rate: int) -> dict[str, float]:
+    """Record for `seconds` at `rate` cycles a second; return what was seen."""
+    clock, board = SystemClock(), Board.create()
+    child = Child("recorder", MAIN, {}, board)
+    recorder, load = RemoteRecorder(child, board), Load(board)
+    memory: list[float] = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.mcap"
+        recorder.start(path, HEADER)
+        start_ns = clock.now_ns()
+        cpu_before, _ = usage(child.pid)
+        per_burst = rate * BURST_NS // NS_PER_S
+        for burst in range(int(seconds * NS_PER_S / BURST_NS)):
+            clock.sleep_until(start_ns + burst * BURST_NS)
+            for _ in range(per_burst):
+                # Dated as if it were 500 Hz, or the file would be refused for its pace.
+                load.cycle(start_ns + load.cycles * PERIOD_NS)
+            if burst % 100 == 0:
+                memory.append(usage(child.pid)[1])
+        cpu = usage(child.pid)[0] - cpu_before
+        backlog = recorder.largest_backlog
+        recorder.finish("bench")
+        reader = TrialReader(path)
+        written = len(reader.cycles().data)
+        lost = int(reader.metadata["result"]["lost_in_ring"])
+        size = path.stat().st_size
+    child.stop()
+    warm = memory[min(len(memory) - 1, 90) :]  # the rings have been round once by then
+    return {
+        "seconds": seconds,
+        "rate": rate,
+        "cycles": load.cycles,
+        "written": written,
+        "lost": lost,
+        "largest_backlog": backlog,
+        "slots": board.cycles.slots,
+        "cpu_share": round(cpu / seconds, 4),
+        "us_per_cycle": round(cpu / load.cycles * 1e6, 2),
+        "bytes_per_cycle": round(size / load.cycles, 1),
+        "growth_kb_warm": round(warm[-1] - warm[0], 1),
+        "cycle_bytes": CYCLE.size,
+    }
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--rate", type=int, default=500)
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    found = run(args.seconds, args.rate)
+    if args.json:
+        print(json.dumps(found, indent=2))
+        return
+    for name, value in found.items():
+        print(f"{name:18}{value}")
+
+
+if __name__ == "__main__":
+    main()
