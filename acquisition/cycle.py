@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from acquisition import flags
 from acquisition.devices import (
     Arm,
     ArmReading,
@@ -17,10 +18,9 @@ from acquisition.devices import (
 )
 from acquisition.guard import Action, GuardState, Limits, Observation, Verdict, check
 from acquisition.loop import Tick
-from acquisition.sample import MOTOR_FRESH_SHIFT, Flag, Sample
+from acquisition.sample import Sample
 
 _ZERO = np.zeros(7)
-CLIPPED = 0.05  # sent differs from wanted by more than rounding [N m]
 _OF_CIRCUIT = frozenset({"estop", "pendant-idle"})  # verdicts that may have a cause
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 
@@ -33,6 +33,14 @@ class ArmState(IntEnum):
     HOLD = 2
     DAMP = 3
     UNKNOWN = 4
+
+
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
+_UNKNOWN = ArmState.UNKNOWN
+_ACTIVE = SafetyMode.ACTIVE
+_BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
+_NONE = Action.NONE
 
 
 class ControlLaw(Protocol):
@@ -121,7 +129,7 @@ class Cycle:
         self._limits = limits
         self._sink = sink
         self._on_wrench = on_wrench
-        self._extra_flags = extra_flags
+        self._extra_flags = int(extra_flags)
         self._guard = GuardState()
         self._sample = Sample()
         self._wrench: WrenchSample | None = None
@@ -171,11 +179,11 @@ class Cycle:
         tau, tau_gravity = self._torque(reading)
         sample = self._sample
         verdict = self._judge(tick, reading, tau)
-        if verdict.action is not Action.NONE:
+        if verdict.action is not _NONE:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0 and status.state is not ArmState.UNKNOWN:
+        if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
             sent = self._arm.send(tau, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
         is_new = self._take_wrench(tick.now_ns)
@@ -229,8 +237,8 @@ class Cycle:
 
     def _confirm_idle(self, reading: ArmReading) -> None:
         """Believe the safety circuit when it confirms later what it was asked for."""
-        is_braked = self.status.safety in {SafetyMode.IDLE, SafetyMode.E_STOP}
-        if is_braked and self.status.state is ArmState.UNKNOWN:
+        is_unknown = self.status.state is _UNKNOWN
+        if is_unknown and self.status.safety in _BRAKED:
             self._sample.torque_command[:] = 0.0
             self._enter(ArmState.IDLE, reading)
 
@@ -240,7 +248,7 @@ class Cycle:
         self._law.enter(state, reading)
 
     def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
-        if self.status.state in {ArmState.IDLE, ArmState.UNKNOWN}:
+        if self.status.state in _UNPOWERED:
             return _ZERO, _ZERO
         return self._law.torque(reading)
 
@@ -248,8 +256,8 @@ class Cycle:
         status = self.status
         if self._wrench_ns:
             status.ft_age_ns = tick.now_ns - self._wrench_ns
-        self._was_active |= status.safety is SafetyMode.ACTIVE
-        is_commanded = status.state not in {ArmState.IDLE, ArmState.UNKNOWN}
+        self._was_active |= status.safety is _ACTIVE
+        is_commanded = status.state not in _UNPOWERED
         seen = Observation(
             reading=reading,
             safety=status.safety,
@@ -292,32 +300,21 @@ class Cycle:
         tau: Vector,
         is_new: bool,
     ) -> None:
-        sample = self._sample
-        flags = int(self.status.safety) | self._extra_flags
-        flags |= reading.fresh << MOTOR_FRESH_SHIFT
-        if reading.is_complete:
-            flags |= Flag.ARM_FRESH
-        if is_new:
-            flags |= Flag.FT_FRESH
-        if self._wrench is not None:
-            sample.ft_ns[0] = self._wrench.t_ns
-            sample.ft_counter[0] = self._wrench.counter & 0xFFFFFFFF
-            if self._wrench.is_saturated:
-                flags |= Flag.FT_SATURATED
-        if tick.is_late:
-            flags |= Flag.DEADLINE_MISSED
-        if self._arm.safety_warnings():
-            flags |= Flag.SAFETY_WARNING
-        if self._arm.safety_faults():
-            flags |= Flag.SAFETY_FAULT
-        if self.status.state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
-            flags |= Flag.JOINT7_LOCKED
-        if reading.is_complete and np.abs(sent - tau).max() > CLIPPED:
-            flags |= Flag.TORQUE_CLIPPED
+        sample, wrench = self._sample, self._wrench
+        if wrench is not None:
+            sample.ft_ns[0] = wrench.t_ns
+            sample.ft_counter[0] = wrench.counter & 0xFFFFFFFF
+        bits = self._extra_flags | flags.of_safety(self._arm, self.status.safety)
+        bits |= flags.of_reading(reading, is_late=tick.is_late)
+        bits |= flags.of_wrench(wrench, is_new=is_new)
+        if self.status.state not in _UNPOWERED:
+            bits |= flags.JOINT7_LOCKED
+        if reading.is_complete and flags.is_clipped(sent, tau):
+            bits |= flags.TORQUE_CLIPPED
         if sample.traction[2] > CONTACT_FORCE:
-            flags |= Flag.CONTACT
+            bits |= flags.CONTACT
         sample.cycle[0] = tick.number
-        sample.flags[0] = flags
+        sample.flags[0] = bits
         sample.host_ns[0] = reading.host_ns
         sample.arm_ns[0] = reading.arm_ns
         sample.counts[:] = reading.counts

@@ -24,7 +24,7 @@ class FrameTape:
 
     def add(self, t_ns: int, can_id: int, data: bytes) -> None:
         """Keep one frame of monotonic time `t_ns` [ns]; the oldest is forgotten."""
-        self._ring.write(_FRAME.pack(t_ns, can_id, len(data), data))
+        self._ring.pack(_FRAME, t_ns, can_id, len(data), data)
 
 
 def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:

@@ -47,6 +47,7 @@ class Verdict:
 
 
 OK = Verdict(Action.NONE)
+_BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +173,10 @@ def _remember(
 
 
 def _check_safety(seen: Observation) -> Verdict:
-    if seen.safety is SafetyMode.E_STOP:
-        return Verdict(Action.IDLE, "estop")
-    if seen.safety is SafetyMode.IDLE:
-        return Verdict(Action.IDLE, "pendant-idle")
-    return OK
+    if seen.safety not in _BRAKED:
+        return OK
+    is_stopped = seen.safety is SafetyMode.E_STOP
+    return Verdict(Action.IDLE, "estop" if is_stopped else "pendant-idle")
 
 
 def _check_silence(limits: Limits, seen: Observation) -> Verdict:
@@ -192,7 +192,8 @@ def _check_silence(limits: Limits, seen: Observation) -> Verdict:
 def _check_numbers(seen: Observation) -> Verdict:
     reading = seen.reading
     q, qd, tau = reading.q, reading.qd, seen.tau
-    total = float(q @ q + qd @ qd + tau @ tau)  # squares: infinities cannot cancel
+    # Squares: infinities cannot cancel.
+    total = float(q.dot(q) + qd.dot(qd) + tau.dot(tau))
     total += abs(seen.foot_speed) + abs(seen.joint7_offset)
     if total - total != 0.0:  # NaN or infinite
         return Verdict(Action.IDLE, "not-a-number")

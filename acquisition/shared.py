@@ -4,6 +4,8 @@ Each has one writer. The payload is written before the counter, so a reader neve
 a record that is half written; what the writer has overwritten is counted as lost.
 """
 
+import struct
+
 import numpy as np
 
 from acquisition.sample import Record
@@ -53,6 +55,13 @@ class Ring:
         number = counter[0]
         start = number % self.slots * self._stride
         self._bytes[start : start + self._size] = payload
+        counter[0] = number + 1
+
+    def pack(self, layout: struct.Struct, *values: object) -> None:
+        """Append one record, given as its values; `layout` covers all of its bytes."""
+        counter = self._counter
+        number = counter[0]
+        layout.pack_into(self._bytes, number % self.slots * self._stride, *values)
         counter[0] = number + 1
 
     def reader(self) -> "RingReader":

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from acquisition.board import TIMING_DTYPE
 from acquisition.clock import NS_PER_S
 from acquisition.cycle import ArmState
 from acquisition.devices import SafetyMode
@@ -89,7 +90,7 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
     desk = rig.crew.desk
     is_powered = _power_up(rig)
     desk.advance(SETTLE)
-    collected = _Collector(rig)
+    collected = _Collector(rig, seconds)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.mcap"
         rig.crew.recorder.start(path, _header())
@@ -124,19 +125,25 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
 class _Collector:
     """Reads the ring of timings as it fills; it holds a minute only."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, seconds: float) -> None:
         self._timings = rig.crew.desk.timings()
-        self._parts = [self._timings.read()]
         self._rig = rig
+        self._count = 0
+        # Taken now, page by page: the console's memory is measured too.
+        self._records = np.zeros(int(seconds * 510) + 2000, TIMING_DTYPE)
+        self._records["number"] = 1
         rig.crew.desk.on_pass.append(self._look)
 
     def _look(self) -> None:
-        self._parts.append(self._timings.read())
+        new = self._timings.read()
+        new = new[: len(self._records) - self._count]
+        self._records[self._count : self._count + len(new)] = new
+        self._count += len(new)
 
     def take(self) -> Record:
         """Return every record since the start."""
         self._rig.crew.desk.on_pass.remove(self._look)
-        return np.concatenate(self._parts)
+        return self._records[: self._count]
 
 
 def _power_up(rig: Rig) -> bool:

@@ -60,7 +60,6 @@ class BusFaults:
         self._rules: dict[int, list[_Rule]] = {}
         self._released_ns: dict[int, int] = {}
         self._flood = 0  # number of the present one; events of earlier ones are void
-        schedule.on_emit = self._pass_on
 
     def drop(self, can_id: int, count: int | None = 1, share: float = 1.0) -> None:
         """Lose frames, each with probability `share`."""
@@ -98,6 +97,7 @@ class BusFaults:
     def go_off(self) -> None:
         """Let the host's controller leave the bus, as after too many errors."""
         self.is_off = True
+        self._step_in()
 
     def mend(self) -> None:
         """End everything; frames that are late already still come."""
@@ -116,6 +116,15 @@ class BusFaults:
     ) -> None:
         rule = _Rule(effect, count, every, share)
         self._rules.setdefault(can_id, []).append(rule)
+        self._step_in()
+
+    def _step_in(self) -> None:
+        """Come between devices and wire, once and for good.
+
+        Until something goes wrong for the first time frames take the short way. The
+        long one stays: a mended delay still keeps frames of an identifier in order.
+        """
+        self._schedule.emit = self._pass_on
 
     def _pass_on(self, can_id: int, data: bytes) -> None:
         for delay_ns, left in self._struck(can_id, data):

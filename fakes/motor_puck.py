@@ -2,6 +2,7 @@
 
 from fakes.network_options import NetworkOptions
 from fakes.puck_life import Power, PuckLife
+from wam.frames import position_reply_id
 from wam.pucks import (
     MAGNETIC_ENCODER,
     Device,
@@ -12,6 +13,9 @@ from wam.pucks import (
     property_number,
 )
 
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_AWAKE = Power.AWAKE
+_DRIVEN = PuckMode.TORQUE
 READ_ONLY = frozenset(
     ("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM", "VBUS")
 )
@@ -23,6 +27,7 @@ class MotorPuck:
     Attributes:
         life: its processor.
         node: its number, 1 to 7.
+        position_id: identifier of its position replies.
         vers: its firmware.
         offset: its position less the encoder's [counts].
         torque: torque it makes [puck units].
@@ -34,6 +39,7 @@ class MotorPuck:
     def __init__(self, life: PuckLife, options: NetworkOptions) -> None:
         self.life = life
         self.node = node = life.node
+        self.position_id = position_reply_id(node)
         i = node - 1
         self.vers = options.vers[i]
         self.offset = 0
@@ -55,12 +61,12 @@ class MotorPuck:
     @property
     def is_awake(self) -> bool:
         """Whether its firmware runs."""
-        return self.life.power is Power.AWAKE
+        return self.life.power is _AWAKE
 
     @property
     def is_driven(self) -> bool:
         """Whether it follows torques."""
-        return self.properties["MODE"] == PuckMode.TORQUE
+        return self.properties["MODE"] == _DRIVEN
 
     def hears(self, group: int) -> bool:
         """Return whether the puck belongs to `group` and runs."""
@@ -86,8 +92,9 @@ class MotorPuck:
 
     def take_torque(self, units: int) -> None:
         """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
-        if self.is_driven:
-            limit = self.properties["MT"]
+        properties = self.properties
+        if properties["MODE"] == _DRIVEN:
+            limit = properties["MT"]
             self.torque = max(-limit, min(units, limit))
 
     def restart(self, power: Power) -> None:

@@ -13,9 +13,8 @@ from fakes.schedule import Schedule
 from wam.frames import (
     MOTOR_NODES,
     Property,
-    decode_position,
     encode_position,
-    position_reply_id,
+    wrap_position,
 )
 
 
@@ -141,9 +140,10 @@ class PuckBank:
         reported: dict[int, int] = {}
         for puck in pucks:
             if puck.is_awake and not puck.life.is_mute:
-                position = encode_position(counts[puck.node - 1] + puck.offset)
-                self._schedule.emit(position_reply_id(puck.node), position)
-                reported[puck.node] = decode_position(position)
+                node = puck.node
+                position = wrap_position(counts[node - 1] + puck.offset)
+                self._schedule.emit(puck.position_id, encode_position(position))
+                reported[node] = position
         if reported:
             self._on_positions(reported)
 

@@ -15,7 +15,7 @@ from fakes.safety_module import (
     PendantAction,
     Strainable,
 )
-from fakes.schedule import OutFrame, Schedule
+from fakes.schedule import NEVER, OutFrame, Schedule
 from wam.frames import (
     GROUP_BIT,
     MOTOR_NODES,
@@ -23,7 +23,6 @@ from wam.frames import (
     SENDER_MASK,
     SENSOR_NODE,
     FrameError,
-    Group,
     Payload,
     decode_request,
     decode_torques,
@@ -35,6 +34,7 @@ class PuckNetwork:
     """The network as a host sees it: `receive` frames, `advance`, take what is `due`.
 
     Attributes:
+        schedule: the network's time, its plans, and what wants onto the wire.
         options: the arm as it was found.
         faults: what goes wrong with frames on their way to the host.
     """
@@ -48,17 +48,15 @@ class PuckNetwork:
     ) -> None:
         """Join devices and motors; `load` is on the sensor, if there is one."""
         self.options = options or NetworkOptions()
-        self._schedule = Schedule(t_ns)
-        self.faults = BusFaults(self._schedule)
-        self._safety = FakeSafetyModule(
-            self.options, self._schedule, self._mode_changed
-        )
+        self.schedule = schedule = Schedule(t_ns)
+        self.faults = BusFaults(schedule)
+        self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
         self._bank = PuckBank(
-            motors, self.options, self._schedule, self._safety.hear_positions
+            motors, self.options, schedule, self._safety.hear_positions
         )
         self._sensor: ForceTorquePuck | None = None
         if self.options.has_sensor:
-            self._sensor = ForceTorquePuck(self.options, self._schedule, load or Load())
+            self._sensor = ForceTorquePuck(self.options, schedule, load or Load())
 
     @property
     def safety_mode(self) -> SafetyMode:
@@ -72,27 +70,21 @@ class PuckNetwork:
 
     def advance(self, t_ns: int) -> None:
         """Let everything happen that happens until `t_ns`, in order of time."""
-        while (next_ns := self.next_event_ns()) is not None and next_ns <= t_ns:
-            self._schedule.go_to(next_ns)
-            if not self._schedule.run_due():
-                self._safety.miss_beat()
-        self._schedule.go_to(t_ns)
+        self.schedule.advance(t_ns)
 
     def next_event_ns(self) -> int | None:
         """Return when the network does something of its own accord next."""
-        plan_ns, beat_ns = self._schedule.next_ns(), self._safety.beat_due_ns()
-        if plan_ns is None or beat_ns is None:
-            return beat_ns if plan_ns is None else plan_ns
-        return min(plan_ns, beat_ns)
+        next_ns = self.schedule.next_ns
+        return None if next_ns == NEVER else next_ns
 
     def due(self, t_ns: int) -> list[OutFrame]:
         """Advance to `t_ns` and return the frames that want onto the wire by then."""
-        self.advance(t_ns)
-        return self._schedule.take()
+        self.schedule.advance(t_ns)
+        return self.schedule.take()
 
     def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
         """Take a host's frame whose last bit arrived at `t_ns`."""
-        self.advance(t_ns)
+        self.schedule.advance(t_ns)
         if can_id & SENDER_MASK:
             return
         to = can_id & 0x1F
@@ -152,7 +144,7 @@ class PuckNetwork:
         if group in TORQUE_GROUPS and len(data) == 8:
             units = decode_torques(data)
             self._bank.receive_torques(group, data[0], units)
-            self._safety.hear_torques(Group(group), units)
+            self._safety.hear_torques(group, units)
         else:
             self._bank.receive_group(group, decode_request(data))
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 from acquisition.devices import SafetyMode
 from fakes.network_options import NetworkOptions
-from fakes.schedule import Schedule
+from fakes.schedule import NEVER, Schedule
 from fakes.speed_watch import SpeedWatch
 from wam.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
 from wam.pucks import Device, PuckMode, Role, Stat, names
@@ -58,7 +58,6 @@ class FakeSafetyModule:
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
-        self._last_position_ns = schedule.now_ns
         self._levels: dict[str, Level] = dict.fromkeys(MONITORS, Level.SAFE)
         if not options.has_power:
             self._levels["other"] = Level.FAULT
@@ -67,7 +66,7 @@ class FakeSafetyModule:
         self._bus_voltage = NOMINAL_VOLTAGE
         self._is_deaf = False
         self._spared: dict[str, int] = {}  # limits as they were before `strain`
-        self._largest_command: dict[Group, int] = dict.fromkeys(TORQUE_GROUPS, 0)
+        self._largest_command: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
             **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
             **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0, "STAT": int(Stat.READY)},
@@ -78,6 +77,8 @@ class FakeSafetyModule:
                 **_POWER_UP_LIMITS,
             },
         }
+        schedule.on_alarm = self._miss_beat
+        self._feel_beat()
 
     @property
     def pendant_word(self) -> PendantWord:
@@ -143,22 +144,22 @@ class FakeSafetyModule:
         """Take positions [counts] by node: heartbeat of the arm, and its speed."""
         if self._is_deaf:
             return
-        self._last_position_ns = self._schedule.now_ns
+        self._feel_beat()
         self._speeds.hear(self._schedule.now_ns, positions)
         self._judge_speed()
 
-    def hear_torques(self, group: Group, units: Sequence[int]) -> None:
+    def hear_torques(self, group: int, units: Sequence[int]) -> None:
         """Judge a torque command as it stands on the bus, before a puck clips it."""
         self._largest_command[group] = max(map(abs, units))
         self._judge_torque()
 
-    def beat_due_ns(self) -> int | None:
-        """Return when the next position is missed, None unless ACTIVE."""
-        if self.mode is not SafetyMode.ACTIVE:
-            return None
-        return self._last_position_ns + self._options.heartbeat_ns
+    def _feel_beat(self) -> None:
+        """Wait for the next position until the heartbeat is over, while ACTIVE."""
+        is_active = self.mode is SafetyMode.ACTIVE
+        due_ns = self._schedule.now_ns + self._options.heartbeat_ns
+        self._schedule.set_alarm(due_ns if is_active else NEVER)
 
-    def miss_beat(self) -> None:
+    def _miss_beat(self) -> None:
         """Fault the arm: nobody has asked for positions in time."""
         self._fault("heartbeat")
 
@@ -238,7 +239,7 @@ class FakeSafetyModule:
             self._properties["ZERO"] = 0
             self._speeds.forget()
             self._too_fast_since_ns = None
-        self._last_position_ns = self._schedule.now_ns
+        self._feel_beat()
         told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
         self._schedule.emit(_BROADCAST_ID, told)
         self._on_change(before)

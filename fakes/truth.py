@@ -9,7 +9,6 @@ from acquisition.sample import Record
 from ft_sensor.payload import TerrainFrame
 from wam.constants import Array
 
-
 MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
 
 

@@ -1,20 +1,14 @@
 """The wire between hosts and a puck network: one frame at a time, lowest id first."""
 
 from heapq import heappop, heappush
-from typing import NamedTuple
 
 from fakes.pucks import PuckNetwork
-from fakes.schedule import FRAME_NS, OutFrame
+from fakes.schedule import FRAME_NS, NEVER, OutFrame
 from wam.frames import Payload
 
-
-class _Waiting(NamedTuple):
-    """A frame that wants onto the wire; the lowest identifier goes first."""
-
-    can_id: int
-    order: int
-    data: Payload
-    is_of_host: bool
+# A frame that wants onto the wire: identifier, order of arrival, data, is of a host.
+# The lowest identifier goes first.
+_Waiting = tuple[int, int, bytes, bool]
 
 
 class WiredNetwork:
@@ -28,84 +22,87 @@ class WiredNetwork:
 
     def __init__(self, network: PuckNetwork, *, is_far: bool = False) -> None:
         self.network = network
+        self._schedule = network.schedule
         self._is_far = is_far
         self._waiting: list[_Waiting] = []
-        self._on_wire: tuple[int, _Waiting] | None = None
+        self._on_wire: _Waiting | None = None
         self._free_ns = 0
-        self._start_ns = 0
+        self._next_ns = NEVER  # the frame on the wire ends, or the next one starts
         self._order = 0
         self._sent: list[OutFrame] = []
 
     def send(self, t_ns: int, can_id: int, data: Payload) -> None:
         """Queue a host's frame at `t_ns`, the time of the last `advance`."""
-        self._queue(t_ns, can_id, data, is_of_host=True)
+        self._queue(t_ns, can_id, bytes(data), True)
 
     def drop_waiting(self) -> None:
         """Lose the frames that wait for the wire."""
         self._waiting.clear()
+        if self._on_wire is None:
+            self._next_ns = NEVER
 
     def next_event_ns(self) -> int | None:
         """Return when wire or network do something next, None if never."""
-        times = [self._next_wire_ns(), self.network.next_event_ns()]
-        return min((t for t in times if t is not None), default=None)
+        next_ns = min(self._next_ns, self._schedule.next_ns)
+        return None if next_ns == NEVER else next_ns
 
     def advance(self, t_ns: int) -> list[OutFrame]:
         """Let wire and network go on to `t_ns`; return the devices' frames till then.
 
         Each comes with the time [ns] at which it was sent.
         """
+        schedule = self._schedule
         while True:
-            wire_ns = self._next_wire_ns()
-            own_ns = self.network.next_event_ns()
             # At one instant the network is first: its frame may win the arbitration.
-            if (
-                own_ns is not None
-                and own_ns <= t_ns
-                and not (wire_ns is not None and wire_ns < own_ns)
-            ):
+            own_ns, wire_ns = schedule.next_ns, self._next_ns
+            if own_ns <= t_ns and own_ns <= wire_ns:
                 self._take_due(own_ns)
-            elif wire_ns is not None and wire_ns <= t_ns:
-                self._step(wire_ns)
+            elif wire_ns <= t_ns:
+                self._carry(min(t_ns, own_ns - 1))
             else:
                 break
-        self._take_due(t_ns)
+        if schedule.now_ns < t_ns or schedule.outbox:
+            self._take_due(t_ns)
         sent, self._sent = self._sent, []
         return sent
 
     def _take_due(self, t_ns: int) -> None:
         for ready_ns, can_id, data in self.network.due(t_ns):
-            self._queue(ready_ns, can_id, data, is_of_host=False)
+            self._queue(ready_ns, can_id, data, False)
 
-    def _queue(
-        self, ready_ns: int, can_id: int, data: Payload, *, is_of_host: bool
-    ) -> None:
+    def _queue(self, ready_ns: int, can_id: int, data: bytes, is_of_host: bool) -> None:
         self._order += 1
-        if not self._waiting:
-            self._start_ns = max(self._free_ns, ready_ns)
-        heappush(self._waiting, _Waiting(can_id, self._order, data, is_of_host))
+        if not self._waiting and self._on_wire is None:
+            self._next_ns = max(self._free_ns, ready_ns)
+        heappush(self._waiting, (can_id, self._order, data, is_of_host))
 
-    def _next_wire_ns(self) -> int | None:
-        """Return when the frame on the wire ends, or the next one starts."""
-        if self._on_wire is not None:
-            return self._on_wire[0]
-        return self._start_ns if self._waiting else None
+    def _carry(self, until_ns: int) -> None:
+        """Carry frames until `until_ns`, or until the network has got one of a host."""
+        while (t_ns := self._next_ns) <= until_ns:
+            frame = self._on_wire
+            if frame is None:
+                frame = heappop(self._waiting)
+                t_ns = self._start(t_ns, frame)
+                if t_ns > until_ns:  # its end is of a later call
+                    self._on_wire, self._next_ns = frame, t_ns
+                    return
+            can_id, _, data, is_of_host = frame
+            self._on_wire = None
+            self._free_ns = t_ns
+            # Whoever waits by now has been ready for a while.
+            self._next_ns = t_ns if self._waiting else NEVER
+            if is_of_host:
+                self.network.receive(t_ns, can_id, data)
+                return
+            if not self._is_far:
+                self._sent.append((t_ns, can_id, data))
 
-    def _step(self, t_ns: int) -> None:
-        if self._on_wire is None:
-            self._start(t_ns, heappop(self._waiting))
-            return
-        self._free_ns, frame = self._on_wire
-        self._on_wire = None
-        self._start_ns = t_ns  # whoever waits by now has been ready for a while
-        if frame.is_of_host:
-            self.network.receive(t_ns, frame.can_id, frame.data)
-        elif not self._is_far:
-            self._sent.append((t_ns, frame.can_id, bytes(frame.data)))
-
-    def _start(self, t_ns: int, frame: _Waiting) -> None:
-        takes_ns = FRAME_NS[len(frame.data)]
-        if self._is_far and frame.is_of_host:
-            takes_ns = 0
-        elif self._is_far:
-            self._sent.append((t_ns, frame.can_id, bytes(frame.data)))
-        self._on_wire = (t_ns + takes_ns, frame)
+    def _start(self, t_ns: int, frame: _Waiting) -> int:
+        """Begin a frame at `t_ns`; return when it ends."""
+        can_id, _, data, is_of_host = frame
+        if not self._is_far:
+            return t_ns + FRAME_NS[len(data)]
+        if is_of_host:
+            return t_ns
+        self._sent.append((t_ns, can_id, data))
+        return t_ns + FRAME_NS[len(data)]

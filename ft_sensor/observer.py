@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 
@@ -19,7 +20,7 @@ class LiveFoot:
     ) -> None:
         self._model = model
         self.payload = payload
-        self._axes = terrain.axes()
+        self._x_T, _, self._z_T = terrain.axes()
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
@@ -36,15 +37,14 @@ class LiveFoot:
         sample.foot_position[:] = position
         sample.foot_orientation[:] = quaternion(rotation)
         sample.foot_velocity[:] = twist
-        axes = self._axes
         if wrench is not None:
             payload = self.payload
             sample.wrench_raw[:] = wrench.wrench
             contact = payload.contact(sample.wrench_raw, rotation)
             sample.wrench[:] = contact
             force = payload.to_base(contact, rotation)
-            sample.traction[1] = -(axes[0] @ force)
-            sample.traction[2] = axes[2] @ force
+            sample.traction[1] = -self._x_T.dot(force)
+            sample.traction[2] = self._z_T.dot(force)
         velocity = twist[:3]
-        sample.traction[0] = axes[0] @ velocity
-        return float(np.sqrt(velocity @ velocity))
+        sample.traction[0] = self._x_T.dot(velocity)
+        return sqrt(velocity.dot(velocity))

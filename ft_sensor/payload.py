@@ -9,7 +9,7 @@ m_b and c_b everything below the gauges and g_w = (0, 0, -g):
 Force and torque leave the sensor frame in `to_base` only.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,12 @@ class Payload:
     rotation: Array
     sign: float
     bias: Array
+    _weighing: Array = field(init=False, repr=False, compare=False)  # (3, 6)
+
+    def __post_init__(self) -> None:
+        turned = self.rotation @ cross_matrix(self.com).T
+        weighing = -self.mass * GRAVITY * np.hstack([self.rotation, turned])
+        object.__setattr__(self, "_weighing", weighing)
 
     def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
         """Return the payload with the bias that a reading in the air gives.
@@ -60,9 +66,8 @@ class Payload:
         Args:
             rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
         """
-        down = -self.mass * GRAVITY * rotation_base_7[..., 2, :]
-        force = down @ self.rotation  # rotation^T applied to row vectors
-        return np.concatenate([force, force @ cross_matrix(self.com).T], axis=-1)
+        # The base's z axis in frame 7 is the last row of its orientation.
+        return rotation_base_7[..., 2, :].dot(self._weighing)
 
     def contact(self, raw: Floats, rotation_base_7: Floats) -> Floats:
         """Return the ground's wrench on the foot in the sensor frame, shape (..., 6).
@@ -75,8 +80,8 @@ class Payload:
 
     def to_base(self, wrench: Floats, rotation_base_7: Floats) -> Floats:
         """Return the force part of `wrench` (..., 6) in the base frame, (..., 3)."""
-        rotation = rotation_base_7 @ self.rotation
-        return np.matmul(rotation, wrench[..., :3, None])[..., 0]
+        force_7 = wrench[..., :3].dot(self.rotation.T)
+        return np.matmul(rotation_base_7, force_7[..., None])[..., 0]
 
 
 def payload_of(tool: Tool) -> Payload:

@@ -155,29 +155,30 @@ class CanLink:
     def _drain(self) -> None:
         if not self._is_open:
             return
-        receive = self._bus.recv
+        receive, sort = self._bus.recv, self._sort
         try:
             for _ in range(_DRAIN_AT_MOST):
                 message = receive(0)
                 if message is None:
                     return
-                self._sort(message)
+                sort(message)
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
 
     def _sort(self, message: can.Message) -> None:
-        can_id = message.arbitration_id
         if message.is_error_frame:
             self.error_frames += 1
             return
         if message.is_extended_id or message.is_remote_frame:
             return
+        can_id, stamp = message.arbitration_id, message.timestamp
+        data = bytes(message.data)
         if self.tap is not None:
-            self.tap(can_id, bytes(message.data), message.timestamp)
+            self.tap(can_id, data, stamp)
         if can_id == MODE_BROADCAST_ID:
             self.mode_hints += 1
         elif can_id & SENDER_MASK:
-            self._inbox.append(Frame(can_id, message.data, message.timestamp))
+            self._inbox.append(Frame(can_id, data, stamp))
 
 
 def _cannot_open(

@@ -20,13 +20,11 @@ class FrameTap:
 
     def __call__(self, can_id: int, data: bytes, stamp: float) -> None:
         """Note a frame."""
-        self._tape.add(self._monotonic_ns(stamp), can_id, data)
-
-    def _monotonic_ns(self, stamp: float) -> int:
-        now_ns = self._clock.now_ns()
+        t_ns = now_ns = self._clock.now_ns()
         if stamp:
             stamp_ns = round(stamp * NS_PER_S)
-            for t_ns in (stamp_ns - self._offset_ns, stamp_ns):
-                if 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
-                    return t_ns
-        return now_ns
+            if 0 <= now_ns - stamp_ns + self._offset_ns < _PLAUSIBLE_NS:
+                t_ns = stamp_ns - self._offset_ns
+            elif 0 <= now_ns - stamp_ns < _PLAUSIBLE_NS:
+                t_ns = stamp_ns
+        self._tape.add(t_ns, can_id, data)

@@ -155,6 +155,11 @@ def _checked_number(number: int) -> int:
     return number
 
 
+def wrap_position(counts: int) -> int:
+    """Return a motor position [encoder counts] as 22 bits carry it, signed."""
+    return (counts + _POSITION_SIGN) % _POSITION_MODULUS - _POSITION_SIGN
+
+
 def encode_position(counts: int) -> bytes:
     """Return the three bytes of a motor position, wrapped at 22 bits as on a puck."""
     return (counts % _POSITION_MODULUS).to_bytes(3, "big")

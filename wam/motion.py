@@ -52,18 +52,19 @@ class Motion:
         share = self._pole * step / (1.0 + self._pole * step)
         is_resumed = step > _PAUSE
         fresh = 0
+        times_ns, rates, positions = self._times_ns, self._rates, self._positions
         for i, counts in enumerate(received):
-            elapsed = (t_ns - self._times_ns[i]) * 1e-9
-            guess = self.counts[i] + self._rates[i] * min(elapsed, _LONGEST_GUESS)
+            elapsed = (t_ns - times_ns[i]) * 1e-9
+            last, rate = self.counts[i], rates[i]
+            guess = last + rate * min(elapsed, _LONGEST_GUESS)
             if counts is None or (abs(counts - guess) > self._jump and not is_resumed):
-                self._positions[i] = guess
+                positions[i] = guess
                 continue
             if elapsed > 0.0:
-                rate = (counts - self.counts[i]) / elapsed
-                self._rates[i] += share * (rate - self._rates[i])
+                rates[i] = rate + share * ((counts - last) / elapsed - rate)
             self.counts[i] = counts
-            self._positions[i] = counts
-            self._times_ns[i] = t_ns
+            positions[i] = counts
+            times_ns[i] = t_ns
             fresh |= 1 << i
         self._advance(t_ns, step)
         return fresh

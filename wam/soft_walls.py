@@ -53,11 +53,12 @@ class SoftWalls:
         walls = self._walls
         rows = zip(reading.q.tolist(), walls.lower, walls.upper, strict=True)
         for joint, (angle, lower, upper) in enumerate(rows):
-            depth = max(lower + DEPTH - angle, 0.0) - max(angle - upper + DEPTH, 0.0)
-            if depth == 0.0:
+            if lower + DEPTH <= angle <= upper - DEPTH:
                 if reading.is_complete:  # an extrapolated position arms nothing
                     self._armed |= 1 << joint
-            elif self._armed >> joint & 1:
+                continue
+            depth = max(lower + DEPTH - angle, 0.0) - max(angle - upper + DEPTH, 0.0)
+            if self._armed >> joint & 1:
                 push = self._push(joint, depth, float(reading.qd[joint]))
                 tau[joint] = self._bounded(joint, float(tau[joint]), push)
 

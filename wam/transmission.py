@@ -78,11 +78,11 @@ class Transmission:
 
         The same line turns count rates [1/s] into joint velocities [rad/s].
         """
-        return self._joints_of_counts @ np.array(counts, dtype=np.float64)
+        return self._joints_of_counts.dot(counts)
 
     def exact_counts(self, q: Vector) -> Vector:
         """Return motor positions [counts, not whole], shape (7,), of joints [rad]."""
-        return self._counts_of_joints @ q
+        return self._counts_of_joints.dot(q)
 
     def counts(self, q: Vector) -> list[int]:
         """Return motor positions [counts] of joint positions [rad], floored."""
@@ -90,11 +90,11 @@ class Transmission:
 
     def exact_units(self, tau: Vector) -> Vector:
         """Return motor torques [puck units, not whole] of joint torques [N m]."""
-        return self._units_of_tau @ tau
+        return self._units_of_tau.dot(tau)
 
     def tau(self, units: Sequence[float]) -> Vector:
         """Return joint torques [N m], shape (7,), of motor torques [puck units]."""
-        return self._tau_of_units @ np.array(units, dtype=np.float64)
+        return self._tau_of_units.dot(units)
 
     def command(self, tau: Vector, tau_gravity: Vector) -> TorqueCommand:
         """Return the torques to send for `tau`, within the limits of every motor.
@@ -116,10 +116,7 @@ class Transmission:
                 hint="This is an error of the program; nothing was sent.",
             )
         wanted: list[float] = self.exact_units(tau).tolist()
-        is_clipped = any(
-            abs(unit) > limit
-            for unit, limit in zip(wanted, self.torque_limits, strict=True)
-        )
+        is_clipped = _is_beyond(wanted, self.torque_limits)
         if is_clipped:
             gravity: list[float] = self.exact_units(tau_gravity).tolist()
             wanted = keep_gravity(wanted, gravity, self.torque_limits)
@@ -162,6 +159,14 @@ def coupled_ratios(
     j2mp[1, 2], j2mp[2, 1] = -n2 / n3, -n2
     j2mp[4, 5], j2mp[5, 4] = -n5 / n6, n5
     return j2mp
+
+
+def _is_beyond(values: Sequence[float], limits: Sequence[float]) -> bool:
+    """Return whether any of `values` is beyond its limit."""
+    for value, limit in zip(values, limits, strict=True):  # noqa: SIM110
+        if abs(value) > limit:
+            return True
+    return False
 
 
 def _room(held: float, rest: float, limit: float) -> float:

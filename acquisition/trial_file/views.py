@@ -1,8 +1,13 @@
 """Standard messages with the content of a cycle, for viewers that know no Cycle."""
 
+import struct
+from dataclasses import dataclass
+from typing import Final
+
 import numpy as np
 
-from acquisition.cdr import CdrWriter
+from acquisition.cdr import NS_PER_S, CdrWriter
+from acquisition.messages import CYCLE
 
 JOINT_NAMES = [f"wam_j{joint}" for joint in range(1, 8)]
 VIEW_TOPICS = {
@@ -11,6 +16,29 @@ VIEW_TOPICS = {
     "/foot/pose": "geometry_msgs/msg/PoseStamped",
     "/foot/twist": "geometry_msgs/msg/TwistStamped",
 }
+_STAMP: Final = struct.Struct("<iI")
+_STAMP_AT: Final = 4  # right behind the encapsulation
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """A message of which only the numbers change.
+
+    Attributes:
+        template: the message with zeros for stamp and numbers.
+        parts: where numbers stand in the message, and where in the bytes of a cycle.
+    """
+
+    template: bytes
+    parts: tuple[tuple[slice, slice], ...]
+
+    def filled(self, cycle: bytes, seconds: int, nanoseconds: int) -> bytes:
+        """Return the message of one cycle."""
+        data = bytearray(self.template)
+        _STAMP.pack_into(data, _STAMP_AT, seconds, nanoseconds)
+        for here, there in self.parts:
+            data[here] = cycle[there]
+        return bytes(data)
 
 
 def encode_views(record: np.void, log_time: int) -> dict[str, bytes]:
@@ -20,15 +48,42 @@ def encode_views(record: np.void, log_time: int) -> dict[str, bytes]:
         record: one record in the layout of `acquisition.messages.CYCLE`.
         log_time: UTC of the cycle [ns].
     """
-    joints = CdrWriter().header(log_time, "wam_base").strings(JOINT_NAMES)
-    joints.sequence(record["position"]).sequence(record["velocity"])
-    joints.sequence(record["torque_command"])
-    wrench = CdrWriter().header(log_time, "ft_sensor").array(record["wrench"])
-    pose = CdrWriter().header(log_time, "wam_base").array(record["foot_position"])
-    pose.array(record["foot_orientation"])
-    twist = CdrWriter().header(log_time, "wam_base").array(record["foot_velocity"])
-    writers = (joints, wrench, pose, twist)
-    return {
-        topic: writer.finish()
-        for topic, writer in zip(VIEW_TOPICS, writers, strict=True)
-    }
+    cycle = record.tobytes()
+    stamp = divmod(log_time, NS_PER_S)
+    return {topic: view.filled(cycle, *stamp) for topic, view in _VIEWS.items()}
+
+
+def _joint_states() -> _View:
+    writer = CdrWriter().header(0, "wam_base").strings(JOINT_NAMES)
+    fields = ("position", "velocity", "torque_command")
+    return _view(writer, fields, are_counted=True)
+
+
+def _view(
+    writer: CdrWriter, fields: tuple[str, ...], *, are_counted: bool = False
+) -> _View:
+    """Return the message that goes on with `fields` of a cycle after `writer`."""
+    empty = np.zeros((), CYCLE.dtype)
+    assert CYCLE.dtype.fields is not None
+    offsets = {field: place[1] for field, place in CYCLE.dtype.fields.items()}
+    append = writer.sequence if are_counted else writer.array
+    parts: list[tuple[slice, slice]] = []
+    for name in fields:
+        numbers = empty[name]
+        append(numbers)
+        end, start = len(writer.finish()), offsets[name]
+        here = slice(end - numbers.nbytes, end)
+        parts.append((here, slice(start, start + numbers.nbytes)))
+    return _View(writer.finish(), tuple(parts))
+
+
+def _header(frame_id: str) -> CdrWriter:
+    return CdrWriter().header(0, frame_id)
+
+
+_VIEWS: Final = {
+    "/joint_states": _joint_states(),
+    "/wrench": _view(_header("ft_sensor"), ("wrench",)),
+    "/foot/pose": _view(_header("wam_base"), ("foot_position", "foot_orientation")),
+    "/foot/twist": _view(_header("wam_base"), ("foot_velocity",)),
+}

@@ -122,13 +122,13 @@ class TrialWriter:
         self._count_cycles(records)
         with self._guarded():
             size = CYCLE.size
+            every = self._header.views_every
             data = records.tobytes()
             numbers = records["cycle"].tolist()
             rows = zip(numbers, log_times.tolist(), published.tolist(), strict=True)
             for i, (number, log_time, publish_time) in enumerate(rows):
                 payload = data[i * size : (i + 1) * size]
                 self._add("/cycle", log_time, payload, publish_time, number)
-                every = self._header.views_every
                 if every and number % every == 0:
                     for topic, view in encode_views(records[i], log_time).items():
                         self._add(topic, log_time, view, publish_time, number)
@@ -235,16 +235,15 @@ class TrialWriter:
 
     def _count_cycles(self, records: Record) -> None:
         counts = self.counts
-        numbers = records["cycle"].astype(np.int64)
+        first, last = int(records["cycle"][0]), int(records["cycle"][-1])
         if counts.first_cycle is None:
-            counts.first_cycle = int(numbers[0])
-            counts.last_cycle = int(numbers[0]) - 1
+            counts.first_cycle = first
+            counts.last_cycle = first - 1
         assert counts.last_cycle is not None
-        steps = np.diff(numbers, prepend=counts.last_cycle)
-        counts.missed += int((steps - 1).sum())
+        counts.missed += last - counts.last_cycle - len(records)
         counts.late += int(np.count_nonzero(records["flags"] & Flag.DEADLINE_MISSED))
         counts.cycles += len(records)
-        counts.last_cycle = int(numbers[-1])
+        counts.last_cycle = last
 
     def _add(
         self,

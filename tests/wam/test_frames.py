@@ -183,6 +183,12 @@ def test_a_position_that_contradicts_the_layout_is_refused(data):
         frames.decode_position(bytes.fromhex(data))
 
 
+@given(st.integers(-(1 << 40), 1 << 40))
+def test_a_wrapped_position_is_what_the_wire_makes_of_it(counts):
+    on_wire = frames.encode_position(counts)
+    assert frames.wrap_position(counts) == frames.decode_position(on_wire)
+
+
 @given(st.integers(-(2**21), 2**21 - 1))
 def test_a_position_survives_the_wire(counts):
     assert frames.decode_position(frames.encode_position(counts)) == counts
