@@ -8,6 +8,7 @@ without it; the plant's is measured around its calls, in runs of their own.
 """
 
 import argparse
+import gc
 import hashlib
 import json
 import statistics
@@ -56,9 +57,18 @@ def float_rig() -> Rig:
     return rig
 
 
+def without_collector() -> None:
+    """Tidy up and keep the garbage collector out, as the control process does."""
+    gc.enable()
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+
+
 def timed(rig: Rig, seconds: float, *, is_recording: bool) -> tuple[float, str]:
     """Return (CPU seconds of `seconds` of simulation, digest of its samples)."""
     digest = hashlib.sha256()
+    without_collector()
     reader = rig.board.cycles.reader()
     rig.crew.desk.on_pass.append(lambda: digest.update(reader.read().tobytes()))
     with tempfile.TemporaryDirectory() as folder:
@@ -76,6 +86,7 @@ def timed(rig: Rig, seconds: float, *, is_recording: bool) -> tuple[float, str]:
 def plant_share(seconds: float) -> float:
     """Return the seconds that the plant takes of `seconds` of simulation."""
     rig = float_rig()
+    without_collector()
     clock = rig.clock
     assert isinstance(clock, SteppedClock)
     world = clock.world

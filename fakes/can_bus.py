@@ -22,6 +22,7 @@ class FakeCanBus(can.BusABC):
     def __init__(self, network: PuckNetwork, clock: Clock) -> None:
         self.channel_info = "fake bus"
         self.network = network
+        self._faults = network.faults
         self._clock = clock
         self._inbox: deque[can.Message] = deque()
         self._wired = WiredNetwork(network)
@@ -58,14 +59,9 @@ class FakeCanBus(can.BusABC):
     def advance(self, t_ns: int) -> None:
         """Let wire and network go on to `t_ns`."""
         for last_bit_ns, can_id, data in self._wired.advance(t_ns):
-            self._inbox.append(
-                can.Message(
-                    timestamp=last_bit_ns / NS_PER_S,
-                    arbitration_id=can_id,
-                    is_extended_id=False,
-                    data=data,
-                )
-            )
+            # positionally: stamp, identifier, is it an extended one
+            message = can.Message(last_bit_ns / NS_PER_S, can_id, False, data=data)
+            self._inbox.append(message)
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Return the next frame, None when `timeout` [s] of the clock has passed.
@@ -76,9 +72,14 @@ class FakeCanBus(can.BusABC):
             can.CanOperationError: the bus is off.
         """
         self._check_on()
-        if self._inbox and self._filters is None:
-            return self._inbox.popleft()  # the way that nearly every frame takes
         clock = self._clock
+        if self._filters is None:  # the way that nearly every question takes
+            if not self._inbox:
+                self.advance(clock.now_ns())
+            if self._inbox:
+                return self._inbox.popleft()
+            if timeout == 0:
+                return None
         patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)
         deadline_ns = clock.now_ns() + patience_ns if timeout else 0
         while True:
@@ -103,7 +104,7 @@ class FakeCanBus(can.BusABC):
 
     def _check_on(self) -> None:
         """Lose what waits, and say so as an adapter does, while the bus is off."""
-        if self.network.faults.is_off:
+        if self._faults.is_off:
             self._inbox.clear()
             self._wired.drop_waiting()
             raise can.CanOperationError("the controller is bus-off", errno.ENETDOWN)

@@ -31,7 +31,11 @@ class Bristle:
         """Return the force against a displacement of `moved` since the last step."""
         stretch = self._stretch + moved
         most = limit / self._stiffness
-        self._stretch = stretch = min(max(stretch, -most), most)
+        if stretch > most:
+            stretch = most
+        elif stretch < -most:
+            stretch = -most
+        self._stretch = stretch
         return -self._stiffness * stretch
 
 

@@ -118,7 +118,9 @@ class Jams:
         if self._is_loaded:
             self._age += dt
         aged = _Q0 + (1.0 - _Q0) * (1.0 - math.exp(-self._age / _TAU))
-        return max(min(self._J * aged, F_n * self._T), _LITTLE)
+        strength, grip = self._J * aged, F_n * self._T
+        capacity = strength if strength < grip else grip
+        return capacity if capacity > _LITTLE else _LITTLE
 
     @staticmethod
     def _creep(load: float) -> float:

@@ -3,7 +3,10 @@
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from wam.constants import ArmConstants
+from wam.model import drive_inertia_matrix
 
 _STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 _EPSILON = 0.01  # rad/s, where Coulomb friction saturates
@@ -17,10 +20,18 @@ class JointResistance:
     explicitly it is beyond stability for joint 7; so would be the damping of its stop.
     """
 
-    def __init__(self, constants: ArmConstants, friction: float) -> None:
-        """Take `friction` as a share of the figures identified on another arm."""
-        self._joints: list[tuple[float, float, float, float]] = list(
+    def __init__(self, constants: ArmConstants, friction: float, dt: float) -> None:
+        """Take the arm and the step.
+
+        Args:
+            constants: of the arm; its drives' inertia counts.
+            friction: share of the figures identified on another arm.
+            dt: length of a step [s].
+        """
+        self._dt = dt
+        self._joints: list[tuple[float, float, float, float, float]] = list(
             zip(
+                np.diag(drive_inertia_matrix(constants)).tolist(),
                 (friction * constants.coulomb).tolist(),
                 (friction * constants.viscous).tolist(),
                 constants.q_lower.tolist(),
@@ -32,7 +43,7 @@ class JointResistance:
     def at(
         self, q: Sequence[float], qd: Sequence[float]
     ) -> tuple[list[float], list[float]]:
-        """Return (D [N m s/rad], torques [N m]), seven each.
+        """Return (drive inertia + dt D [kg m^2], torques [N m]), seven each.
 
         The torques are those of the stops and -D qd.
 
@@ -40,17 +51,19 @@ class JointResistance:
             q: joint positions [rad].
             qd: joint velocities [rad/s].
         """
-        dampings: list[float] = []
+        inertias: list[float] = []
         torques: list[float] = []
+        dt, tanh = self._dt, math.tanh
         for angle, rate, joint in zip(q, qd, self._joints, strict=True):
-            dry, damping, lower, upper = joint
-            torque = 0.0
+            drive, dry, damping, lower, upper = joint
             if dry:
-                speed = abs(rate) + _STANDSTILL
-                damping += dry * math.tanh(speed / _EPSILON) / speed
-            if not lower <= angle <= upper:
-                torque = _STOP_K * ((lower if angle < lower else upper) - angle)
+                speed = (rate if rate > 0.0 else -rate) + _STANDSTILL
+                damping += dry * tanh(speed / _EPSILON) / speed
+            if lower <= angle <= upper:
+                torques.append(-damping * rate)
+            else:
                 damping += _STOP_B
-            dampings.append(damping)
-            torques.append(torque - damping * rate)
-        return dampings, torques
+                beyond = angle - (lower if angle < lower else upper)
+                torques.append(-_STOP_K * beyond - damping * rate)
+            inertias.append(drive + dt * damping)
+        return inertias, torques

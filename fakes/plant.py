@@ -10,6 +10,7 @@ implicit part is an addition to the armature, so one articulated-body pass solve
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import floor
 
 import numpy as np
 import pinocchio as pin
@@ -23,7 +24,7 @@ from fakes.truth import Truth
 from fakes.wrist import Wrench, Wrist
 from ft_sensor.payload import TerrainFrame
 from wam.constants import GRAVITY, ArmConstants, Array
-from wam.model import add_point, build_pinocchio, drive_inertia_matrix
+from wam.model import add_point, build_pinocchio
 from wam.tool import Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -77,19 +78,21 @@ class ArmPlant:
         self._add_forearm(constants)
         self._sole = add_point(model, constants, "sole", tool.sole)
         self._data = model.createData()
-        self._drive = np.diag(drive_inertia_matrix(constants)).copy()
-        self._resistance = JointResistance(constants, options.friction)
         self._wrist = Wrist(tool, frame.axes(), CYCLE_NS * 1e-9)
         self._substeps = options.substeps
         self._substep_ns = CYCLE_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
+        self._resistance = JointResistance(constants, options.friction, self._dt)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = 0.5 * (CYCLE_NS - self._substep_ns) * 1e-9
         self._R = frame.axes()
         self._R4 = np.kron(np.eye(4), self._R)
         self._origin = np.array(frame.far_end)
         self._up: list[float] = (self._R[:, 2] * FOREARM_MASS * GRAVITY).tolist()
-        self._to_units = np.array(constants.ipnm, dtype=float)
+        # counts of the encoders per joint angle, joint torque per puck unit
+        turns = np.array(constants.cts) / (2.0 * np.pi)
+        self._to_counts = turns[:, None] * constants.j2mp
+        self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._tau = np.zeros(7)
         self._is_held = True
         self.q, self.qd, self._qdd = q.copy(), np.zeros(7), np.zeros(7)
@@ -104,8 +107,9 @@ class ArmPlant:
         pin.computeJointJacobians(model, self._data, self.q)
         hand = pin.updateFramePlacement(model, self._data, self._hand)
         self._wanted = hand.rotation.copy()
-        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn.
-        self._A = np.zeros((12, 7))
+        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn; the joints.
+        self._B = np.vstack((np.zeros((12, 7)), np.eye(7)))
+        self._A = self._B[:12]
         self._rates = [0.0] * 12
         self._linearise()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
@@ -132,14 +136,11 @@ class ArmPlant:
 
     def counts(self) -> Sequence[int]:
         """Return encoder counts of the seven motors."""
-        angle = self._constants.j2mp @ self.q
-        scale = np.array(self._constants.cts) / (2.0 * np.pi)
-        return np.floor(angle * scale).astype(int).tolist()
+        return [floor(count) for count in self._to_counts.dot(self.q).tolist()]
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        motor = np.asarray(units, dtype=float) / self._to_units
-        self._tau = self._constants.j2mp.T @ motor
+        self._tau = self._of_units.dot(units)
 
     def set_braking(self, is_braked: bool, is_powered: bool) -> None:
         """Hold the joints (braked), or let them follow torque or fall."""
@@ -209,7 +210,7 @@ class ArmPlant:
             ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
             held = (push[0] + ux, push[1] + uy, push[2] + uz)
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
-            self._integrate(np.array((*ground, *held, *turned)))
+            self._integrate((*ground, *held, *turned))
         if self.t_ns % CYCLE_NS == 0:
             self._end_cycle()
 
@@ -231,7 +232,7 @@ class ArmPlant:
         pin.updateFramePlacement(model, data, self._hand)
         J_s = pin.getFrameJacobian(model, data, self._sole, _AXES)
         J_h = pin.getFrameJacobian(model, data, self._hand, _AXES)
-        A[:] = self._R4 @ np.concatenate((J_s, J_h))
+        np.dot(self._R4, np.concatenate((J_s, J_h)), out=A)
         self._rates = A.dot(self.qd).tolist()
         x, y, z = R.dot(sole_at - self._origin).tolist()
         self._sole_at = (x, y, z)
@@ -241,12 +242,13 @@ class ArmPlant:
         x, y, z = R.dot(turn).tolist()
         self._tilt = (0.5 * x, 0.5 * y, 0.5 * z)
 
-    def _integrate(self, wrench: Array) -> None:
-        """Advance by one substep under `wrench` on foot and hand, shape (12,)."""
+    def _integrate(self, wrench: tuple[float, ...]) -> None:
+        """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
         q, qd, dt, model = self.q, self.qd, self._dt, self._model
-        D, resistance = np.array(self._resistance.at(q.tolist(), qd.tolist()))
-        model.armature = self._drive + dt * D
-        tau = self._tau + self.disturbance + wrench.dot(self._A) + resistance
+        inertias, resistance = self._resistance.at(q.tolist(), qd.tolist())
+        model.armature = np.array(inertias)
+        from_outside = np.array((*wrench, *resistance)).dot(self._B)
+        tau = self._tau + self.disturbance + from_outside
         # Velocities stand half a step behind positions; the speed-dependent part of
         # the dynamics takes them where the positions are, or a free swing loses energy.
         now = qd + 0.5 * dt * self._qdd

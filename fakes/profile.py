@@ -25,7 +25,9 @@ def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
 
 def locate(x: float) -> tuple[int, float]:
     """Return (row, share of the next row) of `x` [m] in every table."""
-    position = min(max((x + _MARGIN) / GRID, 0.0), _LAST)
+    position = (x + _MARGIN) / GRID
+    if not 0.0 <= position <= _LAST:
+        position = 0.0 if position < 0.0 else _LAST
     row = int(position)
     return row, position - row
 

@@ -108,7 +108,8 @@ class PuckBank:
         for puck in self._group(group):
             if puck.t_header == header:
                 puck.take_torque(units[(puck.properties["PIDX"] - 1) & 3])
-        self._apply()
+        self._motors.advance(self._schedule.now_ns)
+        self._motors.set_torques([puck.torque for puck in self._pucks])
 
     def _wake_up(self) -> None:
         for puck in self._pucks:

@@ -27,6 +27,7 @@ _REACTION, _REACTION_SPREAD, _FASTEST_REACTION = 0.18, 0.03, 0.1  # s
 _DEAF = 0.25  # s after a reaction without another
 _PROGRESS, _STUCK = 0.006, 1.5  # m in s, less is stuck
 _HARDER, _HARDEST = 3.0, 40.0  # N/s, N
+_ON_THE_WAY = (0.0, 0.0)  # neither aside nor lifted
 
 
 class HandView(NamedTuple):
@@ -106,23 +107,24 @@ class Push:
         x, y, _ = view.hand
         vx, vy, _ = view.hand_v
         self._watch(view.sole[0], view.sole_v[0])
-        begun = min(max((self._age - self._wait) / _RAMP, 0.0), 1.0)
+        begun = _between(0.0, (self._age - self._wait) / _RAMP, 1.0)
         v_e = begun * self._speed * max(0.0, 1.0 + self._wander.step())
         spring = self._K * (self._xe - (x - self._x0))
         room = (self._strongest - spring) / (0.3 * self._strongest)
-        self._xe += dt * v_e * min(max(room, 0.0), 1.0)
+        self._xe += dt * v_e * _between(0.0, room, 1.0)
         self._react(x - self._x0, spring)
         force = max(spring + PUSH_B * (v_e - vx), _WEAKEST)
         unsteady = force * self._effort.step()
         force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor.step()
-        aside, lift = self._pace.mishaps.at(view.sole[0])
+        aside, lift = _ON_THE_WAY
+        if self._pace.mishaps is not NO_MISHAPS:
+            aside, lift = self._pace.mishaps.at(view.sole[0])
         lateral = LATERAL_K * (aside - y) - LATERAL_B * vy
         return force, lateral, self._upward(force, view, begun, lift)
 
     def _upward(self, push: float, view: HandView, begun: float, lift: float) -> float:
         dt, z, vz = self._dt, view.hand[2], view.hand_v[2]
-        tilt = self._beta + self._tilt.step()
-        tilt = min(max(tilt, _FLATTEST), _STEEPEST)
+        tilt = _between(_FLATTEST, self._beta + self._tilt.step(), _STEEPEST)
         wander = self._press.step() * begun
         self._z_ref += dt * (z - self._z_ref) / _Z_TIME
         if lift > 0.0:
@@ -131,7 +133,7 @@ class Push:
             self._z_ref = z
             return _LIFT_K * (self._z_rest + lift - z) - _LIFT_B * vz
         self._z_rest = None
-        pressed = max(push, 0.0) * math.tan(tilt)
+        pressed = push * math.tan(tilt) if push > 0.0 else 0.0
         return -(pressed + wander + _Z_B * vz + _Z_K * (z - self._z_ref))
 
     def _watch(self, x: float, vx: float) -> None:
@@ -144,7 +146,7 @@ class Push:
             self._progress_age += dt
             if self._progress_age > _STUCK:
                 self._strongest = min(self._strongest + _HARDER * dt, _HARDEST)
-        self._deaf = max(self._deaf - dt, 0.0)
+        self._deaf = self._deaf - dt if self._deaf > dt else 0.0
         if vx > _SLIP_SPEED and self._deaf == 0.0 and self._react_in is None:
             reaction = _REACTION + _REACTION_SPREAD * self._n.next()
             self._react_in = max(_FASTEST_REACTION, reaction)
@@ -160,3 +162,8 @@ class Push:
             self._xe = x + share * max(self._react_force, 0.0) / self._K
             self._react_in = None
             self._deaf = _DEAF
+
+
+def _between(least: float, value: float, most: float) -> float:
+    """Return `value` within its limits; quicker than two built-in functions."""
+    return least if value < least else most if value > most else value

@@ -2,6 +2,7 @@
 
 import math
 import zlib
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -28,20 +29,24 @@ def trial_generators(seed: int, terrain: str, trial: int) -> TrialGenerators:
     return TrialGenerators(*trial_generator(seed, terrain, trial).spawn(3))
 
 
+# The processes below step up to 40 times per cycle of 2 ms. As generators they keep
+# their frame between steps, which costs a third of a method's call.
+
+
 class NormalStream:
-    """Standard normal numbers one by one, drawn in blocks."""
+    """Standard normal numbers one by one, drawn in blocks.
+
+    Attributes:
+        next: returns the next number.
+    """
 
     def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
-        self._generator = generator
-        self._block = block
-        self._values: list[float] = []
+        self.next: Callable[[], float] = _normals(generator, block).__next__
 
-    def next(self) -> float:
-        """Return the next number."""
-        if not self._values:
-            self._values = self._generator.standard_normal(self._block).tolist()
-            self._values.reverse()
-        return self._values.pop()
+
+def _normals(generator: np.random.Generator, block: int) -> Iterator[float]:
+    while True:
+        yield from generator.standard_normal(block).tolist()
 
 
 class OrnsteinUhlenbeck:
@@ -49,6 +54,10 @@ class OrnsteinUhlenbeck:
 
     It begins anywhere in its stationary distribution and steps exactly:
     x <- a x + sd sqrt(1 - a^2) n with a = exp(-dt / time).
+
+    Attributes:
+        step: advances by one time step and returns the value.
+        value: the value now.
     """
 
     def __init__(
@@ -59,35 +68,40 @@ class OrnsteinUhlenbeck:
         self._normals = normals
         self.value = sd * normals.next()
         self.set_dt(dt)
+        self.step: Callable[[], float] = self._walk().__next__
 
     def set_dt(self, dt: float) -> None:
         """Let every step from now on be `dt` [s] long."""
         self._keep = math.exp(-dt / self._time)
         self._kick = self._sd * math.sqrt(1.0 - self._keep**2)
 
-    def step(self) -> float:
-        """Advance by one time step and return the value."""
-        self.value = self._keep * self.value + self._kick * self._normals.next()
-        return self.value
+    def _walk(self) -> Iterator[float]:
+        next_normal = self._normals.next
+        while True:
+            self.value = value = self._keep * self.value + self._kick * next_normal()
+            yield value
 
 
 class Tremor:
-    """Unit-rms noise through a resonator at 9.5 Hz, damping ratio 0.15."""
+    """Unit-rms noise through a resonator at 9.5 Hz, damping ratio 0.15.
+
+    Attributes:
+        step: advances by one time step and returns the value.
+    """
 
     def __init__(self, dt: float, normals: NormalStream) -> None:
-        omega, zeta = 2.0 * math.pi * 9.5, 0.15
-        self._normals = normals
-        self._dt = dt
-        self._omega2 = omega * omega
-        self._damp = 2.0 * zeta * omega
-        # white input of this intensity gives unit variance: S = 4 zeta omega^3
-        self._kick = math.sqrt(4.0 * zeta * omega**3 * dt)
-        self._x = normals.next()
-        self._v = omega * normals.next()
+        self.step: Callable[[], float] = _resonance(dt, normals).__next__
 
-    def step(self) -> float:
-        """Advance by one time step and return the value (semi-implicit Euler)."""
-        kick = self._kick * self._normals.next()
-        self._v += self._dt * (-self._omega2 * self._x - self._damp * self._v) + kick
-        self._x += self._dt * self._v
-        return self._x
+
+def _resonance(dt: float, normals: NormalStream) -> Iterator[float]:
+    """Yield the resonator's values; semi-implicit Euler."""
+    omega, zeta = 2.0 * math.pi * 9.5, 0.15
+    square, damping = omega * omega, 2.0 * zeta * omega
+    # white input of this intensity gives unit variance: S = 4 zeta omega^3
+    intensity = math.sqrt(4.0 * zeta * omega**3 * dt)
+    x, v = normals.next(), omega * normals.next()
+    while True:
+        kick = intensity * normals.next()
+        v += dt * (-square * x - damping * v) + kick
+        x += dt * v
+        yield x

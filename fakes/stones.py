@@ -83,5 +83,7 @@ class StoneBed:
             rate = vx * (self._sink_limit - sink) / _L_S
             self._sink = sink + dt * rate * min(1.0, F_n / _FIRM)
         F_t = self._jams.step(dt, (x, vx), F_n, sunk)
-        F_t += F_n * min(max(slope, -_STEEPEST), _STEEPEST)
+        if not -_STEEPEST <= slope <= _STEEPEST:
+            slope = math.copysign(_STEEPEST, slope)
+        F_t += F_n * slope
         return self._footing.step(dt, motion, F_t, F_n, _MU_LATERAL)

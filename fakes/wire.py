@@ -52,6 +52,9 @@ class WiredNetwork:
         Each comes with the time [ns] at which it was sent.
         """
         schedule = self._schedule
+        if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
+            schedule.go_to(t_ns)
+            return []
         while True:
             # At one instant the network is first: its frame may win the arbitration.
             own_ns, wire_ns = schedule.next_ns, self._next_ns
