@@ -149,6 +149,17 @@ _POWER_UP = SafetySection(
 )
 
 
+class LoopSection(_Section):
+    """How the loop keeps time.
+
+    Attributes:
+        spin_us: it stops sleeping so long before each deadline and watches the time;
+            for a kernel that wakes late. It costs the share of the core.
+    """
+
+    spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
+
+
 class RigSettings(_Section):
     """Everything in rig.toml."""
 
@@ -159,6 +170,7 @@ class RigSettings(_Section):
     control: ControlSection
     limits: LimitSection
     gravity: GravitySection = GravitySection(model="cad")
+    loop: LoopSection = LoopSection()
     safety: SafetySection = _POWER_UP
 
 

@@ -55,8 +55,8 @@ class ControlStation:
     def __init__(self, station: Station) -> None:
         settings = station.settings
         self._station = station
-        self._clock = SystemClock()
         self._rig = RigSettings.model_validate(settings["rig"])
+        self._clock = SystemClock(round(self._rig.loop.spin_us * 1e3))
         self._row = TerrainRow.model_validate(settings["row"])
         self._is_simulated = bool(settings["is_simulated"])
         constants = load_constants()

@@ -15,6 +15,7 @@ from acquisition.errors import TrialFileError
 from acquisition.flight import encode_can_batch
 from acquisition.messages import CYCLE, TRUTH, schema_text
 from acquisition.sample import CHANNELS, Flag, Record
+from acquisition.trial_file.publishing import publish_file, sync_directory
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 
 CHUNK_BYTES = 262_144
@@ -107,7 +108,7 @@ class TrialWriter:
             enable_data_crcs=True,
         )
         with self._guarded():
-            _sync_directory(path.parent)
+            sync_directory(path.parent)
             self._start(topics)
 
     def write_cycles(self, records: Record) -> None:
@@ -279,21 +280,10 @@ class TrialWriter:
             ) from error
 
 
-def _sync_directory(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 def publish(writer: TrialWriter) -> None:
     """Give a verified `.partial` its final name, read-only; never replaces a file."""
     try:
-        os.link(writer.partial, writer.path)
-        writer.partial.unlink()
-        _sync_directory(writer.path.parent)
-        writer.path.chmod(0o444)
+        publish_file(writer.partial, writer.path)
     except OSError as error:
         raise TrialFileError(writer.path, _reason(error)) from error
 

@@ -107,3 +107,18 @@ def test_the_kernel_is_asked_to_be_punctual():
     SystemClock()
     get_timer_slack = 30  # PR_GET_TIMERSLACK [ns], 50 us unless asked
     assert ctypes.CDLL(None).prctl(get_timer_slack) == 1
+
+
+def test_the_last_part_before_a_deadline_is_watched_not_slept(monkeypatch):
+    clock = SystemClock(spin_ns=300_000)
+    woken = []
+
+    def nanosleep(*_):
+        woken.append(clock._deadline.sec * 10**9 + clock._deadline.nsec)
+        return 0
+
+    monkeypatch.setattr(clock, "_nanosleep", nanosleep)
+    deadline = clock.now_ns() + 1_000_000
+    clock.sleep_until(deadline)
+    assert woken == [deadline - 300_000]
+    assert clock.now_ns() >= deadline
