@@ -49,12 +49,17 @@ class SensorFit:
     torque_residual: float
 
 
-def fit_sensor(rotations: Floats, readings: Floats) -> SensorFit:
+def fit_sensor(
+    rotations: Floats,
+    readings: Floats,
+    mounting: tuple[float, float] | None = None,
+) -> SensorFit:
     """Fit payload, bias and mounting to readings at rest without contact.
 
     Args:
         rotations: orientations of frame 7 in the base frame, shape (n, 3, 3), n >= 6.
         readings: mean raw readings there [N, N m], shape (n, 6).
+        mounting: angle [rad] and sign where they are known; None = fitted too.
 
     Raises:
         SettingsError: too few orientations, or too much alike.
@@ -62,14 +67,16 @@ def fit_sensor(rotations: Floats, readings: Floats) -> SensorFit:
     down = _directions(rotations)
     forces, torques = readings[:, :3], readings[:, 3:]
     fits: list[tuple[float, float, float, Array, float]] = []
-    for sign in (1.0, -1.0):
-        angle = _search_angle(sign * GRAVITY * down, forces)
-        fits.append((*_fit_forces(sign * GRAVITY * down, forces, angle), sign))
+    for sign in (1.0, -1.0) if mounting is None else (mounting[1],):
+        seen = sign * GRAVITY * down
+        angle = _search_angle(seen, forces) if mounting is None else mounting[0]
+        fits.append((*_fit_forces(seen, forces, angle), sign))
     residual, angle, mass, bias, sign = min(fits, key=_cost)
     if mass <= 0.0:
         raise SettingsError(
             "The readings do not change with the orientation.",
-            hint="Is this sensor the one that carries the foot?",
+            hint="Is this sensor the one that carries the foot, and does its sign in "
+            "rig.toml fit?",
         )
     weight = mass * sign * GRAVITY * _turned(down, angle)
     moment, bias_torque, rest = _fit_torques(weight / mass, torques)

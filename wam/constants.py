@@ -136,7 +136,7 @@ class ArmConstants:
         drive_inertia: at the rotors [kg m^2].
         links: the seven links in their own distal frames.
         mus: first moments of another arm, frames 1..7 [kg m], shape (7, 3).
-        gravity_poses: poses of a gravity calibration [rad], shape (n, 7).
+        calibration_poses: poses of a gravity calibration [rad], shape (n, 7).
         coulomb: Coulomb friction of another arm [N m].
         viscous: viscous friction of another arm [N m s/rad].
         kp: joint position gains [N m/rad].
@@ -158,7 +158,7 @@ class ArmConstants:
     drive_inertia: Array
     links: tuple[Body, ...]
     mus: Array
-    gravity_poses: Array
+    calibration_poses: Array
     coulomb: Array
     viscous: Array
     kp: Array
@@ -200,7 +200,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
         drive_inertia=np.array(file.motors.drive_inertia),
         links=links,
         mus=np.array(file.gravity.mus),
-        gravity_poses=np.array(file.gravity.poses),
+        calibration_poses=np.array(file.gravity.poses),
         coulomb=np.array(file.friction.coulomb),
         viscous=np.array(file.friction.viscous),
         kp=np.array(file.control.kp),

@@ -1,31 +1,19 @@
 """traction calibrate gravity: hold the arm in many poses, fit what it weighs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.errors import PreflightError
-from experiments.activation import activate
-from experiments.operator import Prompt
-from experiments.stage import TICK, Stage
+from experiments.calibrating.walk import Walk
+from experiments.stage import Stage
 from experiments.store import iso_utc
+from wam.calibration_poses import Halt, choose_poses, plan_halts
 from wam.constants import Array
 from wam.first_moments import MomentFit, check_fit, fit_moments
 from wam.gravity_file import GravityCalibration
-from wam.gravity_poses import (
-    APPROACH_SPEED,
-    Halt,
-    choose_poses,
-    plan_halts,
-    way_seconds,
-)
-from wam.move import JointMove
 
-SETTLE = 0.5  # s after a move
 AVERAGE = 0.5  # s of torques that are averaged
-CLEARANCE = 0.10  # m that sole, plate and elbow stay above the highest container
-STILL = 0.02  # rad/s, largest joint speed while torques are averaged
-ATTEMPTS = 4  # at an arm that does not come to rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,16 +35,12 @@ class GravityGuide:
     """Leads the arm through the poses of a gravity calibration."""
 
     def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+        self._walk = Walk(stage)
         self._rig = stage.rig
         self._console = stage.company.console
-        self._here = np.zeros(7)  # where the arm was sent last
 
     def run(self, count: int, *, is_forced: bool) -> GravityCalibration:
         """Measure in `count` poses and return the calibration.
-
-        The arm moves by itself, at 0.5 rad/s and 0.3 m/s at most, after a person has
-        said that the space is clear; it comes back to where it was.
 
         Args:
             count: how many poses.
@@ -67,79 +51,25 @@ class GravityGuide:
             PreflightError: not activated, or touched while it was weighed.
             StopAskedError, FaultedError: as `Stage.tick`.
         """
-        activate(self._stage)
-        halts = self._clear_the_space(count)
-        found = self._measure(halts)
-        self._ask("Support the arm, it goes idle. [space]", Prompt.SUPPORT)
-        self._stage.make_safe()  # nobody need hold it while numbers are looked at
+        model = self._rig.model
+
+        def plan(start: Array, floor: float) -> list[Halt]:
+            return plan_halts(model, start, choose_poses(model, count, floor), floor)
+
+        found = self._measure(self._walk.begin(plan, 2 * AVERAGE))
+        self._walk.end()
         return self._fit(found, is_forced=is_forced)
 
-    def _clear_the_space(self, count: int) -> list[Halt]:
-        """Plan the way, hold the arm where it is and ask for free space."""
-        start = self._rig.crew.desk.latest()["position"][0].copy()
-        rows = self._rig.settings.matrix.terrains
-        floor = max(row.far_end[2] for row in rows) + CLEARANCE
-        model = self._rig.model
-        halts = self._stage.aside(
-            lambda: plan_halts(model, start, choose_poses(model, count, floor), floor)
-        )
-        number = len({halt.pose for halt in halts} - {None})
-        stops = len(halts) * SETTLE + 2 * number * AVERAGE
-        # Held by position: the weight is not known yet, and the hand lets go.
-        self._here = start
-        self._go_to(Halt(start, APPROACH_SPEED, None))
-        self._ask(
-            f"The arm will move by itself through {number} poses, about "
-            f"{(way_seconds(start, halts) + stops) / 60:.1f} min. Let go of it and "
-            "clear the space. [space] when clear.",
-            Prompt.CLEAR,
-        )
-        return halts
-
-    def _measure(self, halts: list[Halt]) -> list[Measured]:
+    def _measure(self, halts: Sequence[Halt]) -> list[Measured]:
         found: dict[int, list[tuple[Array, Array]]] = {}
         for halt in halts:
-            self._go_to(halt)
+            self._walk.go_to(halt)
             if halt.pose is None:
                 continue
-            found.setdefault(halt.pose, []).append(self._average())
+            found.setdefault(halt.pose, []).append(self._walk.rest(AVERAGE))
             if len(found[halt.pose]) == 2:
                 self._console.say(f"pose {halt.pose + 1} measured")
         return [_both(approaches) for approaches in found.values()]
-
-    def _go_to(self, halt: Halt) -> None:
-        self._rig.crew.desk.move_to(halt.q.tolist(), halt.speed)
-        self._wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
-        self._here = halt.q
-
-    def _ask(self, text: str, prompt: Prompt) -> None:
-        self._console.say(text)
-        while self._stage.tick(prompt) != " ":
-            pass
-
-    def _wait(self, seconds: float) -> None:
-        for _ in range(round(seconds / TICK) + 1):
-            self._stage.tick(Prompt.MOVING)
-
-    def _average(self) -> tuple[Array, Array]:
-        """Return mean (positions, torques) of half a second at rest.
-
-        Raises:
-            PreflightError: the arm does not come to rest.
-        """
-        speed = np.zeros(7)
-        for _ in range(ATTEMPTS):
-            self._wait(AVERAGE)
-            records = self._rig.crew.desk.last(AVERAGE)
-            q = records["position"]
-            speed = np.abs(q[-1] - q[0]) / AVERAGE
-            if speed.max() <= STILL:
-                return q.mean(axis=0), records["torque_command"].mean(axis=0)
-        raise PreflightError(
-            f"Joint {speed.argmax() + 1} moved at {speed.max():.3f} rad/s while it was "
-            f"weighed (limit {STILL}).",
-            hint="Nobody may touch the arm. Start again.",
-        )
 
     def _fit(self, measured: list[Measured], *, is_forced: bool) -> GravityCalibration:
         rig = self._rig

@@ -9,11 +9,11 @@ import pytest
 
 import fakes.rig
 from acquisition.devices import SafetyMode
-from experiments.calibrating import gravity
+from experiments.calibrating import gravity, walk
 from experiments.operator import AutoKeys, Prompt
 from fakes.plant import PlantOptions
 from tests.experiments.program import traction, write_config
-from wam import gravity_poses
+from wam import calibration_poses
 from wam.constants import Body, load_constants
 from wam.first_moments import gravity_torque
 from wam.gravity_file import gravity_from_toml
@@ -56,11 +56,11 @@ def calibrate(out, *options, press=None, is_quick=True):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fakes.rig, "FakeRig", HeavierRig)
         if is_quick:
-            patch.setattr(gravity, "SETTLE", 0.1)
+            patch.setattr(walk, "SETTLE", 0.1)
             patch.setattr(gravity, "AVERAGE", 0.1)
-            patch.setattr(gravity_poses, "POINT_SPEED", 0.6)
-            patch.setattr(gravity_poses, "APPROACH_SPEED", 0.1)
-            patch.setattr(gravity_poses, "_REACH", 0.6 * gravity_poses._REACH)
+            patch.setattr(calibration_poses, "POINT_SPEED", 0.6)
+            patch.setattr(calibration_poses, "APPROACH_SPEED", 0.1)
+            patch.setattr(calibration_poses, "_REACH", 0.6 * calibration_poses._REACH)
         if press is not None:
             usual = AutoKeys.answer
 

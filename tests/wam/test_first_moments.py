@@ -79,7 +79,7 @@ def perturbed():
 
 def test_calibration_recovers_the_torques_of_a_perturbed_arm():
     arm = perturbed()
-    poses = CONSTANTS.gravity_poses
+    poses = CONSTANTS.calibration_poses
     rng = np.random.default_rng(5)
     measured = torques(arm, poses) + rng.normal(0.0, 0.02, (len(poses), 7))
     fit = fit_moments(CONSTANTS, poses, measured)
@@ -96,7 +96,7 @@ def test_calibration_recovers_the_torques_of_a_perturbed_arm():
 
 
 def test_too_few_poses_are_refused():
-    poses = CONSTANTS.gravity_poses[:2]
+    poses = CONSTANTS.calibration_poses[:2]
     fit = fit_moments(CONSTANTS, poses, torques(CONSTANTS, poses))
     with pytest.raises(SettingsError, match="of 12 directions"):
         check_fit(fit)
@@ -110,7 +110,7 @@ def test_poses_that_show_a_direction_poorly_are_refused():
 
 
 def test_torques_that_gravity_cannot_explain_are_refused():
-    poses = CONSTANTS.gravity_poses
+    poses = CONSTANTS.calibration_poses
     spoiled = torques(CONSTANTS, poses)
     spoiled[::2, 1] += 6.0
     with pytest.raises(SettingsError, match="unexplained"):

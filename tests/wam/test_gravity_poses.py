@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.constants import load_constants
-from wam.first_moments import regressor
-from wam.gravity_poses import (
+from wam.calibration_poses import (
     APPROACH_SPEED,
     MARGIN,
     OFFSET,
@@ -19,6 +17,8 @@ from wam.gravity_poses import (
     plan_halts,
     way_seconds,
 )
+from wam.constants import load_constants
+from wam.first_moments import regressor
 from wam.model import ArmModel
 from wam.move import JointMove
 

@@ -1,4 +1,4 @@
-"""Where a gravity calibration measures, and the way there, over safe ground."""
+"""Where a calibration measures, and the way there, over safe ground."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,38 +51,60 @@ def choose_poses(model: ArmModel, count: int, floor: float) -> list[Array]:
     Raises:
         SettingsError: not as many poses are higher than `floor`.
     """
-    reachable = _candidates(model, floor)
-    if len(reachable) < count:
-        raise SettingsError(
-            f"Only {len(reachable)} of {_CANDIDATES} poses keep the arm above "
-            f"{floor:.2f} m.",
-            hint="Calibrate with a lower container: --terrain NAME.",
-        )
+    reachable = _candidates(model, floor, count)
     blocks = [regressor(model.constants, q) for q in reachable]
-    information = 1e-3 * np.eye(21)
+    return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
+
+
+def choose_orientations(model: ArmModel, count: int, floor: float) -> list[Array]:
+    """Return `count` poses [rad], shapes (7,), that turn the tool to all sides.
+
+    As `choose_poses`, for a force sensor: each next pose adds most to the information
+    on weight and offset, which are seen as m g d + b along three axes, d being the
+    direction of gravity in frame 7.
+
+    Raises:
+        SettingsError: not as many poses are higher than `floor`.
+    """
+    reachable = _candidates(model, floor, count)
+    down = [-model.plate_pose(q)[1][2] for q in reachable]
+    blocks = [np.append(direction, 1.0)[None, :] for direction in down]
+    return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
+
+
+def _most_telling(blocks: Sequence[Array], count: int) -> list[int]:
+    """Return which `count` of the regressors (k, p) tell most, one after the other."""
+    rows, parameters = blocks[0].shape
+    information = 1e-3 * np.eye(parameters)
     chosen: list[int] = []
     for _ in range(count):
         inverse = np.linalg.inv(information)
         gains = [
             -np.inf
             if i in chosen
-            else float(np.linalg.slogdet(np.eye(7) + Y @ inverse @ Y.T)[1])
+            else float(np.linalg.slogdet(np.eye(rows) + Y @ inverse @ Y.T)[1])
             for i, Y in enumerate(blocks)
         ]
         best = int(np.argmax(gains))
         chosen.append(best)
         information += blocks[best].T @ blocks[best]
-    return _in_short_order([reachable[i] for i in chosen])
+    return chosen
 
 
 def plan_halts(
-    model: ArmModel, start: Array, poses: Sequence[Array], floor: float
+    model: ArmModel,
+    start: Array,
+    poses: Sequence[Array],
+    floor: float,
+    *,
+    is_two_sided: bool = True,
 ) -> list[Halt]:
     """Return the halts: each pose from below and from above, in every joint.
 
     The way begins at `start` [rad], shape (7,), goes by the upright pose and ends at
     `start`. A straight way in joint space that would come lower than `floor` [m] goes
-    by the upright pose; a pose that cannot be reached from there is left out.
+    by the upright pose; a pose that cannot be reached from there is left out. Where
+    friction does not matter (`is_two_sided` false) each pose is reached once, directly.
 
     Raises:
         SettingsError: even the upright pose cannot be reached from `start`.
@@ -98,12 +120,21 @@ def plan_halts(
     for number, pose in enumerate(reachable):
         if not is_clear(model, way[-1][0], pose, floor):
             way.append((upright, None))
+        if not is_two_sided:
+            way.append((pose, number))
+            continue
         for side in (-OFFSET, OFFSET):
             way += [(pose + side, None), (pose, number)]
     way += [(upright, None), (start, None)]
     before = [start, *(q for q, _ in way[:-1])]
     return [
-        Halt(q, APPROACH_SPEED if pose is not None else leg_speed(model, here, q), pose)
+        Halt(
+            q,
+            APPROACH_SPEED
+            if pose is not None and is_two_sided
+            else leg_speed(model, here, q),
+            pose,
+        )
         for here, (q, pose) in zip(before, way, strict=True)
     ]
 
@@ -166,15 +197,26 @@ def _elbow(constants: ArmConstants, q: NDArray[np.float64]) -> NDArray[np.float6
     return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1)
 
 
-def _candidates(model: ArmModel, floor: float) -> list[Array]:
-    """Return poses that are above `floor` [m], also where they are approached."""
+def _candidates(model: ArmModel, floor: float, count: int) -> list[Array]:
+    """Return poses that are above `floor` [m], also where they are approached.
+
+    Raises:
+        SettingsError: there are fewer than `count`.
+    """
     rng = np.random.default_rng(_SEED)
     away = MARGIN + OFFSET
     constants = model.constants
     drawn = np.array(UPRIGHT) + _REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
     drawn = np.clip(drawn, constants.q_lower + away, constants.q_upper - away)
     heights = np.min([lowest(model, drawn + d) for d in (-OFFSET, 0.0, OFFSET)], axis=0)
-    return list(drawn[heights > floor])
+    reachable = list(drawn[heights > floor])
+    if len(reachable) < count:
+        raise SettingsError(
+            f"Only {len(reachable)} of {_CANDIDATES} poses keep the arm above "
+            f"{floor:.2f} m.",
+            hint="Calibrate with a lower container: --terrain NAME.",
+        )
+    return reachable
 
 
 def _in_short_order(poses: list[Array]) -> list[Array]:
