@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from acquisition.errors import SettingsError
+from experiments.calibration_files import NOTHING, check_kind, read_calibration
 from experiments.parts import build_tool
 from experiments.settings import RigSettings, Settings
 from wam.constants import load_constants
@@ -10,8 +11,7 @@ from wam.gravity import gravity_model
 from wam.gravity_file import GravityCalibration, fits_tool, gravity_from_toml
 from wam.model import ArmModel
 
-_LARGEST = 1_000_000  # bytes; a calibration has a few thousand
-_NOTHING = "Nothing was started."
+_INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 
 
 def gravity_path(settings: Settings) -> Path:
@@ -27,18 +27,7 @@ def read_gravity(settings: Settings) -> str:
     """
     if settings.rig.gravity.model != "calibrated":
         return ""
-    path = gravity_path(settings)
-    try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("it is too large")
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is no calibration"
-        raise SettingsError(
-            f"The gravity calibration {path} cannot be read ({reason}).",
-            hint="Make it with: traction calibrate gravity. Or set [gravity] model = "
-            f'"cad" in rig.toml. {_NOTHING}',
-        ) from error
+    return read_calibration(gravity_path(settings), "gravity", _INSTEAD)
 
 
 def build_law_model(
@@ -61,7 +50,12 @@ def build_law_model(
     if rig.gravity.model == "shipped":
         return gravity_model(constants, tool, constants.mus)
     found = gravity_from_toml(gravity_text, rig.gravity.file)
-    _check_kind(rig, found, is_simulated=is_simulated)
+    check_kind(
+        rig.gravity.file,
+        is_of_simulation=found.is_simulated,
+        is_simulated=is_simulated,
+        instead=_INSTEAD,
+    )
     _check_tool(rig, found)
     return gravity_model(constants, tool, found.mus, found.tool)
 
@@ -75,20 +69,6 @@ def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
     return f"calibrated {found.measured_utc}, rms {found.residual:.2f} N m{moved}"
 
 
-def _check_kind(
-    rig: RigSettings, found: GravityCalibration, *, is_simulated: bool
-) -> None:
-    if found.is_simulated == is_simulated:
-        return
-    kinds = "simulated", "real"
-    theirs, ours = kinds if found.is_simulated else kinds[::-1]
-    raise SettingsError(
-        f"{rig.gravity.file} was measured on a {theirs} arm, this is a {ours} one.",
-        hint='Set [gravity] model = "cad" in rig.toml, or name another file. '
-        f"{_NOTHING}",
-    )
-
-
 def _check_tool(rig: RigSettings, found: GravityCalibration) -> None:
     is_known = found.foot in type(rig.feet).model_fields
     if is_known and fits_tool(found, build_tool(rig, found.foot)):
@@ -99,5 +79,5 @@ def _check_tool(rig: RigSettings, found: GravityCalibration) -> None:
         f"{body.mass:.3f} kg at {body.com.tolist()}, sensor of {sensor.mass:.3f} kg; "
         "rig.toml says otherwise.",
         hint="Run traction calibrate gravity again, or set [gravity] model = "
-        f'"cad" in rig.toml. {_NOTHING}',
+        f'"cad" in rig.toml. {NOTHING}',
     )

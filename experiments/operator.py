@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
@@ -20,6 +21,8 @@ REJECT_REASONS = {
 }
 
 
+# The automatic operator touches so many points, waits so long for the foot to rest.
+TOUCHES, TOUCH_SECONDS, READY_SECONDS = 12, 9.0, 2.2
 AUTO_ATTEMPTS = 8  # at one trial, before the automatic operator gives up
 AUTO_PATIENCE = 60.0  # for a foot that is never lifted and still [s]
 
@@ -30,6 +33,7 @@ class Prompt(Enum):
     SUPPORT = "support"
     CLEAR = "clear"
     MOVING = "moving"
+    TOUCH = "touch"
     LIFT = "lift"
     READY = "ready"
     RECORDING = "recording"
@@ -71,17 +75,39 @@ class AutoKeys:
 
     def answer(self, asked: Asked) -> str:
         """Return a key as soon as it makes sense."""
-        if asked.prompt in {Prompt.SUPPORT, Prompt.CLEAR}:
-            return " "
-        if asked.prompt is Prompt.LIFT:
-            return "q" if asked.since > AUTO_PATIENCE else ""
-        if asked.prompt is Prompt.READY:
-            return " " if asked.since > 2.2 else ""
-        if asked.prompt is Prompt.REVIEW:
-            if asked.is_complete:
-                return "k"
-            return "r5" if asked.attempt < AUTO_ATTEMPTS else "q"
+        answer = _AUTOMATIC.get(asked.prompt)
+        return answer(asked) if answer is not None else ""
+
+
+def _lift_key(asked: Asked) -> str:
+    return "q" if asked.since > AUTO_PATIENCE else ""
+
+
+def _ready_key(asked: Asked) -> str:
+    return " " if asked.since > READY_SECONDS else ""
+
+
+def _review_key(asked: Asked) -> str:
+    if asked.is_complete:
+        return "k"
+    return "r5" if asked.attempt < AUTO_ATTEMPTS else "q"
+
+
+def _touch_key(asked: Asked) -> str:
+    """Touch a dozen points, each until the foot is at rest."""
+    if asked.since < TOUCH_SECONDS:
         return ""
+    return " " if asked.trial <= TOUCHES else "d"
+
+
+_AUTOMATIC: dict[Prompt, Callable[[Asked], str]] = {
+    Prompt.SUPPORT: lambda _: " ",
+    Prompt.CLEAR: lambda _: " ",
+    Prompt.LIFT: _lift_key,
+    Prompt.READY: _ready_key,
+    Prompt.TOUCH: _touch_key,
+    Prompt.REVIEW: _review_key,
+}
 
 
 class ScriptKeys:
@@ -150,6 +176,8 @@ class RehearsedHand:
             self._rehearsal.lift()
         elif asked.prompt is Prompt.CLEAR:
             self._rehearsal.let_go()
+        elif asked.prompt is Prompt.TOUCH:
+            self._rehearsal.touch(asked.trial)
         elif asked.prompt is Prompt.READY:
             self._rehearsal.prepare(asked.trial + 1000 * (asked.attempt - 1))
             self._rehearsal.put_down()

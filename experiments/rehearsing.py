@@ -34,6 +34,10 @@ class Rehearsing(Protocol):
         """Let the hand put the foot down there."""
         ...
 
+    def touch(self, number: int) -> None:
+        """Let the hand touch the ground: the corners 1 to 4, then points between."""
+        ...
+
     def push(self) -> None:
         """Let the hand push the foot across; the truth is written from here on."""
         ...
@@ -81,6 +85,10 @@ class RemoteRehearsal:
     def put_down(self) -> None:
         """Let the hand put the foot down there."""
         self._child.ask("put_down")
+
+    def touch(self, number: int) -> None:
+        """Let the hand touch the ground: the corners 1 to 4, then points between."""
+        self._child.ask("touch", number)
 
     def push(self) -> None:
         """Let the hand push the foot across; the truth is written from here on."""

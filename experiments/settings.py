@@ -1,7 +1,8 @@
 """rig.toml and matrix.toml: read, checked, with an error that says what to write."""
 
 import tomllib
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal, TypeVar, cast
@@ -18,6 +19,7 @@ _Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this ro
 _Vector3 = tuple[_Near, _Near, _Near]
 _Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
+_File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 _M = TypeVar("_M", bound=BaseModel)
 Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
 Mass = Annotated[Number, Field(gt=0, le=20)]
@@ -64,6 +66,7 @@ class SensorSection(_Section):
     height: Number = Field(ge=0, le=0.2, examples=[0.012])
     angle_deg: Number = Field(ge=-360, le=360, examples=[0.0])
     sign: Literal[1, -1] = Field(examples=[1])
+    calibration: _File | None = Field(default=None, examples=["ft_sensor.toml"])
 
     @model_validator(mode="before")
     @classmethod
@@ -83,6 +86,7 @@ class FootSection(_Section):
         examples=[[4e-4, 5.5e-4, 4.5e-4]]
     )
     sole: _Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
+    calibration: _File | None = Field(default=None, examples=["foot_tread.toml"])
 
 
 class Feet(_Section):
@@ -108,9 +112,7 @@ class GravitySection(_Section):
     """
 
     model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
-    file: str = Field(
-        default="gravity.toml", min_length=1, max_length=4096, examples=["gravity.toml"]
-    )
+    file: _File = Field(default="gravity.toml", examples=["gravity.toml"])
 
 
 class LimitSection(_Section):
@@ -186,6 +188,7 @@ class TerrainRow(_Section):
     travel: Number = Field(gt=0.05, le=1.0, examples=[0.45])
     trials: Whole = Field(ge=1, le=99, examples=[10])
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
+    calibration: _File | None = Field(default=None, examples=["terrain_S10.toml"])
 
 
 class MatrixSettings(_Section):
@@ -205,6 +208,7 @@ class Settings:
         matrix_text: text of matrix.toml.
         origin: "shipped default" or the folder of the files.
         folder: where the files are that rig.toml names.
+        calibrations: texts of the calibration files that were applied, by name.
     """
 
     rig: RigSettings
@@ -213,11 +217,35 @@ class Settings:
     matrix_text: str
     origin: str
     folder: Path
+    calibrations: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def by_cad(self) -> "Settings":
         """Return the same with the gravity of the drawings, for a calibration."""
         cad = self.rig.gravity.model_copy(update={"model": "cad"})
         return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
+
+    def with_row(self, row: TerrainRow) -> "Settings":
+        """Return the same with `row` in place of the one of its name."""
+        rows = tuple(row if old.name == row.name else old for old in self._rows)
+        matrix = self.matrix.model_copy(update={"terrains": rows})
+        return replace(self, matrix=matrix)
+
+    def without_sensor(self, foot: str, *, is_mounted: bool) -> "Settings":
+        """Return the same without what was measured of `foot`, for a calibration.
+
+        The mounting of the sensor goes too, unless it `is_mounted` as it was.
+        """
+        nothing = {"calibration": None}
+        old = self.rig.feet.tread if foot == "tread" else self.rig.feet.bare
+        feet = self.rig.feet.model_copy(update={foot: old.model_copy(update=nothing)})
+        changed: dict[str, object] = {"feet": feet}
+        if not is_mounted:
+            changed["ft_sensor"] = self.rig.ft_sensor.model_copy(update=nothing)
+        return replace(self, rig=self.rig.model_copy(update=changed))
+
+    @property
+    def _rows(self) -> tuple[TerrainRow, ...]:
+        return self.matrix.terrains
 
     def row(self, terrain: str) -> TerrainRow:
         """Return the matrix row of `terrain`.

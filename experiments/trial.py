@@ -100,6 +100,7 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
         "diff.patch": facts.diff,
     }
+    attachments.update(rig.settings.calibrations)
     if rig.gravity_text:
         attachments["gravity.toml"] = rig.gravity_text
     return TrialHeader(

@@ -21,6 +21,7 @@ from fakes.push import (
 
 LIFT = 0.06  # how high the foot is carried above the plane [m]
 SPEED = 0.25  # mean speed of carrying [m/s]
+_CAREFUL = 0.12  # m/s, of a hand that touches corners
 _CARRY_K, _CARRY_B = 800.0, 100.0  # N/m, N s/m
 _REST_B = 18.0  # of a hand that lies on the arm, along z [N s/m]
 
@@ -43,6 +44,7 @@ class Hand:
         self._start: Vector3 | None = None
         self._path: list[Vector3] = []
         self._moved = 0.0
+        self._speed = SPEED
         self._push: Push | None = None
         self._pending: tuple[Pace, np.random.Generator] | None = None
         self._anchor = 0.0
@@ -61,6 +63,7 @@ class Hand:
     def carry(self, *points: Vector3) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
         self.phase = Phase.CARRY
+        self._speed = SPEED
         self._path = list(points)
         self._start = None
         self._rests_then = False
@@ -73,6 +76,12 @@ class Hand:
         """Lower the foot onto the ground at the far end and let it rest there."""
         self.carry((0.0, 0.0, ground + 0.01), (0.0, 0.0, ground - 0.002))
         self._rests_then = True
+
+    def touch(self, x: float, y: float, ground: float) -> None:
+        """Carry the foot above a point, lower it there, and press lightly."""
+        above, low = (x, y, LIFT), (x, y, ground + 0.01)
+        self.carry((math.nan, math.nan, LIFT), above, low, (x, y, ground - 0.004))
+        self._speed = _CAREFUL
 
     def push(self, pace: Pace, rng: np.random.Generator) -> None:
         """Push the foot across the container."""
@@ -124,9 +133,9 @@ class Hand:
         start = self._start
         goal = self._path[0]
         if math.isnan(goal[0]):
-            goal = (start[0], goal[1], goal[2])
+            goal = (start[0], start[1] if math.isnan(goal[1]) else goal[1], goal[2])
         step = (goal[0] - start[0], goal[1] - start[1], goal[2] - start[2])
-        duration = max(math.hypot(*step) / SPEED, 0.4)
+        duration = max(math.hypot(*step) / self._speed, 0.4)
         self._moved += self._dt
         s = min(self._moved / duration, 1.0)
         share = s * s * s * (10.0 + s * (-15.0 + 6.0 * s))

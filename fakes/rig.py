@@ -30,6 +30,7 @@ from wam.model import ArmModel
 from wam.tool import Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
+ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
 _CLOSE = 1e-9  # m and rad, where the search for the start pose ends
 _LARGEST_STEP = 0.5  # rad
 
@@ -159,6 +160,14 @@ class FakeRig:
         self.plant.terrain = self.ground
 
 
+def _place(number: int, travel: float) -> tuple[float, float]:
+    """Return where a person touches the container the `number`th time [m]."""
+    if number <= 4:
+        return (0.0 if number <= 2 else travel), (-ASIDE if number % 2 else ASIDE)
+    share = number * 0.618 % 1.0  # spreads out, whatever the number
+    return share * travel, ASIDE * (2.0 * (number * 0.383 % 1.0) - 1.0)
+
+
 class Rehearsal:
     """What only the simulation can be asked: hand, pendant, bed, faults, truth.
 
@@ -198,6 +207,16 @@ class Rehearsal:
     def put_down(self) -> None:
         """Let the hand put the foot down at the far end."""
         self._rig.plant.hand.put_down(self._rig.ground.surface(0.0))
+
+    def touch(self, number: int) -> None:
+        """Let the hand touch the ground with the sole and stay there.
+
+        1 to 4: far left, far right, near left, near right, seen from the arm; more:
+        points between them.
+        """
+        x, y = _place(number, self._rig.scene.frame.travel)
+        ground = self._rig.ground.surface(x)
+        self._rig.plant.hand.touch(x, y, ground)
 
     def push(self) -> None:
         """Let the hand push the foot across; the tare error of a trial begins here."""

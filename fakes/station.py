@@ -124,6 +124,7 @@ def rehearsal_handlers(rig: FakeRig) -> dict[str, Handler]:
         "lift": lambda _: rehearsal.lift(),
         "let_go": lambda _: rehearsal.let_go(),
         "put_down": lambda _: rehearsal.put_down(),
+        "touch": rehearsal.touch,
         "push": lambda _: rehearsal.push(),
         "pendant": rehearsal.pendant,
         "inject": rehearsal.inject,

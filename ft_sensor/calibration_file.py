@@ -81,6 +81,16 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
         raise SettingsError(f"terrain.toml is incomplete: {error}.") from error
 
 
+def terrain_facts(text: str) -> dict[str, str]:
+    """Return what else `terrain.toml` says, empty where it says nothing.
+
+    Raises:
+        SettingsError: the text is no TOML.
+    """
+    facts = _parse(text, "terrain.toml").get("facts", {})
+    return {str(key): str(value) for key, value in facts.items()}
+
+
 def _parse(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)

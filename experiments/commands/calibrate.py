@@ -7,21 +7,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.settings import Settings
+    from experiments.settings import Settings, TerrainRow
     from experiments.stage import Stage
 
 EXAMPLES = """\
   traction calibrate gravity                what the arm weighs, with its tool
+  traction calibrate sensor                 mounting and offset of the sensor, its foot
+  traction calibrate foot --terrain Tf      another foot on the same sensor
+  traction calibrate terrain --terrain S10  where the container stands
   traction calibrate gravity --fake --fast  the same steps with simulated devices"""
 
-_FEWEST, _MOST = 3, 60  # poses
+_MOST = 60  # poses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `calibrate`."""
     parser.add_argument("what", choices=tuple(_WORK), help="what is calibrated")
     parser.add_argument(
-        "--terrain", metavar="NAME", help="row of the matrix, for its foot (first)"
+        "--terrain",
+        metavar="NAME",
+        help="row of the matrix: its foot, its container (the first row)",
     )
     parser.add_argument("--fake", action="store_true", help="simulated devices")
     parser.add_argument(
@@ -55,9 +60,10 @@ def run(args: argparse.Namespace) -> int:
     from experiments.terminal import keyboard
 
     _check_arguments(args)
-    settings = load_settings(args.config).by_cad()
+    settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
-    out = args.out or _place(settings, is_fake=args.fake)
+    settings, row = _without_old(args.what, settings, row)
+    out = args.out or _place(args.what, settings, row, is_fake=args.fake)
     _check_out(out)
     console = Console(color=not args.no_color)
     keys = choose_keys(args.operator_script, is_fake=args.fake)
@@ -80,19 +86,75 @@ def _gravity(stage: Stage, args: argparse.Namespace, out: Path) -> None:
 
     found = GravityGuide(stage).run(args.poses, is_forced=args.force)
     write_new_text(out, gravity_to_toml(found))
-    stage.company.console.say(
-        f'Written: {out}. To use it: [gravity] model = "calibrated" in rig.toml.'
-    )
+    _say_use(stage, out, '[gravity] model = "calibrated"', "rig.toml")
 
 
-_WORK = {"gravity": _gravity}
+def _sensor(stage: Stage, args: argparse.Namespace, out: Path) -> None:
+    from experiments.calibrating.sensor import SensorGuide
+    from experiments.store import write_new_text
+    from ft_sensor.sensor_calibration import sensor_to_toml
+
+    tool = stage.rig.model.tool
+    assert tool is not None
+    is_foot = args.what == "foot"
+    mounting = (tool.sensor_angle, tool.sensor_sign) if is_foot else None
+    found = SensorGuide(stage).run(args.poses, mounting, is_forced=args.force)
+    write_new_text(out, sensor_to_toml(found))
+    section = f"feet.{found.foot}" if is_foot else "ft_sensor"
+    _say_use(stage, out, f'calibration = "{out.name}" in [{section}]', "rig.toml")
 
 
-def _place(settings: Settings, *, is_fake: bool) -> Path:
-    """Return where rig.toml expects the file; what is simulated is marked."""
+def _terrain(stage: Stage, args: argparse.Namespace, out: Path) -> None:
+    from experiments.calibrating.terrain import TerrainGuide
+    from experiments.store import iso_utc, write_new_text
+    from ft_sensor.calibration_file import terrain_to_toml
+
+    rig = stage.rig
+    fit, points = TerrainGuide(stage).run(is_forced=args.force)
+    facts = {
+        "simulated": str(rig.is_simulated).lower(),
+        "measured_utc": iso_utc(rig.clock.utc_ns()),
+        "residual": f"{fit.residual:.6f}",
+        "roll": f"{fit.roll:.6f}",
+        "points": str([point.tolist() for point in points]),
+    }
+    write_new_text(out, terrain_to_toml(rig.row.name, fit.frame, facts))
+    line = f'calibration = "{out.name}" in the row of {rig.row.name}'
+    _say_use(stage, out, line, "matrix.toml")
+
+
+def _say_use(stage: Stage, out: Path, line: str, file: str) -> None:
+    stage.company.console.say(f"Written: {out}. To use it: {line} of {file}.")
+
+
+_WORK = {"gravity": _gravity, "sensor": _sensor, "foot": _sensor, "terrain": _terrain}
+_FEWEST = {"gravity": 3, "sensor": 6, "foot": 6}  # poses
+
+
+def _without_old(
+    what: str, settings: Settings, row: TerrainRow
+) -> tuple[Settings, TerrainRow]:
+    """Return settings and row without the calibration that is made anew."""
+    if what == "gravity":
+        return settings.by_cad(), row
+    if what == "terrain":
+        bare = row.model_copy(update={"calibration": None})
+        return settings.with_row(bare), bare
+    return settings.without_sensor(row.foot, is_mounted=what == "foot"), row
+
+
+def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
+    """Return where the file goes, beside rig.toml; what is simulated is marked."""
     from experiments.gravity_choice import gravity_path
 
+    names = {
+        "sensor": "ft_sensor.toml",
+        "foot": f"foot_{row.foot}.toml",
+        "terrain": f"terrain_{row.name}.toml",
+    }
     path = gravity_path(settings)
+    if what != "gravity":
+        path = settings.folder / names[what]
     return path.with_name(f"{path.stem}.fake{path.suffix}") if is_fake else path
 
 
@@ -104,9 +166,10 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(
             "--fast and --operator-script work only with --fake.", hint=nothing
         )
-    if not _FEWEST <= args.poses <= _MOST:
+    fewest = _FEWEST.get(args.what, 0)
+    if not fewest <= args.poses <= _MOST:
         raise SettingsError(
-            f"--poses {args.poses} - expected a whole number {_FEWEST}..{_MOST}, "
+            f"--poses {args.poses} - expected a whole number {fewest}..{_MOST}, "
             "e.g. 12.",
             hint=nothing,
         )

@@ -47,8 +47,8 @@ def run(args: argparse.Namespace) -> int:
     from experiments.company import StopFlag, signals_ask
     from experiments.console import Console
     from experiments.pendant import PRESSES, Lines, Pendant
-    from experiments.rigs import build_server
     from experiments.settings import load_settings
+    from experiments.simulated import build_server
 
     interface, channel = _split(args.can)
     script = _read_script(args.script)

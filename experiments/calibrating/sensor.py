@@ -1,0 +1,113 @@
+"""traction calibrate sensor, foot: turn the foot to all sides, fit what it weighs."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition.board import WRENCH_SLOTS
+from acquisition.errors import PreflightError
+from acquisition.sample import Record
+from experiments.calibrating.walk import Walk
+from experiments.stage import Stage
+from experiments.store import iso_utc
+from ft_sensor.calibration import SensorFit, check_residual, fit_sensor
+from ft_sensor.sensor_calibration import SensorCalibration
+from wam.calibration_poses import Halt, choose_orientations, plan_halts
+from wam.constants import Array
+
+AVERAGE = 2.0  # s of readings that are averaged in each orientation
+_FEWEST = 100  # readings in an average
+
+
+class SensorGuide:
+    """Leads arm and foot through the orientations of a sensor's calibration."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._walk = Walk(stage)
+        self._rig = stage.rig
+        self._console = stage.company.console
+
+    def run(
+        self, count: int, mounting: tuple[float, float] | None, *, is_forced: bool
+    ) -> SensorCalibration:
+        """Measure in `count` orientations and return the calibration.
+
+        The first one is measured again at the end: what has changed is drift.
+
+        Args:
+            count: how many orientations.
+            mounting: angle [rad] and sign where they are known; None = fitted too.
+            is_forced: accept a fit that `check_residual` refuses.
+
+        Raises:
+            SettingsError: no safe way, or the fit is bad.
+            PreflightError: not activated, touched meanwhile, or too few readings.
+            StopAskedError, FaultedError: as `Stage.tick`.
+        """
+        model = self._rig.model
+
+        def plan(start: Array, floor: float) -> list[Halt]:
+            poses = choose_orientations(model, count, floor)
+            poses.append(poses[0])
+            return plan_halts(model, start, poses, floor, is_two_sided=False)
+
+        found = self._measure(self._walk.begin(plan, AVERAGE))
+        self._walk.end()
+        rotations = np.array([rotation for rotation, _ in found])
+        readings = np.array([reading for _, reading in found])
+        fit = fit_sensor(rotations[:-1], readings[:-1], mounting)
+        drift = float(np.linalg.norm(readings[-1, :3] - readings[0, :3]))
+        self._say(fit, drift)
+        check_residual(fit, is_forced=is_forced)
+        return SensorCalibration(
+            fit=fit,
+            foot=self._rig.row.foot,
+            drift=drift,
+            measured_utc=iso_utc(self._rig.clock.utc_ns()),
+            is_simulated=self._rig.is_simulated,
+            rotations=rotations,
+            readings=readings,
+        )
+
+    def _measure(self, halts: Sequence[Halt]) -> list[tuple[Array, Array]]:
+        found: list[tuple[Array, Array]] = []
+        for halt in halts:
+            self._walk.go_to(halt)
+            if halt.pose is None:
+                continue
+            q, _ = self._walk.rest(AVERAGE)
+            found.append((self._rig.model.plate_pose(q)[1], self._mean_reading()))
+            self._console.say(f"orientation {len(found)} measured")
+        return found
+
+    def _mean_reading(self) -> Array:
+        """Return the mean of the last two seconds [N, N m], shape (6,).
+
+        Raises:
+            PreflightError: too few readings, or one that is not valid.
+        """
+        records: Record = self._rig.board.wrenches.last(WRENCH_SLOTS)
+        since = self._rig.clock.now_ns() - int(AVERAGE * 1e9)
+        records = records[records["t_ns"].astype(np.int64) >= since]
+        bad = int(np.count_nonzero(~records["is_valid"] | records["is_saturated"]))
+        if len(records) < _FEWEST or bad:
+            raise PreflightError(
+                f"{len(records)} readings in {AVERAGE:g} s (at least {_FEWEST}), "
+                f"{bad} of them flagged.",
+                hint="Check the sensor's cable and load, then start again.",
+            )
+        return records["wrench"].mean(axis=0)
+
+    def _say(self, fit: SensorFit, drift: float) -> None:
+        com = ", ".join(f"{1e3 * value:.1f}" for value in fit.com)
+        bias = ", ".join(f"{value:.2f}" for value in fit.bias[:3])
+        say = self._console.say
+        say(f"mass {fit.mass:.3f} kg, centre {com} mm in the sensor frame")
+        say(
+            f"mounted at {np.degrees(fit.angle):.1f} degrees about z7, sign "
+            f"{fit.sign:+.0f}, bias {bias} N"
+        )
+        say(
+            f"residual {fit.residual:.3f} N, {fit.torque_residual:.4f} N m rms; the "
+            f"first orientation had changed by {drift:.2f} N at the end"
+        )

@@ -1,0 +1,104 @@
+"""traction calibrate terrain: touch the container with the sole, fit its frame."""
+
+import numpy as np
+
+from acquisition.cycle import ArmState
+from acquisition.errors import PreflightError
+from experiments.activation import activate
+from experiments.operator import Prompt
+from experiments.stage import Stage
+from experiments.trial import TrialName
+from ft_sensor.terrain_fit import CORNERS, TerrainFit, check_terrain, fit_terrain
+from wam.constants import Array
+
+AVERAGE = 0.3  # s of positions that are averaged
+STILL = 0.003  # m that the sole may move meanwhile
+MOST = 60  # points
+
+
+class TerrainGuide:
+    """Asks a person to touch the corners of a container, and takes the points."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._rig = stage.rig
+        self._console = stage.company.console
+
+    def run(self, *, is_forced: bool) -> tuple[TerrainFit, list[Array]]:
+        """Return the container as touched, and the points [m], shape (3,) each.
+
+        Args:
+            is_forced: accept a container that `check_terrain` refuses.
+
+        Raises:
+            SettingsError: the corners make no container, or not this one.
+            PreflightError: not activated.
+            StopAskedError, FaultedError: as `Stage.tick`.
+        """
+        activate(self._stage)
+        self._stage.control.request(ArmState.FLOAT)
+        points = self._touch()
+        self._stage.control.request(ArmState.HOLD)
+        self._console.say("Support the arm, it goes idle. [space]")
+        while self._stage.tick(Prompt.SUPPORT) != " ":
+            pass
+        self._stage.make_safe()
+        fit = fit_terrain(np.array(points))
+        self._say(fit, len(points))
+        check_terrain(fit, self._rig.frame, is_forced=is_forced)
+        return fit, points
+
+    def _touch(self) -> list[Array]:
+        points: list[Array] = []
+        while len(points) < MOST:
+            number = len(points) + 1
+            is_corner = number <= len(CORNERS)
+            place = f"{CORNERS[number - 1]} corner" if is_corner else "one more point"
+            done = "" if is_corner else ", [d] when done"
+            self._console.say(
+                f"Touch the {place} with the sole, then [space]{done}.   (far left = "
+                "away from the arm, its left)"
+                if number == 1
+                else f"Touch the {place} with the sole, then [space]{done}."
+            )
+            point = self._point(TrialName(number, 1), is_corner=is_corner)
+            if point is None:
+                break
+            points.append(point)
+        return points
+
+    def _point(self, name: TrialName, *, is_corner: bool) -> Array | None:
+        """Return the sole's mean position [m], shape (3,); None = no more."""
+        while True:
+            key = self._stage.tick(Prompt.TOUCH, name)
+            if key == "d" and not is_corner:
+                return None
+            if key != " ":
+                continue
+            try:
+                return self._at_rest()
+            except PreflightError as error:
+                self._console.say(str(error))
+
+    def _at_rest(self) -> Array:
+        self._stage.control.advance(AVERAGE)
+        at = self._stage.control.last(AVERAGE)["foot_position"]
+        moved = float(np.ptp(at, axis=0).max())
+        if moved > STILL:
+            raise PreflightError(
+                f"The sole moved by {1e3 * moved:.1f} mm (limit {1e3 * STILL:g}).",
+                hint="Hold it still on the ground, then [space] again.",
+            )
+        return at.mean(axis=0)
+
+    def _say(self, fit: TerrainFit, points: int) -> None:
+        frame, row = fit.frame, self._rig.row
+        x, y, z = frame.far_end
+        say = self._console.say
+        say(
+            f"incline {np.degrees(frame.incline):.2f} degrees (matrix "
+            f"{row.incline_deg:g}), heading {np.degrees(frame.heading):.2f} (matrix "
+            f"{row.heading_deg:g}), across {np.degrees(fit.roll):+.2f}"
+        )
+        say(f"far end {x:.3f}, {y:.3f}, {z:.3f} m, travel {frame.travel:.3f} m")
+        say(f"{points} points, {1e3 * fit.residual:.1f} mm rms off the plane")

@@ -1,0 +1,147 @@
+"""The simulated world under a session: what it is told, and how it is stepped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from acquisition.board import Board
+from acquisition.clock import Clock, SystemClock
+from acquisition.devices import WrenchSensor
+from experiments.crews import Crew, InlineCrew
+from experiments.parts import (
+    LoopParts,
+    build_arm,
+    build_sensor,
+    build_tool,
+    open_bus_sensor,
+    terrain_frame,
+)
+from experiments.rehearsing import Rehearsing
+from experiments.settings import RigSettings, Settings, TerrainRow
+from wam.can_link import CanLink
+from wam.model import ArmModel
+from wam.tool import tool_facts, tool_of
+
+if TYPE_CHECKING:
+    from fakes.serve import PuckServer
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What is simulated: the settings as written, before any calibration.
+
+    Attributes:
+        rig: rig.toml.
+        row: row of the matrix.
+        seed: of everything random.
+    """
+
+    rig: RigSettings
+    row: TerrainRow
+    seed: int
+
+    def facts(self) -> dict[str, Any]:
+        """Return the world in plain values, for a process of its own."""
+        frame = terrain_frame(self.row)
+        scene = {
+            "terrain": self.row.name,
+            "stones": self.row.stones,
+            "foot": self.row.foot,
+            "frame": {
+                "incline": frame.incline,
+                "heading": frame.heading,
+                "far_end": list(frame.far_end),
+                "travel": frame.travel,
+            },
+            "start_q": list(self.row.start_q),
+            "seed": self.seed,
+        }
+        return {
+            "scene": scene,
+            "tool": tool_facts(build_tool(self.rig, self.row.foot)),
+            "has_sensor": self.rig.ft_sensor.kind == "barrett",
+        }
+
+
+def stepped(
+    world: World,
+    settings: Settings,
+    row: TerrainRow,
+    models: tuple[ArmModel, ArmModel],
+    board: Board,
+) -> tuple[Clock, Crew, Rehearsing]:
+    """Return (clock, crew, handle) of a simulation that runs in this thread.
+
+    `models`: the arm with its tool, and as the control law weighs it.
+    """
+    from fakes.clock import SteppedClock
+    from fakes.network_options import NetworkOptions
+    from fakes.rig import FakeRig, Rehearsal
+    from fakes.station import scene_of
+
+    clock, facts = SteppedClock(), world.facts()
+    model, law_model = models
+    is_on_bus: bool = facts["has_sensor"]
+    network = NetworkOptions(has_sensor=is_on_bus)
+    simulation = FakeRig(
+        scene_of(facts["scene"]),
+        model.constants,
+        tool_of(facts["tool"]),
+        clock,
+        network=network,
+    )
+    clock.world = simulation
+    link = CanLink(simulation.bus)
+    arm = build_arm(settings.rig, model.constants, link, board, clock)
+
+    def sensor() -> WrenchSensor:
+        if is_on_bus:
+            return open_bus_sensor(arm, link, clock)
+        port = simulation.open_port()
+        serial = build_sensor(settings.rig, port, clock, is_simulated=True)
+        serial.open()
+        return serial
+
+    def parts(opened: WrenchSensor) -> LoopParts:
+        return LoopParts(
+            rig=settings.rig,
+            row=row,
+            model=model,
+            law_model=law_model,
+            arm=arm,
+            sensor=opened,
+            board=board,
+            clock=clock,
+            is_simulated=True,
+        )
+
+    crew = InlineCrew(board, clock, arm, sensor, parts)
+    return clock, crew, Rehearsal(simulation)
+
+
+def build_server(
+    settings: Settings, interface: str, channel: str, *, is_idle_first: bool
+) -> PuckServer:
+    """Return a simulated arm that serves its pucks to other programs.
+
+    The arm is at its home position, where an operator puts it before zeroing.
+
+    Args:
+        settings: all settings; the first terrain of the matrix names the foot.
+        interface: "traction-fake" or an interface of python-can.
+        channel: path of the socket, or the interface's channel.
+        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
+
+    Raises:
+        SettingsError: the socket's path is in use or cannot be one.
+        LinkError: the bus cannot be opened.
+    """
+    from fakes.serve import build_home_server, open_can_port
+
+    row = settings.matrix.terrains[0]
+    port = open_can_port(interface, channel, settings.rig.can.bitrate)
+    tool = build_tool(settings.rig, row.foot)
+    return build_home_server(
+        port, tool, terrain_frame(row), SystemClock(), is_idle_first=is_idle_first
+    )
