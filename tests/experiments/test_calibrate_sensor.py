@@ -158,7 +158,7 @@ def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated)
     path = only_session(tmp_path / "data") / "trials" / "T01.mcap"
     # A wrong sign or angle makes it several newtons; drift and bias 0.3-0.5.
     assert force_error(path) < 1.0
-    names = TrialReader(path).attachments()
+    names = TrialReader(path).attachments
     assert "calibration:ft_sensor.toml" in names
 
 
