@@ -1,5 +1,6 @@
 """The recorder: drains the board into a trial file, every 20 ms."""
 
+import contextlib
 import json
 from pathlib import Path
 from typing import Protocol
@@ -58,7 +59,7 @@ class TrialRecording(Protocol):
         ...
 
     def abandon(self) -> None:
-        """Let go of a file that can no longer be written; it stays as `.partial`."""
+        """Stop recording; what there is goes to the disk and stays as `.partial`."""
         ...
 
 
@@ -119,7 +120,7 @@ class Recorder:
                 self._write_new(self._writer)
             except TrialFileError as error:
                 self.failure = error
-                self.abandon()
+                self._let_go()
         self._board.beats.beat(Role.RECORDER, self._clock.now_ns())
 
     def event(self, level: int, name: str, text: str) -> None:
@@ -130,7 +131,7 @@ class Recorder:
             self._writer.write_event(self._clock.now_ns(), level, name, text)
         except TrialFileError as error:
             self.failure = error
-            self.abandon()
+            self._let_go()
 
     def finish(self, stop_reason: str) -> Verified:
         """End, verify and publish the file; see `seal`."""
@@ -144,7 +145,16 @@ class Recorder:
         return seal(writer, stop_reason)
 
     def abandon(self) -> None:
-        """Let go of a file that can no longer be written; it stays as `.partial`."""
+        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        writer = self._writer
+        if writer is not None:
+            with contextlib.suppress(TrialFileError):
+                self._write_new(writer)
+                writer.flush()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Leave the file as it stands."""
         if self._writer is not None:
             self._writer.close_partial()
             self._writer = None

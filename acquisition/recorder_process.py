@@ -85,7 +85,7 @@ class RemoteRecorder:
         return _VERIFIED.validate_python(self._child.ask("finish", stop_reason))
 
     def abandon(self) -> None:
-        """Let go of a file that can no longer be written; it stays as `.partial`."""
+        """Stop recording; what there is goes to the disk and stays as `.partial`."""
         if self._is_recording:
             self._is_recording = False
             if self._child.is_alive:

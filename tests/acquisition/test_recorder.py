@@ -11,6 +11,7 @@ from acquisition.messages import CYCLE
 from acquisition.recorder import Recorder
 from acquisition.shared_sensor import publish
 from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.recover import recover
 from acquisition.trial_file.writer import TrialWriter
 from fakes.clock import SteppedClock
 from tests.acquisition.ros import decode, messages_of
@@ -141,14 +142,12 @@ def test_draining_without_a_trial_does_nothing(desk):
 def test_the_file_is_forced_to_the_disk_every_quarter_second(desk, flushes):
     desk.start()
     desk.run(500, drain_every=10)
-    desk.recorder.abandon()
     assert flushes == [130, 260, 390]  # first drain at or after 0.25 s: 130 cycles
 
 
 def test_a_fast_drain_does_not_flush_more_often(desk, flushes):
     desk.start()
     desk.run(500, drain_every=1)
-    desk.recorder.abandon()
     assert flushes == [125, 250, 375, 500]
 
 
@@ -259,3 +258,12 @@ def test_abandoning_twice_does_nothing(desk):
     desk.recorder.abandon()
     desk.recorder.abandon()
     assert not desk.recorder.is_recording
+
+
+def test_what_was_measured_before_a_trial_is_abandoned_is_on_the_disk(desk):
+    desk.start()
+    desk.run(137)
+    desk.recorder.abandon()
+    partial = desk.path.with_name(desk.path.name + ".partial")
+    saved = recover(partial).path
+    assert TrialReader(saved).cycles().data["cycle"].tolist() == list(range(137))
