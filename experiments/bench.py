@@ -19,6 +19,7 @@ from acquisition.sample import Record
 from acquisition.timing import LoopReport, loop_report
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader
+from experiments.trial import TIME_LIMIT
 
 if TYPE_CHECKING:
     from experiments.rigs import Rig
@@ -54,7 +55,7 @@ class BenchReport:
         loop: quantiles of the loop's times.
         processes: what each process used.
         is_powered: the control law ran; otherwise the arm was idle.
-        recorded: cycles in the recorded file.
+        recorded: cycles in the recorded files.
         lost: cycles the recorder lost.
         largest_backlog: cycles that waited for the recorder at most.
     """
@@ -92,19 +93,15 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
     desk.advance(SETTLE)
     collected = _Collector(rig, seconds)
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "bench.mcap"
-        rig.crew.recorder.start(path, _header())
+        trials = _Trials(rig, Path(folder))
         before = {name: _usage(pid) for name, pid in processes.items()}
         start_ns = rig.clock.now_ns()
         warm = min(seconds / 2, WARM)
-        desk.advance(warm)
+        trials.record(warm)
         middle = {name: _usage(pid) for name, pid in processes.items()}
-        desk.advance(seconds - warm)
+        trials.record(seconds - warm)
         passed = (rig.clock.now_ns() - start_ns) / NS_PER_S
         after = {name: _usage(pid) for name, pid in processes.items()}
-        largest_backlog = rig.crew.recorder.largest_backlog
-        rig.crew.recorder.finish("bench")
-        result = TrialReader(path).metadata["result"]
     report = loop_report(collected.take())
     if report is None:
         raise PreflightError("No cycle ran.", hint="Try again; then: traction check.")
@@ -116,10 +113,37 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
         loop=report,
         processes=uses,
         is_powered=is_powered,
-        recorded=int(result["cycles_written"]),
-        lost=int(result["lost_in_ring"]),
-        largest_backlog=largest_backlog,
+        recorded=trials.recorded,
+        lost=trials.lost,
+        largest_backlog=trials.largest_backlog,
     )
+
+
+class _Trials:
+    """Records one trial after the other, none longer than a trial may be.
+
+    Each file begins with the second before it, so a second of every trial is recorded
+    twice; each is verified, counted and thrown away.
+    """
+
+    def __init__(self, rig: Rig, folder: Path) -> None:
+        self.recorded = self.lost = self.largest_backlog = 0
+        self._rig = rig
+        self._path = folder / "bench.mcap"
+
+    def record(self, seconds: float) -> None:
+        """Let the loop run for `seconds` with the recorder on."""
+        recorder = self._rig.crew.recorder
+        while seconds > 0.0:
+            recorder.start(self._path, _header())
+            self._rig.crew.desk.advance(min(seconds, TIME_LIMIT))
+            seconds -= TIME_LIMIT
+            self.largest_backlog = max(self.largest_backlog, recorder.largest_backlog)
+            recorder.finish("bench")
+            result = TrialReader(self._path).metadata["result"]
+            self.recorded += int(result["cycles_written"])
+            self.lost += int(result["lost_in_ring"])
+            self._path.unlink()
 
 
 class _Collector:
