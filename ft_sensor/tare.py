@@ -16,7 +16,8 @@ Wrench = tuple[float, float, float, float, float, float]
 SPREAD_LIMIT = 0.5  # [N]
 MIN_DURATION = 1.0  # [s]
 WINDOW = 0.2  # [s]
-_MIN_PER_WINDOW = 50  # half of what the slowest accepted sensor sends in 0.2 s
+SLOWEST = 500.0  # what the slowest sensor in use sends [Hz]
+_FEWEST = 0.5  # share of its samples that a window must hold
 _AGAIN = "[space] to try again."
 
 
@@ -47,19 +48,22 @@ class TareResult:
 
 
 def tare(
-    samples: Sequence[WrenchSample], spread_limit: float = SPREAD_LIMIT
+    samples: Sequence[WrenchSample],
+    spread_limit: float = SPREAD_LIMIT,
+    rate: float = SLOWEST,
 ) -> TareResult:
     """Return the mean of at least one second of raw samples, oldest first.
 
     White noise averages away in 0.2 s means; what still varies between them is a
-    touch or a drift. Device-side zeroing is not used: it is lost at power-off.
+    touch or a drift. Device-side zeroing is not used: it is lost at power-off. Each
+    0.2 s must hold half of the samples that `rate` [Hz] promises.
 
     Raises:
         TareError: too few samples or a gap, a flagged or non-finite sample, or a
             spread above `spread_limit` [N].
     """
     _refuse_flagged(samples)
-    windows = _windows(samples)
+    windows = _windows(samples, _FEWEST * rate * WINDOW)
     wrenches = np.array([sample.wrench for sample in samples], dtype=np.float64)
     if not np.isfinite(wrenches).all():
         raise TareError(
@@ -91,7 +95,7 @@ def _refuse_flagged(samples: Sequence[WrenchSample]) -> None:
         )
 
 
-def _windows(samples: Sequence[WrenchSample]) -> NDArray[np.int64]:
+def _windows(samples: Sequence[WrenchSample], least: float) -> NDArray[np.int64]:
     """Return the number of the 0.2 s window of each sample, shape (n,).
 
     A sample stands for one period, so n samples last n / (n - 1) times the time from
@@ -114,10 +118,10 @@ def _windows(samples: Sequence[WrenchSample]) -> NDArray[np.int64]:
     whole = int((lasted + grace) / window_ns)
     windows = np.minimum(windows, whole - 1)
     fewest = min(int(np.count_nonzero(windows == k)) for k in range(whole))
-    if fewest < _MIN_PER_WINDOW:
+    if fewest < least:
         raise TareError(
             f"Only {fewest} F/T samples in one {WINDOW:g} s of the tare "
-            f"(at least {_MIN_PER_WINDOW}).",
+            f"(at least {least:.0f}).",
             hint=f"Check the sensor's rate and cable. {_AGAIN}",
         )
     return windows
