@@ -4,9 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import savgol_filter
-from scipy.spatial.transform import Rotation
-
 from acquisition.devices import WrenchSample
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, tare
@@ -15,10 +12,10 @@ REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
 PRESS, CONTOUR = REAL / "granular_press_ft", REAL / "kuleuven_contour"
 RATE = 100.0  # Hz, of the recorded Bota sensor
 MOUNTINGS = {
-    **dict.fromkeys("ac", [("x", 135.0)]),
-    **dict.fromkeys("be", [("y", 180.0), ("x", 135.0)]),
-    "d": [("y", 90.0), ("x", 135.0)],
-    "f": [("y", -90.0), ("x", 135.0)],
+    **dict.fromkeys("ac", (("x", 135.0),)),
+    **dict.fromkeys("be", (("y", 180.0), ("x", 135.0))),
+    "d": (("y", 90.0), ("x", 135.0)),
+    "f": (("y", -90.0), ("x", 135.0)),
 }
 
 pytestmark = [
@@ -65,6 +62,8 @@ def test_a_press_cannot_be_taken_for_a_tare():
 
 def upright(*turns):
     """Return the product of elementary rotations (axis, degrees)."""
+    from scipy.spatial.transform import Rotation
+
     product = Rotation.identity()
     for axis, angle in turns:
         product *= Rotation.from_euler(axis, angle, degrees=True)
@@ -73,6 +72,8 @@ def upright(*turns):
 
 def true_force(raw, letter):
     """Return (force of the tool [N], tool point [m], rows where the pose is new)."""
+    from scipy.spatial.transform import Rotation
+
     up = upright(("x", 90))
     tracker = up * Rotation.from_quat(raw[:, 4:8], scalar_first=True)
     mounting = upright(*MOUNTINGS[letter]) * upright(("z", -90), ("x", 225)).inv()
@@ -94,6 +95,8 @@ def resampled(grid, t, values):
 @pytest.mark.parametrize("letter", "abcdef")
 @pytest.mark.parametrize("number", [1, 2])
 def test_forces_of_a_guided_tool_agree_with_the_published_ones(letter, number):
+    from scipy.signal import savgol_filter
+
     raw = np.loadtxt(CONTOUR / f"contour_{letter}_{number}.dat", skiprows=1)
     published = np.loadtxt(
         CONTOUR / f"kuleuven_{letter}_{number}.csv", delimiter=",", skiprows=1
