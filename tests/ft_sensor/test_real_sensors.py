@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from acquisition.devices import WrenchSample
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, tare
