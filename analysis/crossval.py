@@ -12,8 +12,9 @@ import numpy as np
 
 from acquisition.errors import TractionError
 from analysis.metrics import Score, mean_absolute_error, score
-from analysis.models import FITTERS, TITLES, FitOptions, FittedModel, Rows
+from analysis.models import BEYOND, FITTERS, TITLES, FitOptions, FittedModel
 from analysis.prepare import PreparedTrial
+from analysis.rows import Rows, Training
 from analysis.series import Indices
 
 Prepared = Mapping[str, Sequence[PreparedTrial]]
@@ -27,6 +28,7 @@ class FoldTask:
         terrain: terrain of the models.
         fold: number of the trial left out, from 0.
         training: kept samples of the other trials.
+        lengths: number of samples of each of them.
         own: kept samples of the trial left out.
         others: for every other terrain the trials this fold is tested on.
         options: how to fit.
@@ -35,6 +37,7 @@ class FoldTask:
     terrain: str
     fold: int
     training: Rows
+    lengths: tuple[int, ...]
     own: Rows
     others: Mapping[str, tuple[Rows, ...]]
     options: FitOptions
@@ -102,12 +105,13 @@ def plan_folds(
 def run_fold(task: FoldTask) -> FoldResult:
     """Return the models of one fold and their errors."""
     chosen = choose_rows(task)
-    subset = task.training.take(chosen)
+    training = Training(task.training, task.lengths, chosen)
     models: dict[str, ModelFold] = {}
     notes: list[str] = []
-    for name, fit in FITTERS.items():
+    for name in task.options.models:
+        fit = FITTERS[name] if name in FITTERS else BEYOND[name]
         try:
-            model = fit(task.training, subset, task.options)
+            model = fit(training, task.options)
         except TractionError as error:
             notes.append(
                 f"{task.terrain}, fold {task.fold + 1}, {TITLES[name]}: {error.message}"
@@ -183,6 +187,7 @@ def _task(
         terrain=terrain,
         fold=fold,
         training=Rows.of([own[k] for k in usable[terrain] if k != fold]),
+        lengths=tuple(own[k].kept for k in usable[terrain] if k != fold),
         own=Rows.of([own[fold]]),
         others=others,
         options=options,
@@ -190,18 +195,20 @@ def _task(
 
 
 def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
-    own, training = task.own, task.training
-    error = model.mean(training.F_n, training.v_t) - training.F_t
-    cross = {
-        terrain: tuple(
-            mean_absolute_error(rows.F_t, model.mean(rows.F_n, rows.v_t))
-            for rows in trials
-        )
-        for terrain, trials in task.others.items()
-    }
+    own = task.own
+    foreign = [rows for trials in task.others.values() for rows in trials]
+    tested = Rows.joined([task.training, *foreign])
+    # one call for all rows: small ones cost more than they compute
+    error = np.abs(model.mean(tested.F_n, tested.v_t) - tested.F_t)
+    ends = np.cumsum([task.training.count, *(rows.count for rows in foreign)])
+    on_training, *on_foreign = np.split(error, ends[:-1])
+    maes = iter(float(part.mean()) for part in on_foreign)
     return ModelFold(
         model=model,
         score=score(own.F_t, model.predict(own.F_n, own.v_t)),
-        train_rmse=float(np.sqrt(np.mean(error**2))),
-        cross=cross,
+        train_rmse=float(np.sqrt(np.mean(on_training**2))),
+        cross={
+            terrain: tuple(next(maes) for _ in trials)
+            for terrain, trials in task.others.items()
+        },
     )

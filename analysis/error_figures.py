@@ -18,6 +18,7 @@ from analysis.models import FITTERS, TITLES
 from analysis.study import Study
 
 _MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart
+_MAP_COLUMNS = 2  # heat maps side by side
 
 
 def draw_errors(study: Study) -> Figure | None:
@@ -55,7 +56,7 @@ def draw_errors(study: Study) -> Figure | None:
     ax.set_xlabel("terrain")
     ax.set_ylabel(ERROR_LABEL)
     ax.grid(visible=False, axis="x")
-    figure.legend(loc="outside upper center", ncols=len(FITTERS) + 1)
+    figure.legend(loc="outside upper center", ncols=3)
     return figure
 
 
@@ -104,9 +105,12 @@ def draw_cross_map(study: Study) -> Figure | None:
     if len(study.terrains) < 2 or not _has_models(study):
         return None
     tested = list(study.terrains)
-    side = WIDTH / len(FITTERS)
-    figure = new_figure(side + 0.2)
-    axes = figure.subplots(1, len(FITTERS), squeeze=False)[0]
+    side, rows = WIDTH / _MAP_COLUMNS, -(-len(FITTERS) // _MAP_COLUMNS)
+    figure = new_figure(rows * (side + 0.2))
+    grid = figure.subplots(rows, _MAP_COLUMNS, squeeze=False)
+    axes = grid.ravel()[: len(FITTERS)]
+    for spare in grid.ravel()[len(FITTERS) :]:
+        spare.remove()
     tables = {model: study.cross(model) for model in FITTERS}
     values = [e for c in tables.values() for row in c.values() for e in row.values()]
     top = max(value for value in values if value is not None)
@@ -114,7 +118,8 @@ def draw_cross_map(study: Study) -> Figure | None:
         _draw_map(ax, cross, tested, top)
         ax.set_title(f"{TITLES[model]}: {ERROR_LABEL}", loc="left")
         ax.set_xlabel("terrain tested on")
-    axes[0].set_ylabel("model of terrain")
+    for ax in grid[:, 0]:
+        ax.set_ylabel("model of terrain")
     return figure
 
 

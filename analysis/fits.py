@@ -3,14 +3,18 @@
 import csv
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 
-from analysis.models import FITTERS, TUSTIN
+from analysis.comparison import compare, standard_error
+from analysis.metrics import Score
+from analysis.models import TUSTIN
 from analysis.study import Study, TerrainResult, mean_of
-from analysis.tustin import UNITS
+from analysis.tustin import UNITS, TustinFit
 
 SCHEMA = 1
 _OTHER_UNITS = {
@@ -20,7 +24,12 @@ _OTHER_UNITS = {
     "constant_mae": "N",
     "rmse": "N",
     "variance": "N^2",
+    "nlpd": "log N",
+    "crps": "N",
+    "coverage50": "1",
+    "coverage90": "1",
     "coverage95": "1",
+    "standard_errors": "unit of the measure",
     "cross": "N",
     "lifted_share": "1",
     "theta": "natural logarithms, inputs standardised, outputs in N",
@@ -32,8 +41,11 @@ def to_fits(study: Study) -> dict[str, Any]:
     fits = {
         "schema": SCHEMA,
         "simulated": study.simulated,
-        "terrains": {name: _terrain(r) for name, r in study.terrains.items()},
-        "cross": {model: study.cross(model) for model in FITTERS},
+        "terrains": {
+            name: _terrain(result, study.options.fit.models)
+            for name, result in study.terrains.items()
+        },
+        "cross": {model: study.cross(model) for model in study.options.fit.models},
         "units": UNITS | _OTHER_UNITS,
         "options": asdict(study.options),
         "notes": list(study.notes),
@@ -80,8 +92,9 @@ def flag_counts(result: TerrainResult, model: str) -> list[str]:
     ]
 
 
-def _terrain(result: TerrainResult) -> dict[str, Any]:
+def _terrain(result: TerrainResult, models: Sequence[str]) -> dict[str, Any]:
     folds = [fold.model.describe() for fold in result.models(TUSTIN)]
+    whole = result.whole
     return {
         "trials": len(result.trials),
         "kept_samples": [trial.kept for trial in result.trials],
@@ -93,26 +106,59 @@ def _terrain(result: TerrainResult) -> dict[str, Any]:
             "median": tustin_medians(result),
             "folds": folds,
             "flags": flag_counts(result, TUSTIN),
+            "all_trials": None if whole.fit is None else _whole_fit(whole.fit),
+            "intervals": {key: list(ends) for key, ends in whole.intervals.items()},
         },
-        "gp": {
-            model: _processes(result, model) for model in FITTERS if model != TUSTIN
-        },
-        "mae": {model: result.mae(model) for model in FITTERS},
-        "mae_folds": {model: result.maes(model) for model in FITTERS},
+        "gp": {model: _processes(result, model) for model in models if model != TUSTIN},
+        "mae": {model: result.mae(model) for model in models},
+        "mae_folds": {model: result.maes(model) for model in models},
         "train_rmse_folds": {
             model: result.per_trial(model, lambda fold: fold.train_rmse)
-            for model in FITTERS
+            for model in models
         },
         "constant_mae": result.constant_mae,
         **{
-            key: {model: _mean_score(result, model, key) for model in FITTERS}
-            for key in ("rmse", "coverage95", "variance")
+            key: {model: mean_of(_scores(result, model, key)) for model in models}
+            for key in Score._fields
+            if key != "mae"
         },
+        "standard_errors": {
+            key: {
+                model: standard_error(_scores(result, model, key)) for model in models
+            }
+            for key in Score._fields
+        },
+        "paired": _paired(result, models),
     }
 
 
-def _mean_score(result: TerrainResult, model: str, key: str) -> float | None:
-    return mean_of(result.per_trial(model, lambda fold: getattr(fold.score, key)))
+def _scores(result: TerrainResult, model: str, key: str) -> list[float | None]:
+    return result.per_trial(model, lambda fold: getattr(fold.score, key))
+
+
+def _whole_fit(fit: TustinFit) -> dict[str, Any]:
+    profiles = fit.profiles
+    return {
+        **asdict(fit.parameters),
+        "sse": fit.sse,
+        "flags": list(fit.flags),
+        "profiles": None if profiles is None else profiles._asdict(),
+    }
+
+
+def _paired(result: TerrainResult, models: Sequence[str]) -> list[dict[str, Any]]:
+    """Return every pair of models compared over the trials, by MAE and by NLPD."""
+    return [
+        {"models": [first, second], "measure": key, **outcome._asdict()}
+        for first, second in combinations(models, 2)
+        for key in ("mae", "nlpd")
+        if (
+            outcome := compare(
+                _scores(result, first, key), _scores(result, second, key)
+            )
+        )
+        is not None
+    ]
 
 
 def _processes(result: TerrainResult, model: str) -> dict[str, Any]:

@@ -1,16 +1,54 @@
-"""The one door to joblib: independent tasks on the cores of this machine."""
+"""The one door to joblib and dask: independent tasks on cores or on a cluster."""
 
 import os
-from collections.abc import Callable, Sequence
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
+
+from acquisition.errors import SettingsError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Progress = Callable[[int, int], None]
 
 _FEW = 3  # tasks that cost less than starting workers
+_PATIENCE = 10.0  # s to reach a scheduler
+
+
+@dataclass(frozen=True, slots=True)
+class Workers:
+    """Where tasks run; never what they return.
+
+    Attributes:
+        n_jobs: number of processes; by default one per core, and none beside this one
+            for three tasks or fewer.
+        scheduler: address of a Dask scheduler, e.g. "tcp://127.0.0.1:8786"; None for
+            this machine. Its workers need the same version of this project.
+    """
+
+    n_jobs: int | None = None
+    scheduler: str | None = None
+
+    def count(self, tasks: int) -> int:
+        """Return the number of local processes for so many tasks."""
+        if self.n_jobs is None and tasks <= _FEW:
+            return 1
+        return min(available_cores() if self.n_jobs is None else self.n_jobs, tasks)
+
+
+class Store(Protocol):
+    """Keeps results, so that an interrupted study resumes."""
+
+    def get(self, task: Any) -> Any | None:  # noqa: ANN401
+        """Return the result of a task done before, None if there is none."""
+        ...
+
+    def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
+        """Keep a result."""
+        ...
 
 
 def available_cores() -> int:
@@ -21,35 +59,89 @@ def available_cores() -> int:
 def run_tasks(
     function: Callable[[Task], Result],
     tasks: Sequence[Task],
-    n_jobs: int | None = None,
+    workers: Workers | int | None = None,
     progress: Progress | None = None,
+    store: Store | None = None,
 ) -> list[Result]:
     """Return `function` of every task, in the order of the tasks.
 
-    The function must be pure, so that the results do not depend on the number of
-    workers. Workers have one linear-algebra thread each: for matrices of a few hundred
-    rows more threads lose time.
+    The function must be pure. Every task runs with one linear-algebra thread, here and
+    in workers: for matrices of a few hundred rows more lose time, and one thread makes
+    results identical, bit by bit, for any number of workers.
 
     Args:
         function: importable by name, called with one task.
         tasks: what to do.
-        n_jobs: number of processes; by default one per core, and none beside this one
-            for three tasks or fewer.
+        workers: where, or just the number of processes.
         progress: called with (done, total) after every task.
+        store: results of earlier runs; new ones are kept as soon as they are there.
+
+    Raises:
+        SettingsError: the scheduler does not answer.
     """
-    workers = min(available_cores() if n_jobs is None else n_jobs, len(tasks))
-    if workers <= 1 or (n_jobs is None and len(tasks) <= _FEW):
-        results = map(function, tasks)
-        return _collect(results, len(tasks), progress)
-    with parallel_config("loky", n_jobs=workers, inner_max_num_threads=1):
-        stream = Parallel(return_as="generator")(delayed(function)(t) for t in tasks)
-        return _collect(stream, len(tasks), progress)
-
-
-def _collect(results, total: int, progress: Progress | None) -> list:  # noqa: ANN001
-    collected = []
-    for result in results:
-        collected.append(result)
+    where = workers if isinstance(workers, Workers) else Workers(workers)
+    found = {} if store is None else _found(store, tasks)
+    left = [(k, task) for k, task in enumerate(tasks) if k not in found]
+    if progress is not None and found:
+        progress(len(found), len(tasks))
+    for k, result in _stream(function, left, where):
+        found[k] = result
+        if store is not None:
+            store.put(tasks[k], result)
         if progress is not None:
-            progress(len(collected), total)
-    return collected
+            progress(len(found), len(tasks))
+    return [found[k] for k in range(len(tasks))]
+
+
+def _found(store: Store, tasks: Sequence[Any]) -> dict[int, Any]:
+    results = ((k, store.get(task)) for k, task in enumerate(tasks))
+    return {k: result for k, result in results if result is not None}
+
+
+def _stream(
+    function: Callable[[Task], Result], tasks: list[tuple[int, Task]], where: Workers
+) -> Iterator[tuple[int, Result]]:
+    """Yield (number, result) of every task as it is done, in any order."""
+    count = where.count(len(tasks))
+    if not tasks:
+        return
+    calls: Iterable[Any] = (delayed(_one_threaded)(function, *task) for task in tasks)
+    if where.scheduler is not None:
+        with _cluster(where.scheduler):
+            yield from _parallel(calls)
+    elif count <= 1:
+        yield from (_one_threaded(function, *task) for task in tasks)
+    else:
+        with parallel_config("loky", n_jobs=count, inner_max_num_threads=1):
+            yield from _parallel(calls)
+
+
+def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
+    stream: Any = Parallel(return_as="generator_unordered")(calls)
+    return stream
+
+
+def _one_threaded(
+    function: Callable[[Task], Result], number: int, task: Task
+) -> tuple[int, Result]:
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        return number, function(task)
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[None]:
+    """Send the tasks of the block to the Dask scheduler at `address`."""
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise SettingsError(
+            f"No Dask scheduler answers at {address} within {_PATIENCE:.0f} s.",
+            hint="Start one with `dask scheduler` and workers with `dask worker`, or "
+            "leave --scheduler out.",
+        ) from error
+    with client, parallel_config("dask", client=client):
+        yield

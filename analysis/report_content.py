@@ -110,7 +110,7 @@ def quality(study: Study) -> ReportTable:
                 means = [
                     sum(column) / len(scores) for column in zip(*scores, strict=True)
                 ]
-                _, rmse, coverage, variance = means
+                _, rmse, coverage, variance, *_ = means
                 rows.append(
                     [
                         name,

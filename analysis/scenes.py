@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.events import Slip
-from analysis.models import FittedModel, Rows
+from analysis.models import FittedModel
 from analysis.prepare import Smoothed
+from analysis.rows import Rows
 from analysis.series import Array
 from analysis.study import Study, TerrainResult
 

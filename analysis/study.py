@@ -8,10 +8,12 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.crossval import FoldResult, ModelFold, plan_folds, run_fold
 from analysis.events import Slip, find_slips
-from analysis.jobs import Progress, run_tasks
+from analysis.jobs import Progress, Store, Workers, run_tasks
 from analysis.models import FitOptions
 from analysis.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
+from analysis.rows import Rows
 from analysis.series import TractionSeries
+from analysis.terrain_fit import TerrainFit, TerrainTask, fit_terrain
 
 LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
 
@@ -24,11 +26,14 @@ class StudyOptions:
         prepare: smoothing, thinning and window.
         fit: bounds, number of points and seed.
         n_jobs: worker processes; None = one per core. Does not change the results.
+        scheduler: address of a Dask scheduler to work for; None = this machine. Does
+            not change them either.
     """
 
     prepare: PrepareOptions = field(default_factory=PrepareOptions)
     fit: FitOptions = field(default_factory=FitOptions)
     n_jobs: int | None = None
+    scheduler: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +45,14 @@ class TerrainResult:
         trials: its prepared trials.
         slips: the slips of every trial.
         folds: its folds; a trial without kept samples has none.
+        whole: the Tustin fit of all its trials, with intervals.
     """
 
     terrain: str
     trials: tuple[PreparedTrial, ...]
     slips: tuple[tuple[Slip, ...], ...]
     folds: tuple[FoldResult, ...]
+    whole: TerrainFit
 
     def per_trial(
         self, model: str, measure: Callable[[ModelFold], float]
@@ -123,6 +130,7 @@ def run_study(
     options: StudyOptions,
     simulated: bool,
     progress: Progress | None = None,
+    store: Store | None = None,
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -131,6 +139,7 @@ def run_study(
         options: every choice.
         simulated: the trials were simulated; marks every product.
         progress: called with (folds done, folds in all).
+        store: results of earlier runs, so that an interrupted study resumes.
 
     Raises:
         SettingsError: there is no trial at all.
@@ -142,7 +151,9 @@ def run_study(
         for terrain, recorded in trials.items()
     }
     tasks, notes = plan_folds(prepared, options.fit)
-    folds = run_tasks(run_fold, tasks, options.n_jobs, progress)
+    workers = Workers(options.n_jobs, options.scheduler)
+    folds = run_tasks(run_fold, tasks, workers, progress, store)
+    wholes = run_tasks(fit_terrain, _wholes(prepared, options), workers, store=store)
     notes += [note for fold in folds for note in fold.notes]
     results = {
         terrain: TerrainResult(
@@ -150,8 +161,9 @@ def run_study(
             trials=kept,
             slips=tuple(find_slips(trial.smooth) for trial in kept),
             folds=tuple(fold for fold in folds if fold.terrain == terrain),
+            whole=whole,
         )
-        for terrain, kept in prepared.items()
+        for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
     }
     warnings = tuple(
         warning
@@ -159,6 +171,15 @@ def run_study(
         for warning in _warnings(result, options.prepare.container_travel is not None)
     )
     return Study(simulated, options, results, tuple(notes), warnings)
+
+
+def _wholes(
+    prepared: Mapping[str, Sequence[PreparedTrial]], options: StudyOptions
+) -> list[TerrainTask]:
+    return [
+        TerrainTask(terrain, tuple(Rows.of([t]) for t in trials if t.kept), options.fit)
+        for terrain, trials in prepared.items()
+    ]
 
 
 def mean_of(values: Sequence[float | None]) -> float | None:

@@ -6,17 +6,20 @@ F_s is a constant in newtons. Only the curve is identified on most terrains, not
 parameter; the flags of a fit say so.
 """
 
-from dataclasses import astuple, dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields, replace
+from typing import Literal
 
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.identifiability import is_identifiable, is_straight
+from analysis.identifiability import Profiles, is_identifiable, is_straight
+from analysis.moments import Moments, profiles
+from analysis.robust import Loss, search_robustly
 from analysis.series import Array
 from analysis.varpro import Box, Point, Problem, search, stribeck_power
 
 MINIMUM_ROWS = 20  # four per parameter
-NEGATIVE_B = "b negative"
+NEGATIVE_B = "b negative"  # nonphysical, like a negative mu or F_s
 NOT_IDENTIFIABLE = "not identifiable"
 NO_STRIBECK = "no Stribeck shape"
 UNITS = {"mu": "1", "F_s": "N", "v_s": "m/s", "delta_s": "1", "b": "kg/s"}
@@ -42,6 +45,32 @@ class TustinParameters:
     v_s: float
     delta_s: float
     b: float
+
+    def canonical(self) -> "TustinParameters":
+        """Return the same curve with v_s > 0: only |v/v_s| enters.
+
+        A negative delta_s is left alone; no positive one gives the same curve.
+        """
+        return replace(self, v_s=abs(self.v_s))
+
+
+@dataclass(frozen=True, slots=True)
+class TustinForm:
+    """Which variant of the model is fitted, and how residuals are weighed.
+
+    Attributes:
+        static: "constant" has F_s in newtons (eq. 1 as printed), "proportional"
+            F_s = f_s F_n with f_s [-] in the place of F_s (as the paper's text says).
+        loss: "squares" (the paper), "huber" or "student".
+    """
+
+    static: Literal["constant", "proportional"] = "constant"
+    loss: Loss = "squares"
+
+    @property
+    def is_proportional(self) -> bool:
+        """Whether F_s stands for f_s = F_s/F_n."""
+        return self.static == "proportional"
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,10 +113,12 @@ class TustinFit:
 
     Attributes:
         parameters: the optimum.
-        sse: sum of squared residuals [N^2].
+        sse: sum of squared residuals [N^2], unweighted.
         rows: number of samples it was fitted to.
         flags: what a reader must know before believing a parameter.
-        starts: sums of squares that the polished starts reached [N^2].
+        starts: sums of (weighted) squares that the polished starts reached [N^2].
+        form: variant that was fitted.
+        profiles: intervals of v_s and delta_s that the samples leave open.
     """
 
     parameters: TustinParameters
@@ -95,6 +126,12 @@ class TustinFit:
     rows: int
     flags: tuple[str, ...]
     starts: tuple[float, ...] = field(default=())
+    form: TustinForm = field(default_factory=TustinForm)
+    profiles: Profiles | None = None
+
+    def mean(self, F_n: Array, v_t: Array) -> Array:
+        """Return F_t [N] of the fitted curve, shape (n,)."""
+        return predict(self.parameters, F_n, v_t, self.form)
 
     @property
     def rmse(self) -> float:
@@ -108,35 +145,53 @@ class TustinFit:
         return float(np.sqrt(self.sse / freedom))
 
 
-def predict(parameters: TustinParameters, F_n: Array, v_t: Array) -> Array:
+def predict(
+    parameters: TustinParameters,
+    F_n: Array,
+    v_t: Array,
+    form: TustinForm | None = None,
+) -> Array:
     """Return F_t [N] by eq. (1), odd in v_t; at standstill the static force F_s."""
     p = parameters
     e = np.exp(-stribeck_power(np.abs(v_t), p.v_s, p.delta_s))
     sign = np.where(v_t < 0, -1.0, 1.0)
-    return sign * (p.mu * F_n + (p.F_s - p.mu * F_n) * e) + p.b * v_t
+    static = _static(p, F_n, form)
+    return sign * (p.mu * F_n + (static - p.mu * F_n) * e) + p.b * v_t
 
 
 def bound(
-    parameters: TustinParameters, F_n: Array, *, as_printed: bool = False
+    parameters: TustinParameters,
+    F_n: Array,
+    form: TustinForm | None = None,
+    *,
+    as_printed: bool = False,
 ) -> Array:
     """Return the largest |F_t| [N] that sticking can hold.
 
     With a Stribeck term that is max(F_s, mu F_n); `as_printed` gives mu F_n (eq. 2).
     """
-    sliding = parameters.mu * np.asarray(F_n, dtype=np.float64)
-    return sliding if as_printed else np.maximum(parameters.F_s, sliding)
+    load = np.asarray(F_n, dtype=np.float64)
+    sliding = parameters.mu * load
+    return (
+        sliding if as_printed else np.maximum(_static(parameters, load, form), sliding)
+    )
 
 
 def fit_tustin(
-    F_n: Array, v_t: Array, F_t: Array, bounds: TustinBounds | None = None
+    F_n: Array,
+    v_t: Array,
+    F_t: Array,
+    bounds: TustinBounds | None = None,
+    form: TustinForm | None = None,
 ) -> TustinFit:
-    """Return the least-squares Tustin model inside `bounds`.
+    """Return the Tustin model inside `bounds` with the smallest loss.
 
     Args:
         F_n: normal force [N], shape (n,).
         v_t: slip velocity [m/s], shape (n,), all above zero.
         F_t: traction force [N], shape (n,).
         bounds: box of the search.
+        form: variant and loss; by default eq. (1) by least squares.
 
     Raises:
         SettingsError: fewer than 20 samples.
@@ -147,28 +202,47 @@ def fit_tustin(
             f"(at least {MINIMUM_ROWS}).",
             hint="Record more motion inside the window of velocities.",
         )
-    bounds = bounds or TustinBounds()
-    problem = Problem(F_n, v_t, F_t, bounds.box())
-    optima = search(problem)
-    parameters = _parameters(optima[0])
+    bounds, form = bounds or TustinBounds(), form or TustinForm()
+    problem = Problem(
+        (F_n, v_t, F_t), bounds.box(), is_proportional=form.is_proportional
+    )
+    if form.loss == "squares":
+        optima = search(problem)
+    else:
+        problem, optima = search_robustly(problem, form.loss)
+    parameters = parameters_at(optima[0])
+    residual = problem.residual(optima[0])
+    moments = Moments.of(problem, (F_n.size,))
+    open_intervals = profiles(moments, bounds.box(), optima[0], residual)
     return TustinFit(
         parameters=parameters,
-        sse=optima[0].sse,
+        sse=float(residual @ residual),
         rows=F_n.size,
-        flags=_flags(problem, optima[0], parameters, bounds),
+        flags=_flags(problem, optima[0], bounds, open_intervals),
         starts=tuple(point.sse for point in optima),
+        form=form,
+        profiles=open_intervals,
     )
 
 
-def _parameters(point: Point) -> TustinParameters:
+def parameters_at(point: Point) -> TustinParameters:
+    """Return the parameters of a point of the search."""
     mu, F_s, b = (float(value) for value in point.p)
     v_s, delta_s = (float(value) for value in np.exp(point.q))
     return TustinParameters(mu=mu, F_s=F_s, v_s=v_s, delta_s=delta_s, b=b)
 
 
+def _static(
+    parameters: TustinParameters, F_n: Array, form: TustinForm | None
+) -> Array | float:
+    is_proportional = form is not None and form.is_proportional
+    return parameters.F_s * F_n if is_proportional else parameters.F_s
+
+
 def _flags(
-    problem: Problem, point: Point, parameters: TustinParameters, bounds: TustinBounds
+    problem: Problem, point: Point, bounds: TustinBounds, intervals: Profiles
 ) -> tuple[str, ...]:
+    parameters = parameters_at(point)
     flags = [
         f"{name} at {side} bound"
         for (name, (lower, upper)), value in zip(
@@ -177,9 +251,12 @@ def _flags(
         for side, edge in (("lower", lower), ("upper", upper))
         if _is_at(value, edge, upper - lower, name in {"v_s", "delta_s"})
     ]
-    if parameters.b < 0:
-        flags.append(NEGATIVE_B)
-    if not is_identifiable(problem, point):
+    flags += [
+        f"{name} negative"
+        for name in ("mu", "F_s", "b")
+        if getattr(parameters, name) < 0
+    ]
+    if not (intervals.are_closed and is_identifiable(problem, point)):
         flags.append(NOT_IDENTIFIABLE)
     if is_straight(problem, point):
         flags.append(NO_STRIBECK)

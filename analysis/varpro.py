@@ -15,7 +15,7 @@ from analysis.series import Array
 
 _GRID = (16, 14)  # points over log v_s and log delta_s
 _POLISHED = 4  # starting cells, no two of them neighbours
-_LARGEST_LOG_POWER = np.log(700.0)  # exp(-700) is about the smallest that is not zero
+LARGEST_LOG_POWER = np.log(700.0)  # exp(-700) is about the smallest that is not zero
 
 
 class Box(NamedTuple):
@@ -36,7 +36,7 @@ def stribeck_power(speed: Array, v_s: float, delta_s: float) -> Array:
     """Return |v/v_s|^delta_s, held below overflow."""
     with np.errstate(divide="ignore"):
         exponent = delta_s * (np.log(speed) - np.log(abs(v_s)))
-    return np.exp(np.minimum(exponent, _LARGEST_LOG_POWER))
+    return np.exp(np.minimum(exponent, LARGEST_LOG_POWER))
 
 
 class Point(NamedTuple):
@@ -48,11 +48,37 @@ class Point(NamedTuple):
 
 
 class Problem:
-    """The samples and box of one fit, with the logarithms taken once."""
+    """The samples and box of one fit, with the logarithms taken once.
 
-    def __init__(self, F_n: Array, v_t: Array, F_t: Array, box: Box) -> None:
-        self.F_n, self.v_t, self.F_t, self.box = F_n, v_t, F_t, box
-        self.log_v = np.log(v_t)
+    With `is_proportional` the second linear parameter is f_s = F_s/F_n [-]. `weights`
+    of the squared residuals, shape (n,), are 1 at first.
+    """
+
+    def __init__(
+        self,
+        rows: tuple[Array, Array, Array],
+        box: Box,
+        *,
+        is_proportional: bool = False,
+        weights: Array | None = None,
+    ) -> None:
+        self.F_n, self.v_t, self.F_t = rows
+        self.box, self.is_proportional = box, is_proportional
+        self.log_v = np.log(self.v_t)
+        self.weights = np.ones(self.F_t.size) if weights is None else weights
+
+    def reweighted(self, weights: Array) -> "Problem":
+        """Return the same problem with other weights."""
+        return Problem(
+            (self.F_n, self.v_t, self.F_t),
+            self.box,
+            is_proportional=self.is_proportional,
+            weights=weights,
+        )
+
+    def residual(self, point: "Point") -> Array:
+        """Return prediction minus measurement [N] at `point`, shape (n,)."""
+        return self.design(point.q) @ point.p - self.F_t
 
     def design(self, q: Array) -> Array:
         """Return the design matrix at `q`, shape (n, 3)."""
@@ -60,7 +86,8 @@ class Problem:
 
     def columns(self, e: Array) -> Array:
         """Return the design matrix for Stribeck factors `e`, shape (n, 3)."""
-        return np.column_stack([self.F_n * (1.0 - e), e, self.v_t])
+        static = self.F_n * e if self.is_proportional else e
+        return np.column_stack([self.F_n * (1.0 - e), static, self.v_t])
 
     def project(self, q: Array) -> tuple[Point, Array]:
         """Return the best point at `q` and the slope of its SSE in q, shape (2,).
@@ -68,19 +95,24 @@ class Problem:
         The slope of p drops out because p is optimal (envelope theorem).
         """
         delta, distance = np.exp(q[1]), self.log_v - q[0]
-        z = np.exp(np.minimum(delta * distance, _LARGEST_LOG_POWER))
+        z = np.exp(np.minimum(delta * distance, LARGEST_LOG_POWER))
         e = np.exp(-z)
         A = self.columns(e)
-        p = solve_in_box(A.T @ A, A.T @ self.F_t, self.box.lower, self.box.upper)
+        weighed = A.T * self.weights
+        p = solve_in_box(
+            weighed @ A, weighed @ self.F_t, self.box.lower, self.box.upper
+        )
         r = A @ p - self.F_t
-        common = 2.0 * r * (p[1] - p[0] * self.F_n) * e * z * delta
+        weighed_r = self.weights * r
+        static = p[1] * self.F_n if self.is_proportional else p[1]
+        common = 2.0 * weighed_r * (static - p[0] * self.F_n) * e * z * delta
         slope = np.array([common.sum(), -common @ distance])
-        return Point(q, p, float(r @ r)), slope
+        return Point(q, p, float(r @ weighed_r)), slope
 
 
 def search(problem: Problem) -> list[Point]:
     """Return the local optima reached from the best cells of the grid, best first."""
-    polished = [_polish(problem, q) for q in _promising(problem)]
+    polished = [polish(problem, q) for q in _promising(problem)]
     return sorted(polished, key=lambda point: point.sse)
 
 
@@ -108,20 +140,21 @@ def _scan(problem: Problem, log_v_s: Array, log_delta: Array) -> Array:
     for j, delta in enumerate(np.exp(log_delta)):
         exponent = delta * problem.log_v
         for i, shift in enumerate(delta * log_v_s):
-            z = np.exp(np.minimum(exponent - shift, _LARGEST_LOG_POWER))
+            z = np.exp(np.minimum(exponent - shift, LARGEST_LOG_POWER))
             M = np.column_stack([problem.columns(np.exp(-z)), problem.F_t])
-            gram[i, j] = M.T @ M
+            gram[i, j] = (M.T * problem.weights) @ M
     G, c, yy = gram[..., :3, :3], gram[..., :3, 3], gram[..., 3, 3]
     p = solve_in_box(G, c, problem.box.lower, problem.box.upper)
     quadratic = np.einsum("...i,...ij,...j->...", p, G, p)
     return yy - 2.0 * np.einsum("...i,...i->...", c, p) + quadratic
 
 
-def _polish(problem: Problem, start: Array) -> Point:
-    """Return the local optimum reached from `start`."""
+def polish(problem: Problem, start: Array) -> Point:
+    """Return the local optimum reached from `start` = (log v_s, log delta_s)."""
     from scipy.optimize import minimize
 
-    scale = max(float(problem.F_t @ problem.F_t), np.finfo(float).tiny)
+    power = float(problem.weights @ problem.F_t**2)
+    scale = max(power, np.finfo(float).tiny)
 
     def objective(q: Array) -> tuple[float, Array]:
         point, slope = problem.project(q)

@@ -19,6 +19,7 @@ COMMANDS = {
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "what was said on the bus, in words",
     "recover": "save what is sound of trials that were not ended",
+    "rehearse": "the whole study simulated, held against what it has to show",
     "report": "fit and compare models of recorded sessions, write the report",
     "fit": "the same for tables that Traction did not record",
 }

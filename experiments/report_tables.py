@@ -3,16 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.errors import TrialFileError
-from acquisition.trial_file.reader import TrialReader
 from analysis.load import RecordedTrial
-from analysis.prepare import moving_average
 from analysis.report import ReportTable
 from experiments.store import SessionFolder
-
-MINIMUM_COMPARED = 50  # cycles, or a truth file is none of this trial
+from experiments.truth import truth_errors
 
 
 def report_tables(
@@ -100,36 +95,15 @@ def _truth_table(trials: Sequence[RecordedTrial]) -> ReportTable | None:
     """Return measured against true for simulated trials with a truth file."""
     rows: list[tuple[str, ...]] = []
     for trial in trials:
-        path = trial.path.with_name(trial.path.stem + ".truth.mcap")
-        if not path.exists():
+        error = truth_errors(trial)
+        if error is None:
             continue
-        try:
-            truth = TrialReader(path).truth().data
-        except TrialFileError:
-            continue
-        t_true = truth["host_ns"].astype(float)
-        host_ns = trial.cycles["host_ns"]
-        if not len(truth):
-            continue
-        inside = (host_ns >= truth["host_ns"][0]) & (host_ns <= truth["host_ns"][-1])
-        if np.count_nonzero(inside) < MINIMUM_COMPARED:
-            continue
-        t = host_ns[inside].astype(float)
-        error = _smooth(trial.traction[inside]) - _smooth(
-            np.column_stack(
-                [np.interp(t, t_true, truth["traction"][:, k]) for k in range(3)]
-            )
-        )
-        v_t, F_t, F_n = (
-            np.sqrt(np.nanmean(error[:, 0] ** 2)),
-            *np.nanmean(np.abs(error[:, 1:]), axis=0),
-        )
         rows.append(
             (
                 f"{trial.terrain} {trial.name}",
-                f"{v_t * 1e3:.2f}",
-                f"{F_t:.2f}",
-                f"{F_n:.2f}",
+                f"{error.v_t * 1e3:.2f}",
+                f"{error.F_t:.2f}",
+                f"{error.F_n:.2f}",
             )
         )
     if not rows:
@@ -140,10 +114,6 @@ def _truth_table(trials: Sequence[RecordedTrial]) -> ReportTable | None:
         rows,
         note="Simulated trials only; after the same smoothing on both.",
     )
-
-
-def _smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.column_stack([moving_average(column, 11) for column in values.T])
 
 
 def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:

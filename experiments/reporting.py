@@ -10,18 +10,28 @@ from analysis.load import RecordedTrial, load_trial
 from analysis.models import FitOptions
 from analysis.prepare import PrepareOptions
 from analysis.report import ReportContext, write_report
+from analysis.results import ResultStore
 from analysis.study import StudyOptions, run_study
 from experiments.console import Console
 from experiments.report_tables import report_tables
 from experiments.store import SessionFolder, find_session, iso_utc, list_sessions
 
+FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """How a report is laid out: terrains in the matrix's order, seed of the points."""
+    """How a report is made.
+
+    Attributes:
+        terrains: names in the matrix's order.
+        seed: seed of the points of the Gaussian processes.
+        scheduler: address of a Dask scheduler to fit on; None for this machine.
+    """
 
     terrains: Sequence[str]
     seed: int
+    scheduler: str | None = None
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -106,10 +116,13 @@ def report_sessions(
     is_simulated = sessions[0].is_simulated
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
-        prepare=PrepareOptions(container_travel=travel), fit=FitOptions(seed=order.seed)
+        prepare=PrepareOptions(container_travel=travel),
+        fit=FitOptions(seed=order.seed),
+        scheduler=order.scheduler,
     )
     series = {name: [t.series() for t in group] for name, group in trials.items()}
-    study = run_study(series, options, simulated=is_simulated)
+    store = ResultStore(data / FOLDS)
+    study = run_study(series, options, simulated=is_simulated, store=store)
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),

@@ -29,10 +29,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class FakeOptions:
-    """How a simulated session runs: stepped time or the wall clock, and the seed."""
+    """How a simulated session runs.
+
+    Attributes:
+        is_fast: on stepped time; otherwise on the wall clock.
+        seed: of everything random.
+        friction: of the joints, as a share of what was identified on another arm.
+        pace: how the simulated person pushes, a name of `fakes.push.PACES`.
+    """
 
     is_fast: bool
     seed: int
+    friction: float = 0.05
+    pace: str = "steady"
 
 
 @dataclass(slots=True)
@@ -81,7 +90,9 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         LinkError: a process cannot open its bus or port.
     """
     # A simulated world does not know what was calibrated.
-    world = World(settings.rig, row, fake.seed) if fake is not None else None
+    world: World | None = None
+    if fake is not None:
+        world = World(settings.rig, row, fake.seed, fake.friction, fake.pace)
     settings = with_calibrations(settings, is_simulated=world is not None)
     row = settings.row(row.name)
     tool = build_tool(settings.rig, row.foot)

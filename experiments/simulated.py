@@ -35,11 +35,15 @@ class World:
         rig: rig.toml.
         row: row of the matrix.
         seed: of everything random.
+        friction: of the joints, as a share of what was identified on another arm.
+        pace: how the simulated person pushes.
     """
 
     rig: RigSettings
     row: TerrainRow
     seed: int
+    friction: float
+    pace: str
 
     def facts(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -61,6 +65,8 @@ class World:
             "scene": scene,
             "tool": tool_facts(build_tool(self.rig, self.row.foot)),
             "has_sensor": self.rig.ft_sensor.kind == "barrett",
+            "friction": self.friction,
+            "pace": self.pace,
         }
 
 
@@ -77,6 +83,8 @@ def stepped(
     """
     from fakes.clock import SteppedClock
     from fakes.network_options import NetworkOptions
+    from fakes.plant import PlantOptions
+    from fakes.push import PACES
     from fakes.rig import FakeRig, Rehearsal
     from fakes.station import scene_of
 
@@ -89,7 +97,8 @@ def stepped(
         model.constants,
         tool_of(facts["tool"]),
         clock,
-        network=network,
+        PlantOptions(friction=facts["friction"]),
+        network,
     )
     clock.world = simulation
     link = CanLink(simulation.bus)
@@ -117,7 +126,7 @@ def stepped(
         )
 
     crew = InlineCrew(board, clock, arm, sensor, parts)
-    return clock, crew, Rehearsal(simulation)
+    return clock, crew, Rehearsal(simulation, PACES[facts["pace"]])
 
 
 def build_server(

@@ -172,10 +172,13 @@ class Rehearsal:
     """What only the simulation can be asked: hand, pendant, bed, faults, truth.
 
     The drivers never see it; experiments.rigs owns it.
+
+    Attributes:
+        rig: the simulated rig.
     """
 
     def __init__(self, rig: FakeRig, pace: Pace | None = None) -> None:
-        self._rig = rig
+        self.rig = rig
         self._pace = pace or Pace()
         self._faults: dict[str, Callable[[], None]] = {
             "ft-silent": rig.silence_sensor,
@@ -190,23 +193,23 @@ class Rehearsal:
 
     def prepare(self, trial: int) -> None:
         """Rake the bed for `trial` and begin to write the truth."""
-        self._rig.rake(trial)
+        self.rig.rake(trial)
 
     def lift(self) -> None:
         """Let the hand carry the foot above the far end and hold it still for a tare.
 
         The sensor shows its offset and noise only, until the next push.
         """
-        self._rig.errors.settle()
-        self._rig.plant.hand.lift_to_start()
+        self.rig.errors.settle()
+        self.rig.plant.hand.lift_to_start()
 
     def let_go(self) -> None:
         """Let the hand let go of the arm."""
-        self._rig.plant.hand.let_go()
+        self.rig.plant.hand.let_go()
 
     def put_down(self) -> None:
         """Let the hand put the foot down at the far end."""
-        self._rig.plant.hand.put_down(self._rig.ground.surface(0.0))
+        self.rig.plant.hand.put_down(self.rig.ground.surface(0.0))
 
     def touch(self, number: int) -> None:
         """Let the hand touch the ground with the sole and stay there.
@@ -214,20 +217,20 @@ class Rehearsal:
         1 to 4: far left, far right, near left, near right, seen from the arm; more:
         points between them.
         """
-        x, y = _place(number, self._rig.scene.frame.travel)
-        ground = self._rig.ground.surface(x)
-        self._rig.plant.hand.touch(x, y, ground)
+        x, y = _place(number, self.rig.scene.frame.travel)
+        ground = self.rig.ground.surface(x)
+        self.rig.plant.hand.touch(x, y, ground)
 
     def push(self) -> None:
         """Let the hand push the foot across; the tare error of a trial begins here."""
-        rig = self._rig
+        rig = self.rig
         rig.errors.new_trial(rig.random.sensor)
         rig.plant.hand.push(self._pace, rig.random.hand)
         rig.plant.start_truth()
 
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""
-        self._rig.network.pendant(button)
+        self.rig.network.pendant(button)
 
     def inject(self, fault: str) -> None:
         """Let a device fail; `fault` is one of `fault_names`."""
@@ -235,14 +238,14 @@ class Rehearsal:
 
     def mend(self) -> None:
         """End every fault that can be ended without the arm."""
-        self._rig.silence_sensor(is_mute=False)
-        mend_network(self._rig.network)
+        self.rig.silence_sensor(is_mute=False)
+        mend_network(self.rig.network)
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""
-        return truth_records(self._rig.plant.take_truth(), self._rig.scene.frame)
+        return truth_records(self.rig.plant.take_truth(), self.rig.scene.frame)
 
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground as strings."""
-        values = self._rig.ground.truth()
+        values = self.rig.ground.truth()
         return {name: f"{value:.9g}" for name, value in values.items()}

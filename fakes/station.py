@@ -17,6 +17,8 @@ from acquisition.processes import Station, name_process
 from acquisition.realtime import Wish, request
 from fakes.can_hub import SocketHub
 from fakes.network_options import NetworkOptions
+from fakes.plant import PlantOptions
+from fakes.push import PACES
 from fakes.rig import FakeRig, Rehearsal, Scene
 from fakes.serial_pty import SerialPty
 from fakes.truth import truth_records
@@ -56,15 +58,19 @@ class RigServer:
     """Serves one simulated rig to the processes of a session."""
 
     def __init__(
-        self, rig: FakeRig, clock: WorldClock, folder: Path, channel: Channel
+        self,
+        rehearsal: Rehearsal,
+        clock: WorldClock,
+        folder: Path,
+        channel: Channel,
     ) -> None:
         self._clock = clock
-        self._rig = rig
+        self._rig = rig = rehearsal.rig
         self._wired = WiredNetwork(rig.network, is_far=True)
         self._channel = channel
         self._hub = SocketHub(folder / "can")
         self._pty = SerialPty(self._rig.stream, self._clock.now_ns())
-        self._handlers = rehearsal_handlers(self._rig)
+        self._handlers = rehearsal_handlers(rehearsal)
         self._handlers["hello"] = lambda _: {
             "can": {
                 "interface": "traction-fake",
@@ -116,9 +122,9 @@ class RigServer:
         return max(0, min(wait_ns, TICK_NS)) * 1e-9
 
 
-def rehearsal_handlers(rig: FakeRig) -> dict[str, Handler]:
+def rehearsal_handlers(rehearsal: Rehearsal) -> dict[str, Handler]:
     """Return what the console may ask of the simulation."""
-    rehearsal = Rehearsal(rig)
+    rig = rehearsal.rig
     return {
         "prepare": rehearsal.prepare,
         "lift": lambda _: rehearsal.lift(),
@@ -180,8 +186,10 @@ def main(station: Station) -> None:
             load_constants(),
             tool_of(settings["tool"]),
             clock,
-            network=NetworkOptions(has_sensor=settings["has_sensor"]),
+            PlantOptions(friction=settings["friction"]),
+            NetworkOptions(has_sensor=settings["has_sensor"]),
         )
-        RigServer(rig, clock, folder, station.channel).serve()
+        rehearsal = Rehearsal(rig, PACES[settings["pace"]])
+        RigServer(rehearsal, clock, folder, station.channel).serve()
     finally:
         shutil.rmtree(folder, ignore_errors=True)

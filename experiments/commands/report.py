@@ -16,6 +16,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="fit on the Dask cluster there, e.g. tcp://192.168.1.5:8786",
+    )
     add_seed(parser)
 
 
@@ -29,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    page = report_sessions(sessions, data, Order(order, args.seed), console)
+    wanted = Order(order, args.seed, args.scheduler)
+    page = report_sessions(sessions, data, wanted, console)
     console.say(str(page))
     return 0

@@ -30,6 +30,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
     )
     parser.add_argument(
+        "--friction",
+        type=float,
+        default=0.05,
+        metavar="SHARE",
+        help="of the simulated joints: 1 = as identified on another arm (0.05)",
+    )
+    parser.add_argument(
+        "--pace",
+        choices=("steady", "slow", "fast", "clumsy"),
+        default="steady",
+        help="how the simulated person pushes (steady)",
+    )
+    parser.add_argument(
         "--fault", metavar="NAME[@Tn+SECONDSs]", help="raise a fault, with --fake"
     )
     parser.add_argument(
@@ -62,7 +75,9 @@ def run(args: argparse.Namespace) -> int:
     row = settings.row(args.terrain)
     console = Console(color=not args.no_color)
     keys = choose_keys(args.operator_script, is_fake=args.fake)
-    fake = FakeOptions(args.fast, args.seed) if args.fake else None
+    fake: FakeOptions | None = None
+    if args.fake:
+        fake = FakeOptions(args.fast, args.seed, args.friction, args.pace)
     rig = connect_rig(settings, row, fake)
     stop = StopFlag()
     with logging_bus(rig, args.can_log, console):
@@ -101,6 +116,11 @@ def _check_arguments(args: argparse.Namespace) -> None:
     if args.trials is not None and not 1 <= args.trials <= 99:
         raise SettingsError(
             f"--trials {args.trials} - expected a whole number 1..99, e.g. 10.",
+            hint=nothing,
+        )
+    if not 0.0 <= args.friction <= 2.0:
+        raise SettingsError(
+            f"--friction {args.friction:g} - expected a number 0..2, e.g. 0.05.",
             hint=nothing,
         )
     if args.seed < 0:

@@ -6,11 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from analysis.models import FitOptions
 from analysis.series import TractionSeries
 from analysis.study import StudyOptions, run_study
 from analysis.tables import load_tables
 
 DATA = Path(__file__).parent.parent / "data"
+SMALL_FIT = FitOptions(gp_points=60, draws=20)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_thread():
+    """Keep linear algebra to one thread: more of them lose time on small matrices."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +41,9 @@ def slice_trials(slice_path):
 
 @pytest.fixture(scope="session")
 def small_study(slice_trials):
-    return run_study(slice_trials, StudyOptions(n_jobs=1), simulated=True)
+    # 60 points instead of 300: all five models in a few seconds
+    options = StudyOptions(fit=SMALL_FIT, n_jobs=1)
+    return run_study(slice_trials, options, simulated=True)
 
 
 @pytest.fixture(scope="session")

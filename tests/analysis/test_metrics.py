@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from analysis.metrics import Prediction, score
+from analysis.metrics import (
+    Prediction,
+    coverage,
+    log_density,
+    ranked_probability,
+    score,
+)
 
 
 def test_errors_of_known_predictions():
@@ -16,10 +22,41 @@ def test_errors_of_known_predictions():
 
 def test_coverage_has_the_reference_values(vectors):
     case = vectors["metrics"]
-    inside = case["inside_50_90_95"][2]
-    for k, is_inside in enumerate(inside):
-        y, mean, sd = (np.array([case[key][k]]) for key in ("y", "mean", "sd"))
-        assert score(y, Prediction(mean, sd)).coverage95 == float(is_inside)
+    for level, inside in enumerate(case["inside_50_90_95"]):
+        for k, is_inside in enumerate(inside):
+            y, mean, sd = (np.array([case[key][k]]) for key in ("y", "mean", "sd"))
+            found = score(y, Prediction(mean, sd))
+            shares = (found.coverage50, found.coverage90, found.coverage95)
+            assert shares[level] == float(is_inside)
+
+
+def test_densities_and_ranked_scores_have_the_reference_values(vectors):
+    case = vectors["metrics"]
+    given = Prediction(np.array(case["mean"]), np.array(case["sd"]))
+    y = np.array(case["y"])
+    np.testing.assert_allclose(-log_density(y, given), case["nlpd_each"], rtol=1e-12)
+    np.testing.assert_allclose(
+        ranked_probability(y, given), case["crps_each"], rtol=1e-9
+    )
+
+
+def test_student_t_has_scipys_density_and_the_integral_as_its_score():
+    from scipy import stats
+
+    y, given = np.array([1.4]), Prediction(np.array([0.2]), np.array([0.7]), 4.0)
+    law = stats.t(4.0, 0.2, 0.7 * np.sqrt(0.5))  # variance = scale^2 nu/(nu - 2)
+    assert log_density(y, given)[0] == pytest.approx(law.logpdf(1.4), rel=1e-12)
+    x = np.linspace(-60.0, 60.0, 120_001)
+    integral = np.trapezoid((law.cdf(x) - (x >= 1.4)) ** 2, x)
+    # the step falls between two points 1e-3 apart
+    assert ranked_probability(y, given)[0] == pytest.approx(integral, abs=1e-3)
+    assert coverage(np.array([law.ppf(0.94)]), given, 0.9) == 1.0
+    assert coverage(np.array([law.ppf(0.96)]), given, 0.9) == 0.0
+
+
+def test_ranked_score_of_a_sure_prediction_is_its_error():
+    sure = Prediction(np.array([1.0]), np.array([0.0]))
+    assert ranked_probability(np.array([3.0]), sure)[0] == pytest.approx(2.0)
 
 
 def test_coverage_of_a_normal_sample():

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from analysis.fits import to_fits
-from analysis.models import GP_SE, TUSTIN
+from analysis.models import FITTERS, GP_SE, GP_SE_NOISE, TUSTIN, FitOptions
 from analysis.prepare import PrepareOptions
 from analysis.series import TractionSeries
 from analysis.study import StudyOptions, run_study
 from analysis.tables import load_tables, parse_columns
 
-pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(900)]
 STONES = ("S0", "S10", "S15", "B0", "B10", "B15")
 PLATES = ("TF", "Tf")
 
@@ -76,6 +76,35 @@ def test_errors_across_terrains_agree(fits, expected, model):
             is_far = source in STONES and tested in PLATES
             found = fits["cross"][model][source][tested]
             assert found == pytest.approx(table[i][j], rel=0.35 if is_far else 0.12)
+
+
+@pytest.mark.parametrize("terrain", STONES + PLATES)
+def test_all_five_models_predict_alike(fits, terrain):
+    maes = fits["terrains"][terrain]["mae"]
+    assert list(maes) == list(FITTERS)
+    # the paper's Fig. 9: no model stands out
+    assert max(maes.values()) < 1.15 * min(maes.values())
+
+
+@pytest.mark.parametrize("terrain", STONES + PLATES)
+def test_bands_of_every_model_hold_about_their_share(fits, terrain):
+    low, high = (0.85, 0.95) if terrain in STONES else (0.75, 0.97)
+    for share in fits["terrains"][terrain]["coverage90"].values():
+        assert low <= share <= high
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1200)
+def test_chosen_noise_helps_on_stones_and_does_no_harm_on_plates(shared_data):
+    trials = load_tables([shared_data / "rehearsal_trials.npz"])
+    options = StudyOptions(fit=FitOptions(models=(GP_SE, GP_SE_NOISE), draws=0))
+    terrains = to_fits(run_study(trials, options, simulated=True))["terrains"]
+    nlpd = {name: result["nlpd"] for name, result in terrains.items()}
+    gains = [nlpd[name][GP_SE] - nlpd[name][GP_SE_NOISE] for name in STONES]
+    assert np.mean(gains) >= 0.03
+    for name in PLATES:
+        (pair,) = [p for p in terrains[name]["paired"] if p["measure"] == "nlpd"]
+        assert pair["difference"] < 0 or pair["p"] > 0.05
 
 
 def test_real_contour_trials_are_hardly_better_than_a_constant(contour):

@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from analysis.prepare import PrepareOptions
 from analysis.series import TractionSeries
 from analysis.study import StudyOptions, run_study
 
-OPTIONS = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
+SMALL_FIT = FitOptions(gp_points=60, draws=20)  # as in the shared small study
+TWO = (TUSTIN, GP_SE)
+OPTIONS = StudyOptions(fit=FitOptions(gp_points=80, models=TWO, draws=0), n_jobs=1)
 PARAMETERS = ["mu", "F_s", "v_s", "delta_s", "b"]
 
 
@@ -47,7 +50,7 @@ def test_fits_have_the_agreed_schema(small_study):
         assert set(fits["cross"][model]["TF"]) == {"S0", "B0", "TF"}
     assert len(terrain["train_rmse_folds"]["tustin"]) == 3
     assert set(PARAMETERS) <= set(fits["units"])
-    assert len(terrain["gp"]["gp_se"]["folds"][0]["rows"]) == 300
+    assert len(terrain["gp"]["gp_se"]["folds"][0]["rows"]) == 60
 
 
 def test_medians_are_taken_parameter_by_parameter(small_study):
@@ -73,19 +76,16 @@ def test_csv_keeps_a_terrain_from_becoming_a_formula(make_series, moving):
     assert {row["terrain"] for row in table} == {"'=1+1"}
 
 
-def test_results_do_not_depend_on_the_number_of_workers(small_study, slice_trials):
-    parallel = run_study(slice_trials, StudyOptions(n_jobs=2), simulated=True)
-    for name, result in small_study.terrains.items():
-        other = parallel.terrains[name]
-        assert other.maes(TUSTIN) == pytest.approx(result.maes(TUSTIN), rel=1e-9)
-        # threads of the linear algebra round differently; the search ends nearby
-        assert other.maes(GP_SE) == pytest.approx(result.maes(GP_SE), rel=1e-4)
-        rows = [fold.gp_rows for fold in result.folds]
-        assert [fold.gp_rows for fold in other.folds] == rows
+def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_trials):
+    options = StudyOptions(fit=SMALL_FIT, n_jobs=2)
+    parallel = run_study(slice_trials, options, simulated=True)
+    one, two = to_fits(small_study), to_fits(parallel)
+    one["options"]["n_jobs"] = two["options"]["n_jobs"] = None
+    assert one == two
 
 
 def test_a_terrain_is_fitted_alike_alone_and_in_company(small_study, slice_trials):
-    options = StudyOptions(n_jobs=1)
+    options = StudyOptions(fit=replace(SMALL_FIT, models=TWO), n_jobs=1)
     alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
     expected = small_study.terrains["TF"].maes(GP_SE)
     assert alone.terrains["TF"].maes(GP_SE) == pytest.approx(expected, rel=1e-9)
@@ -99,7 +99,7 @@ def test_no_trials_are_refused():
 def test_one_trial_is_reported_but_not_fitted(make_series, moving):
     study = run_study({"S0": [make_series(moving)]}, OPTIONS, simulated=False)
     fits = to_fits(study)["terrains"]["S0"]
-    assert fits["mae"] == {"tustin": None, "gp_se": None}
+    assert set(fits["mae"].values()) == {None}
     assert fits["tustin"]["median"]["mu"] is None
     assert any("needs two" in note for note in study.notes)
     json.dumps(to_fits(study), allow_nan=False)
@@ -172,7 +172,7 @@ def test_trials_too_short_to_count_are_warned_about(make_series, container, is_n
     # 5 s at 0.08 m/s: 500 kept samples, 0.40 m
     trials = [make_series(np.full(2501, 0.08), seed=k) for k in range(2)]
     prepare = PrepareOptions(container_travel=container)
-    options = StudyOptions(prepare=prepare, fit=FitOptions(gp_points=50), n_jobs=1)
+    options = replace(OPTIONS, prepare=prepare)
     study = run_study({"S0": trials}, options, simulated=False)
     named = [w for w in study.warnings if "the container not crossed" in w]
     assert bool(named) is is_named

@@ -5,13 +5,17 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import SettingsError
+from analysis.bootstrap import bootstrap_tustin
 from analysis.box_least_squares import solve_in_box
 from analysis.identifiability import correlation_samples
-from analysis.models import Rows
+from analysis.moments import Moments, solve_moments
 from analysis.prepare import PrepareOptions, prepare
+from analysis.rows import Rows
 from analysis.tustin import (
     NO_STRIBECK,
+    NOT_IDENTIFIABLE,
     TustinBounds,
+    TustinForm,
     TustinParameters,
     bound,
     fit_tustin,
@@ -74,7 +78,7 @@ def test_sticking_holds_the_larger_of_static_and_sliding_force():
 
 def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
     case = vectors["tustin"]["profile_at"]
-    problem = Problem(*samples, TustinBounds().box())
+    problem = Problem(samples, TustinBounds().box())
     point, _ = problem.project(np.log([case["v_s"], case["delta"]]))
     np.testing.assert_allclose(point.p, case["mu_Fs_b"], rtol=1e-8)
     assert point.sse == pytest.approx(case["sse"], rel=1e-12)
@@ -82,7 +86,7 @@ def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
 
 @pytest.mark.parametrize("b_upper", [200.0, 3.0])
 def test_slope_of_the_search_agrees_with_differences(samples, b_upper):
-    problem = Problem(*samples, TustinBounds(b=(-200.0, b_upper)).box())
+    problem = Problem(samples, TustinBounds(b=(-200.0, b_upper)).box())
     q, h = np.log([0.05, 1.5]), 1e-5
     _, slope = problem.project(q)
     for k, step in enumerate(h * np.eye(2)):
@@ -154,6 +158,107 @@ def test_a_straight_line_is_flagged_as_having_no_stribeck_shape():
     curved = fit_tustin(F_n, v, predict(PLAIN, F_n, v) + noise)
     assert NO_STRIBECK in straight.flags
     assert NO_STRIBECK not in curved.flags
+
+
+def test_static_friction_can_be_proportional_to_load():
+    rng = np.random.default_rng(8)
+    F_n, v = rng.uniform(2, 10, 400), rng.uniform(0.005, 0.2, 400)
+    form = TustinForm(static="proportional")
+    true = TustinParameters(mu=0.5, F_s=1.4, v_s=0.04, delta_s=1.2, b=6.0)
+    fit = fit_tustin(F_n, v, predict(true, F_n, v, form), form=form)
+    assert fit.parameters.F_s == pytest.approx(1.4, rel=1e-3)
+    assert fit.mean(np.array([2.0]), np.array([0.0]))[0] == pytest.approx(2.8, rel=1e-3)
+    np.testing.assert_allclose(bound(true, np.array([3.0]), form), [4.2])
+
+
+@pytest.mark.parametrize("loss", ["huber", "student"])
+def test_wild_samples_do_not_pull_a_robust_fit(loss):
+    rng = np.random.default_rng(9)
+    F_n, v = rng.uniform(2, 10, 600), rng.uniform(0.005, 0.2, 600)
+    clean = predict(PLAIN, F_n, v)
+    F_t = clean + rng.normal(0, 0.1, 600)
+    F_t[::12] += 40.0
+    plain = fit_tustin(F_n, v, F_t)
+    robust = fit_tustin(F_n, v, F_t, form=TustinForm(loss=loss))
+    # 8 % of wild samples shift a mean by 3.3 N
+    assert np.abs(plain.mean(F_n, v) - clean).mean() > 2.0
+    assert np.abs(robust.mean(F_n, v) - clean).mean() < 0.15
+
+
+def test_canonical_form_is_the_same_curve():
+    row = TustinParameters(mu=0.71, F_s=13.52, v_s=-0.841, delta_s=-0.017, b=-23.4)
+    F_n, v = np.array([3.0, 5.0]), np.array([0.02, 0.1])
+    assert row.canonical().v_s == 0.841
+    np.testing.assert_array_equal(
+        predict(row, F_n, v), predict(row.canonical(), F_n, v)
+    )
+
+
+def test_a_force_that_falls_with_load_is_flagged_as_nonphysical():
+    rng = np.random.default_rng(10)
+    F_n, v = rng.uniform(2, 10, 300), rng.uniform(0.005, 0.2, 300)
+    F_t = 9.0 - 0.5 * F_n + 3.0 * v + rng.normal(0, 0.05, 300)
+    box = TustinBounds(mu=(-5.0, 5.0), F_s=(-60.0, 60.0))
+    flags = fit_tustin(F_n, v, F_t, box).flags
+    assert "mu negative" in flags
+    assert "b negative" not in flags
+
+
+def test_profile_holds_the_truth_and_closes_on_a_clear_curve():
+    rng = np.random.default_rng(12)
+    F_n, v = rng.uniform(2, 10, 3000), np.exp(rng.uniform(-5.3, -1.6, 3000))
+    fit = fit_tustin(F_n, v, predict(PLAIN, F_n, v) + rng.normal(0, 0.2, 3000))
+    found = fit.profiles
+    assert found.v_s.lower <= 0.04 * 1.3  # a step of the profile is 1.33
+    assert found.v_s.upper >= 0.04 / 1.3
+    assert found.are_closed
+    assert NOT_IDENTIFIABLE not in fit.flags
+
+
+def test_profile_of_a_straight_line_stays_open():
+    rng = np.random.default_rng(13)
+    F_n, v = rng.uniform(2, 10, 600), rng.uniform(0.005, 0.2, 600)
+    fit = fit_tustin(F_n, v, 0.5 * F_n + 1.0 + 5.0 * v + rng.normal(0, 0.3, 600))
+    assert not fit.profiles.are_closed
+    assert NOT_IDENTIFIABLE in fit.flags
+
+
+def test_binned_sums_give_the_error_of_the_samples(stones):
+    problem = Problem((stones.F_n, stones.v_t, stones.F_t), TustinBounds().box())
+    moments = Moments.of(problem, (stones.count,))
+    q = np.log([[0.001, 0.44], [0.05, 1.5], [0.3, 10.0]])
+    _, sse = solve_moments(moments.sums[0], moments.v, q, problem.box)
+    exact = [problem.project(point)[0].sse for point in q]
+    # bins of 2 % of velocity
+    np.testing.assert_allclose(sse, exact, rtol=1e-3)
+
+
+def test_bootstrap_draws_whole_trials_and_holds_the_truth():
+    rng = np.random.default_rng(14)
+    trials = []
+    for shift in rng.normal(0, 0.3, 10):  # what a trial has in common
+        F_n, v = rng.uniform(2, 10, 200), np.exp(rng.uniform(-5.3, -1.6, 200))
+        F_t = predict(PLAIN, F_n, v) + shift + rng.normal(0, 0.1, 200)
+        trials.append((F_n, v, F_t))
+    fit = fit_tustin(*(np.concatenate(column) for column in zip(*trials, strict=True)))
+    found = bootstrap_tustin(trials, fit, np.random.default_rng(0), draws=100)
+    for name, ends in found.items():
+        assert ends.lower <= getattr(fit.parameters, name) <= ends.upper
+        assert ends.lower <= getattr(PLAIN, name) <= ends.upper
+    # the shift of a trial has sd 0.3 N: over ten, F_s is known to about 2 x 0.1 N
+    assert 0.1 < found["F_s"].upper - found["F_s"].lower < 2.0
+
+
+def test_the_same_draws_give_the_same_intervals(stones):
+    half = stones.count // 2
+    columns = (stones.F_n, stones.v_t, stones.F_t)
+    trials = [tuple(c[:half] for c in columns), tuple(c[half:] for c in columns)]
+    fit = fit_tustin(*columns)
+    once, again = (
+        bootstrap_tustin(trials, fit, np.random.default_rng(3), draws=10)
+        for _ in range(2)
+    )
+    assert once == again
 
 
 def test_parameters_stay_inside_narrow_bounds(samples):

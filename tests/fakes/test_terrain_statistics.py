@@ -161,7 +161,7 @@ def folds(runs) -> dict[int, list[FoldResult]]:
     found = {}
     for seed in SETS:
         prepared = {name: runs[name, seed].trials for name in GROUNDS}
-        tasks = plan_folds(prepared, FitOptions())[0]
+        tasks = plan_folds(prepared, FitOptions(models=(TUSTIN, GP_SE)))[0]
         found[seed] = run_tasks(run_fold, tasks, os.cpu_count() or 1)
     return found
 

@@ -1,0 +1,103 @@
+"""Results of a study on disk, by the hash of what they were made from.
+
+An interrupted study resumes where it stopped, and a study repeated with one choice
+changed repeats only what that choice touches. A file that is damaged, foreign or of
+another version counts as not there.
+"""
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from analysis import kernels, noise, sparse, tustin
+from analysis.arcsine import Arcsine
+from analysis.crossval import FoldResult, FoldTask, ModelFold
+from analysis.files import write_atomic
+from analysis.gp import GaussianProcess
+from analysis.identifiability import Interval, Profiles
+from analysis.metrics import Score
+from analysis.models import FitOptions, GpModel, TustinModel
+from analysis.noise_choice import NoiseChoice, TailedNoise
+from analysis.plain_form import decode, encode
+from analysis.rows import Rows
+from analysis.search import Start
+from analysis.terrain_fit import TerrainFit, TerrainTask
+
+VERSION = 1  # of the numbers: higher whenever the same task gives another result
+
+TYPES = {
+    kind.__name__: kind
+    for kind in (
+        Arcsine,
+        FitOptions,
+        FoldResult,
+        FoldTask,
+        GaussianProcess,
+        GpModel,
+        Interval,
+        ModelFold,
+        NoiseChoice,
+        Profiles,
+        Rows,
+        Score,
+        Start,
+        TailedNoise,
+        TerrainFit,
+        TerrainTask,
+        TustinModel,
+        kernels.Product,
+        kernels.SquaredExponential,
+        kernels.Sum,
+        noise.ConstantNoise,
+        noise.LogLinearNoise,
+        sparse.SparseProcess,
+        tustin.TustinBounds,
+        tustin.TustinFit,
+        tustin.TustinForm,
+        tustin.TustinParameters,
+    )
+}
+
+
+class ResultStore:
+    """Keeps one file per task below a folder.
+
+    Args:
+        folder: made when the first result is kept; may be deleted at any time.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def get(self, task: Any) -> Any | None:  # noqa: ANN401
+        """Return the result of a task done before, None if there is none."""
+        try:
+            content = json.loads(self._path(task).read_bytes())
+            is_whole = content["digest"] == _digest(content["result"])
+            return decode(content["result"], TYPES) if is_whole else None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError):
+            return None
+
+    def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
+        """Keep a result.
+
+        Raises:
+            SettingsError: the folder cannot be written.
+        """
+        plain = encode(result)
+        content = {"digest": _digest(plain), "result": plain}
+        write_atomic(self._path(task), json.dumps(content).encode())
+
+    def _path(self, task: Any) -> Path:  # noqa: ANN401
+        return self._folder / f"{task_key(task)}.json"
+
+
+def task_key(task: Any) -> str:  # noqa: ANN401
+    """Return the hash of a task: its data, its options, the version of the numbers."""
+    return _digest({"version": VERSION, "task": encode(task)})
+
+
+def _digest(plain: Any) -> str:  # noqa: ANN401
+    text = json.dumps(plain, sort_keys=True, allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,104 @@
+"""traction identify: which terrain is this? Probabilities over time."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from analysis.recognition import Recognition
+    from analysis.series import TractionSeries
+    from experiments.console import Console
+
+EXAMPLES = """\
+  traction identify data/sessions/*/trials/T01.mcap --models terrains.json
+  traction identify trials.npz --models terrains.json --window 200 --json"""
+
+_WINDOWS = (50, 100, 200)  # kept samples
+_PER_SECOND = 100  # kept samples
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `identify`."""
+    parser.add_argument(
+        "files", nargs="+", type=Path, metavar="FILE", help="trials, npz or CSV tables"
+    )
+    parser.add_argument(
+        "--models",
+        type=Path,
+        required=True,
+        metavar="DB",
+        help="a terrain database, from traction export --terrain-db",
+    )
+    parser.add_argument(
+        "--window",
+        type=int,
+        choices=_WINDOWS,
+        default=100,
+        help="samples of motion per answer: 50, 100 or 200 are 0.5, 1 or 2 s (100)",
+    )
+    parser.add_argument(
+        "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
+    )
+    parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Recognise the ground of every trial; return the exit code."""
+    import json
+    from dataclasses import asdict
+
+    from analysis.prepare import PrepareOptions, prepare
+    from analysis.recognition import recognise
+    from analysis.terrain_db import load
+    from experiments.console import Console
+
+    console = Console(color=not args.no_color)
+    database = load(args.models)
+    results: list[dict[str, object]] = []
+    for series in _series(args):
+        trial = prepare(series, PrepareOptions())
+        found = recognise(trial, database, args.window)
+        if args.json:
+            content = None if found is None else asdict(found)
+            results.append({"trial": series.name, "terrain": series.terrain})
+            results[-1]["recognition"] = content
+        else:
+            _print(series, found, args.window, console)
+    if args.json:
+        console.say(json.dumps(results, indent=1))
+    return 0
+
+
+def _series(args: argparse.Namespace) -> list[TractionSeries]:
+    """Return the trials of all files, recorded ones and tables."""
+    from analysis.load import load_trial
+    from analysis.tables import load_tables, parse_columns
+
+    recorded = [path for path in args.files if path.suffix == ".mcap"]
+    tables = [path for path in args.files if path.suffix != ".mcap"]
+    found = [load_trial(path).series() for path in recorded]
+    if tables:
+        columns = parse_columns(args.columns) if args.columns else None
+        by_terrain = load_tables(tables, columns, args.terrain)
+        found += [series for group in by_terrain.values() for series in group]
+    return found
+
+
+def _print(
+    series: TractionSeries, found: Recognition | None, window: int, console: Console
+) -> None:
+    seconds = window / _PER_SECOND
+    if found is None:
+        console.say(f"{series.name}: under {seconds:g} s of motion; no answer.")
+        return
+    console.say(f"{series.name} ({series.terrain}), {seconds:g} s windows")
+    rows = [
+        [f"{moment.t:.1f} s", *(f"{p:.2f}" for p in moment.posterior), moment.best]
+        for moment in found.moments
+    ]
+    rows.append(["whole", *(f"{p:.2f}" for p in found.posterior), found.best])
+    console.table(["", *found.terrains, "answer"], rows)
+    console.say(f"smallest error: {found.least_error}")

@@ -1,0 +1,125 @@
+"""traction rehearse: the whole study simulated, analysed and held to its bands."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from analysis.bands import Finding
+    from experiments.console import Console
+    from experiments.rehearsal import Plan
+
+EXAMPLES = """\
+  traction rehearse --seed 2                all terrains, ten trials each, 43 bands
+  traction rehearse --friction 1            the joints of another arm; not gated"""
+
+_FAILED = 6
+_USUAL = 0.05  # share of friction that the bands are meant for
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `rehearse`."""
+    parser.add_argument(
+        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
+    )
+    parser.add_argument(
+        "--trials", type=int, default=10, metavar="N", help="of each terrain (10)"
+    )
+    parser.add_argument(
+        "--friction",
+        type=float,
+        default=_USUAL,
+        metavar="SHARE",
+        help="of the joints: 1 = as identified on another arm (0.05)",
+    )
+    parser.add_argument(
+        "--jobs", type=int, metavar="N", help="processes at a time (one per core)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record, analyse and judge; return 6 if a band is not met."""
+    import json
+
+    from experiments.console import Console
+    from experiments.rehearsal import Plan, analyse, as_plain, record_study
+    from experiments.settings import load_settings
+    from experiments.store import write_text
+
+    _check_arguments(args)
+    settings = load_settings(args.config)
+    rows = settings.matrix.terrains
+    plan = Plan(
+        config=args.config,
+        terrains=tuple(row.name for row in rows),
+        plates=tuple(row.name for row in rows if row.stones == "none"),
+        travel=min(row.travel for row in rows),
+        trials=args.trials,
+        seed=args.seed,
+        friction=args.friction,
+        jobs=args.jobs,
+    )
+    console = Console(color=not args.no_color)
+    folder = _free_folder(Path(args.data), args.seed)
+    console.say(
+        f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "
+        f"trials · seed {plan.seed} · {folder}"
+    )
+    record_study(plan, folder, console.say)
+    found = analyse(plan, folder)
+    write_text(folder / "bands.json", json.dumps(as_plain(plan, found), indent=1))
+    return _print(plan, found, folder, console)
+
+
+def _print(plan: Plan, found: Sequence[Finding], folder: Path, console: Console) -> int:
+    from experiments.console import BAD, GOOD
+
+    rows = [
+        [
+            f"{GOOD if finding.is_met else BAD} {finding.band.id}",
+            finding.band.what,
+            finding.text,
+            f"{finding.band.least:g} .. {finding.band.most:g}",
+        ]
+        for finding in found
+    ]
+    console.table(["", "measure", "value", "band"], rows)
+    failed = [finding.band.id for finding in found if not finding.is_met]
+    met = f"{len(found) - len(failed)} of {len(found)} bands met"
+    console.say(f"{met}. {folder / 'bands.json'}")
+    if not failed:
+        return 0
+    if plan.friction != _USUAL:
+        console.say(f"Outside: {', '.join(failed)}; not gated at this friction.")
+        return 0
+    console.problem(f"Outside their bands: {', '.join(failed)}.")
+    return _FAILED
+
+
+def _free_folder(data: Path, seed: int) -> Path:
+    """Return a folder below `data` that is not there yet."""
+    number, folder = 1, data / f"rehearsal_{seed}"
+    while folder.exists():
+        number += 1
+        folder = data / f"rehearsal_{seed}_{number}"
+    return folder
+
+
+def _check_arguments(args: argparse.Namespace) -> None:
+    from acquisition.errors import SettingsError
+
+    for name, value, least, most in (
+        ("seed", args.seed, 0, 10**9),
+        ("trials", args.trials, 1, 99),
+        ("jobs", args.jobs or 1, 1, 64),
+        ("friction", args.friction, 0.0, 2.0),
+    ):
+        if not least <= value <= most:
+            raise SettingsError(
+                f"--{name} {value:g} - expected {least:g}..{most:g}.",
+                hint="Nothing was started.",
+            )

@@ -1,0 +1,153 @@
+import math
+
+import numpy as np
+import pytest
+
+from analysis.bands import BANDS, Band, Finding, hold_against_bands
+from analysis.events import find_slips
+from analysis.model_measures import model_measures
+from analysis.models import GP_SE, TUSTIN, FitOptions
+from analysis.prepare import PrepareOptions, prepare
+from analysis.series import TractionSeries
+from analysis.slip_measures import GroundTrials, slip_measures
+from analysis.study import StudyOptions, run_study
+from tests.fakes.point_foot import PointFoot
+
+BAND = Band("X1", "something", 0.2, 0.4)
+# What a trial or two of three terrains can show.
+QUICK = ("D1", "D2", "D3", "D4", "E1", "E3", "E4", "F1")
+
+
+def test_there_are_forty_three_bands_and_each_has_its_name():
+    ids = [band.id for band in BANDS]
+    assert len(ids) == len(set(ids)) == 43
+    assert all(band.least < band.most for band in BANDS)
+
+
+@pytest.mark.parametrize(
+    ("values", "is_met"),
+    [
+        ((0.2, 0.4), True),
+        ((0.3,), True),
+        ((0.19,), False),
+        ((0.3, 0.41), False),
+        ((), False),
+        ((math.nan,), False),
+    ],
+)
+def test_a_band_is_met_when_every_value_is_inside(values, is_met):
+    assert Finding(BAND, values).is_met is is_met
+
+
+def test_what_was_not_measured_is_not_met():
+    found = hold_against_bands({"A2": [0.4]})
+    assert [f.band.id for f in found if f.is_met] == ["A2"]
+    assert found[-1].text == "none"
+
+
+def test_several_values_are_told_by_the_smallest_and_the_largest():
+    assert Finding(BAND, (0.31, 0.22, 0.28)).text == "0.22 .. 0.31"
+
+
+# --- slips, samples, rest -------------------------------------------------------------
+
+
+def ground(trials, *, is_plate):
+    prepared = tuple(prepare(series, PrepareOptions()) for series in trials)
+    slips = tuple(find_slips(trial.smooth) for trial in prepared)
+    return GroundTrials(is_plate, tuple(trials), prepared, slips)
+
+
+def failed(grounds, ids):
+    measures = slip_measures(grounds)
+    found = hold_against_bands(measures)
+    return {f.band.id for f in found if f.band.id in ids and not f.is_met}
+
+
+def test_stones_and_a_plate_by_themselves_meet_what_one_trial_can_show():
+    grounds = {
+        name: ground([PointFoot(name, 1, 1).run()], is_plate=name == "TF")
+        for name in ("S0", "B0", "TF")
+    }
+    assert failed(grounds, QUICK) == set()
+
+
+def drawn(terrain, trial, *, seed=1, samples=4000):
+    """Return the toy: no dynamics, a line in F_n and v_t with coloured noise."""
+    rng = np.random.default_rng([seed, trial, len(terrain)])
+    t = np.arange(samples) * 0.002
+    wander = np.cumsum(rng.normal(size=(samples, 3)), axis=0)
+    wander = (wander - wander.mean(axis=0)) / wander.std(axis=0)
+    v_t = np.clip(0.05 + 0.03 * wander[:, 0], 0.006, 0.19)
+    F_n = 3.5 + 0.8 * wander[:, 1]
+    if terrain.startswith("T"):
+        F_t = 0.8 * F_n + 0.2 * wander[:, 2]
+    else:
+        F_t = 0.7 * F_n + 4.0 - 20.0 * v_t + 2.0 * wander[:, 2]
+    return TractionSeries(terrain, f"{terrain}-{trial}", t, v_t, F_n, F_t)
+
+
+def test_a_toy_without_dynamics_is_rejected():
+    grounds = {
+        name: ground([drawn(name, k) for k in range(2)], is_plate=name == "TF")
+        for name in ("S0", "B0", "TF")
+    }
+    assert {"D1", "D4", "D5", "E2", "E3", "F1"} <= failed(
+        grounds, [band.id for band in BANDS]
+    )
+
+
+# --- models ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def toy_measures():
+    names = ("S0", "B0", "TF", "Tf")
+    trials = {name: [drawn(name, k, samples=2000) for k in range(5)] for name in names}
+    fit = FitOptions(models=(TUSTIN, GP_SE), gp_points=60, draws=0)
+    study = run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
+    return study, model_measures(study, ("TF", "Tf"))
+
+
+def test_own_errors_are_those_of_the_study(toy_measures):
+    study, measures = toy_measures
+    plates = [study.terrains[n].mae(m) for m in (TUSTIN, GP_SE) for n in ("TF", "Tf")]
+    assert sorted(measures["A1"]) == pytest.approx(sorted(plates))
+    assert measures["A2"] == pytest.approx([np.mean(plates)])
+    stones = [study.terrains[n].mae(GP_SE) for n in ("S0", "B0")]
+    assert measures["A4"] == pytest.approx([np.mean(stones)])
+
+
+def test_foreign_errors_are_those_of_the_cross_table(toy_measures):
+    study, measures = toy_measures
+    cross = study.cross(GP_SE)
+    expected = cross["S0"]["TF"] / cross["TF"]["TF"]
+    assert min(abs(value - expected) for value in measures["B6"]) < 1e-9
+
+
+def test_plates_and_stones_are_told_apart_and_twins_are_not(toy_measures):
+    _, measures = toy_measures
+    assert measures["B8"] == [1.0]
+    assert measures["B9"][0] < 1.0  # S0 and B0 are drawn from one law
+
+
+def test_a_model_of_stones_is_worse_on_plates_in_every_fold(toy_measures):
+    _, measures = toy_measures
+    # 2 x 2 cells each way; five folds reach p = 1/32
+    assert measures["B10"] == [8.0]
+
+
+def test_coloured_noise_is_remembered_for_tens_of_milliseconds(toy_measures):
+    _, measures = toy_measures
+    assert all(0.9 < value <= 1.0 for value in measures["C3"])
+    assert measures["C4"][0] < min(measures["C3"])
+
+
+def test_the_toy_fails_most_of_what_dynamics_would_show(toy_measures):
+    _, measures = toy_measures
+    assert set(measures) == {b.id for b in BANDS if b.id[0] in "ABC"} | {"E7"}
+
+
+def test_a_study_without_plates_has_no_such_measures(toy_measures):
+    study, _ = toy_measures
+    assert model_measures(study, ()) == {}

@@ -1,0 +1,323 @@
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError
+from analysis.identify import (
+    Confusion,
+    Expert,
+    Scores,
+    identify_study,
+    kind_of,
+    log_densities,
+    neighbour_correlation,
+    score_trial,
+    surface_of,
+)
+from analysis.metrics import Prediction
+from analysis.models import GP_SE, TUSTIN, FitOptions
+from analysis.prepare import PrepareOptions, prepare
+from analysis.recognition import recognise
+from analysis.series import TractionSeries
+from analysis.study import StudyOptions, run_study
+from analysis.terrain_db import Table, load
+from analysis.terrain_export import database_of
+
+LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
+
+
+def push(terrain, trial, ratio=None, spread=None):
+    """Return ten seconds on ground with F_t = ratio F_n and noise that lasts."""
+    from scipy.signal import lfilter
+
+    usual = LEVELS.get(terrain, (1.0, 0.2))
+    ratio, spread = ratio or usual[0], spread or usual[1]
+    rng = np.random.default_rng([trial, len(terrain), ord(terrain[-1])])
+    t = np.arange(5000) * 0.002
+    slow = np.cumsum(rng.normal(size=(5000, 2)), axis=0) / 40.0
+    v_t = np.clip(0.05 + 0.03 * np.sin(slow[:, 0]), 0.006, 0.19)
+    F_n = 3.5 + np.sin(slow[:, 1])
+    lasting = lfilter([np.sqrt(1 - 0.98**2)], [1.0, -0.98], rng.normal(size=5000))
+    F_t = ratio * F_n + spread * lasting
+    return TractionSeries(terrain, f"{terrain}-{trial}", t, v_t, F_n, F_t)
+
+
+@pytest.fixture(scope="module")
+def study():
+    trials = {name: [push(name, k) for k in range(4)] for name in LEVELS}
+    fit = FitOptions(models=(TUSTIN, GP_SE), gp_points=60, draws=0)
+    return run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
+
+
+@pytest.fixture(scope="module")
+def found(study):
+    return identify_study(study)
+
+
+@pytest.fixture(scope="module")
+def path(study, found, tmp_path_factory):
+    path = tmp_path_factory.mktemp("db") / "terrains.json"
+    path.write_text(database_of(study, found, "2027-01-15T08:00:00Z", 1))
+    return path
+
+
+# --- log densities --------------------------------------------------------------------
+
+
+def first_order(rho, sd=2.0, count=4000):
+    """Return a trial whose force is a first-order process around nothing."""
+    rng = np.random.default_rng(3)
+    z = np.zeros(count)
+    for i, noise in enumerate(rng.normal(size=count - 1), 1):
+        z[i] = rho * z[i - 1] + np.sqrt(1 - rho**2) * noise
+    t = np.arange(count) * 0.01
+    flat = np.full(count, 0.05)
+    series = TractionSeries("S0", "drawn", t, flat, flat + 3.0, sd * z)
+    return prepare(series, PrepareOptions(smoothing=1, downsample=1))
+
+
+def around_nothing(trial, sd=2.0):
+    return Prediction(np.zeros(trial.kept), np.full(trial.kept, sd))
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, 0.95])
+def test_the_correlation_of_neighbours_is_found(rho):
+    trial = first_order(rho)
+    found = neighbour_correlation([(trial, around_nothing(trial))])
+    assert found == pytest.approx(rho, abs=0.04)
+
+
+def test_a_correlated_trial_is_likeliest_under_its_own_correlation():
+    trial = first_order(0.9)
+    total = {
+        rho: log_densities(trial, around_nothing(trial), rho).sum()
+        for rho in (0.0, 0.7, 0.9, 0.97)
+    }
+    assert max(total, key=total.get) == 0.9
+
+
+def test_densities_are_those_of_the_process():
+    trial = first_order(0.5, count=50)
+    z = trial.F_t / 2.0
+    expected = -0.5 * z[0] ** 2 - 0.5 * math.log(2 * math.pi) - math.log(2.0)
+    step = (z[1] - 0.5 * z[0]) ** 2 / 0.75
+    second = -0.5 * step - 0.5 * math.log(2 * math.pi * 0.75) - math.log(2.0)
+    found = log_densities(trial, around_nothing(trial), 0.5)
+    assert found[:2] == pytest.approx([expected, second])
+
+
+def test_one_spike_does_not_decide():
+    trial = first_order(0.0, count=200)
+    calm = log_densities(trial, around_nothing(trial), 0.0)
+    F_t = trial.F_t.copy()
+    F_t[100] = 1e6
+    wild = log_densities(replace(trial, F_t=F_t), around_nothing(trial), 0.0)
+    assert calm.sum() - wild.sum() < 60.0
+
+
+def test_terrains_are_named_by_stone_and_surface():
+    assert [kind_of(n) for n in ("S10", "B0", "Tf", "moon")] == [
+        "small",
+        "big",
+        "flat",
+        "moon",
+    ]
+    assert [surface_of(n) for n in ("S10", "TF")] == ["rocky", "flat"]
+
+
+# --- a study --------------------------------------------------------------------------
+
+
+def test_terrains_that_differ_are_told_apart_by_their_density(found):
+    for levels in found.by_density.values():
+        assert levels["terrain"].accuracy > 0.9
+        assert levels["surface"].accuracy > 0.9
+        assert levels["surface"].counts.sum() == levels["terrain"].counts.sum()
+
+
+def test_the_paper_s_rule_stands_beside_the_density(found):
+    for levels in found.by_error.values():
+        assert set(levels) == {"terrain", "stones", "surface"}
+        assert levels["terrain"].accuracy > 0.9
+
+
+def test_many_half_convinced_models_of_one_kind_outvote_a_single_one():
+    density = np.zeros((10, 3))
+    density[:, 2] = 0.05  # the plate is a little likelier than either bed
+    scores = Scores(("S0", "S10", "TF"), density, np.zeros((10, 3)), np.zeros((10, 3)))
+    rows = slice(0, 10)
+    assert scores.likeliest(rows) == "TF"
+    assert scores.likeliest_kind(rows, surface_of) == "rocky"
+    sure = Scores(scores.terrains, 100.0 * density, scores.error, scores.strain)
+    assert sure.likeliest_kind(rows, surface_of) == "flat"
+
+
+def test_neighbouring_residuals_are_alike(found):
+    assert all(0.3 < rho < 1.0 for rho in found.rho.values())
+
+
+def test_a_study_of_one_terrain_identifies_nothing():
+    trials = {"TF": [push("TF", k) for k in range(3)]}
+    fit = FitOptions(models=(GP_SE,), gp_points=40, draws=0)
+    one = run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
+    assert identify_study(one) is None
+
+
+def test_accuracy_counts_every_kind_alike():
+    confusion = Confusion(("rocky", "flat"), np.array([[12, 0], [1, 6]]))
+    assert confusion.accuracy == pytest.approx((1.0 + 6 / 7) / 2)
+
+
+def test_a_posterior_is_a_probability(study):
+    trial = study.terrains["TF"].trials[0]
+    experts = {
+        name: Expert(result.folds[0].models[GP_SE].model.predict, 0.5)
+        for name, result in study.terrains.items()
+    }
+    scores = score_trial(trial, experts)
+    posterior = scores.posterior(slice(0, 100))
+    assert posterior.sum() == pytest.approx(1.0)
+    assert scores.terrains[int(posterior.argmax())] == "TF"
+
+
+# --- the database ---------------------------------------------------------------------
+
+
+def test_the_database_answers_as_the_models_do(study, path):
+    known = load(path).terrain("S0")
+    answer = known.predict(3.5, 0.05)
+    assert answer.mean == pytest.approx(1.5 * 3.5, abs=0.6)
+    assert 0.3 < answer.sd < 2.0
+    assert answer.quantile(0.5) == pytest.approx(answer.mean)
+    assert answer.quantile(0.05) < answer.mean < answer.quantile(0.95)
+
+
+def test_one_point_and_many_points_agree(path):
+    known = load(path).terrain("TF")
+    rng = np.random.default_rng(2)
+    F_n, v_t = rng.uniform(-2.0, 20.0, 50), rng.uniform(0.0, 0.4, 50)
+    many = known.predict_many(F_n, v_t)
+    single = [known.predict(f, v) for f, v in zip(F_n, v_t, strict=True)]
+    assert many.mean == pytest.approx([a.mean for a in single], abs=1e-9)
+    assert many.sd == pytest.approx([a.sd for a in single], abs=1e-9)
+
+
+def test_more_traction_than_there_is_is_a_risk(path):
+    known = load(path).terrain("TF")
+    mean = known.predict(3.5, 0.005).mean
+    assert known.slip_risk(0.5 * mean, 3.5) < 0.01
+    assert known.slip_risk(mean, 3.5) == pytest.approx(0.5, abs=1e-6)
+    assert known.slip_risk(1.5 * mean, 3.5) > 0.99
+
+
+def test_the_tables_are_close_to_the_model_between_their_points(study, path):
+    from analysis.models import FITTERS
+    from analysis.rows import Rows, Training
+    from analysis.terrain_export import _STREAM, zlib
+
+    trials = study.terrains["S0"].trials
+    rows = Rows.of(trials)
+    key = (study.options.fit.seed, zlib.crc32(b"S0"), _STREAM)
+    chosen = np.random.default_rng(key).choice(rows.count, 60, replace=False)
+    lengths = tuple(trial.kept for trial in trials)
+    model = FITTERS[GP_SE](Training(rows, lengths, chosen), study.options.fit)
+    F_n = np.linspace(2.6, 4.4, 37)
+    v_t = np.linspace(0.021, 0.079, 37)
+    exact = model.predict(F_n, v_t)
+    tabled = load(path).terrain("S0").predict_many(F_n, v_t)
+    assert np.abs(tabled.mean - exact.mean).max() < 0.05 * exact.sd.min()
+    assert np.abs(tabled.sd / exact.sd - 1.0).max() < 0.05
+
+
+def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
+    database = load(path)
+    with pytest.raises(SettingsError, match="no terrain 'moon'"):
+        database.terrain("moon")
+    with pytest.raises(SettingsError, match="no model 'oracle'"):
+        database.terrain("S0").predict(1.0, 0.1, "oracle")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"version": 2}, "format or version"),
+        ({"terrains": {}}, "0 terrains"),
+        ({"axes": {"F_n": [1.0, 0.0], "v_t": [0.1, 0.2]}}, "does not increase"),
+        ({"axes": {"F_n": [0.0, float("nan")], "v_t": [0.1, 0.2]}}, "not increase"),
+        ({"default": "oracle"}, "lacks the model"),
+        ({"terrains": {"S0": {"kind": "small"}}}, "is missing"),
+        ({"terrains": 3}, "no terrain database"),
+    ],
+)
+def test_a_file_that_is_no_database_is_refused(path, tmp_path, change, said):
+    content = json.loads(path.read_text()) | change
+    bad = tmp_path / "bad.json"
+    bad.write_text(json.dumps(content))
+    with pytest.raises(SettingsError, match=said):
+        load(bad)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "nonsense", "[" * 100_000])
+def test_other_texts_are_refused(tmp_path, text):
+    bad = tmp_path / "bad.json"
+    bad.write_text(text)
+    with pytest.raises(SettingsError, match="no terrain database"):
+        load(bad)
+
+
+def test_a_missing_file_is_named(tmp_path):
+    with pytest.raises(SettingsError, match="cannot be read"):
+        load(tmp_path / "gone.json")
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False), st.floats(-1e9, 1e9))
+def test_no_point_is_too_far_away_for_an_answer(F_n, v_t):
+    rows = ((1.0, 2.0), (3.0, 4.0))
+    table = Table((0.0, 10.0), (0.005, 0.2), rows, rows)
+    mean, sd = table.at(F_n, v_t)
+    assert 1.0 <= mean <= 4.0
+    assert mean == sd
+
+
+# --- recognition ----------------------------------------------------------------------
+
+
+def kept(series):
+    return prepare(series, PrepareOptions())
+
+
+def test_a_trial_that_was_never_seen_is_recognised(path):
+    database = load(path)
+    for name in LEVELS:
+        seen = recognise(kept(push(name, 77)), database)
+        assert seen.best == name
+        assert seen.posterior[seen.terrains.index(name)] > 0.9
+        assert seen.least_error == name
+
+
+def test_probabilities_come_over_time(path):
+    seen = recognise(kept(push("TF", 78)), load(path), window=50)
+    times = [moment.t for moment in seen.moments]
+    assert times == sorted(times)
+    assert len(times) >= 15
+    assert all(sum(m.posterior) == pytest.approx(1.0) for m in seen.moments)
+
+
+def test_ground_that_nobody_knows_is_none_of_the_known(path):
+    seen = recognise(kept(push("moon", 1, ratio=4.0, spread=0.1)), load(path))
+    assert seen.best == "none"
+
+
+def test_a_trial_too_short_for_a_window_has_no_answer(path):
+    short = push("TF", 1)
+    cut = TractionSeries("TF", "short", *(c[:200] for c in _columns(short)))
+    assert recognise(kept(cut), load(path), window=200) is None
+
+
+def _columns(series):
+    return series.t, series.v_t, series.F_n, series.F_t

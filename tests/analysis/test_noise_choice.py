@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+
+from analysis.gp import fit_gp
+from analysis.metrics import Prediction
+from analysis.noise_choice import TailedNoise, choose_noise
+from analysis.rows import Rows, Training
+
+PER_TRIAL = 120
+
+
+def training(noise, trials=6, seed=0):
+    rng = np.random.default_rng(seed)
+    count = trials * PER_TRIAL
+    F_n, v_t = rng.uniform(1, 8, count), rng.uniform(0.01, 0.2, count)
+    rows = Rows(F_n, v_t, 0.5 * F_n + noise(rng, F_n))
+    chosen = rng.choice(count, 100, replace=False)
+    return Training(rows, (PER_TRIAL,) * trials, chosen)
+
+
+def test_constant_noise_is_kept_where_it_is_the_truth():
+    data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size))
+    choice = choose_noise(data, 100, seed=0)
+    assert choice.chosen == "constant"
+    assert set(choice.nlpd) == {"constant", "loglinear", "student"}
+
+
+def test_noise_that_grows_with_load_is_chosen():
+    data = training(
+        lambda rng, F_n: 0.05 * np.exp(0.5 * F_n) * rng.normal(size=F_n.size)
+    )
+    choice = choose_noise(data, 100, seed=0)
+    assert choice.chosen == "loglinear"
+    assert choice.nlpd["loglinear"] < choice.nlpd["constant"] - 0.03
+
+
+def test_heavy_tails_are_chosen():
+    data = training(lambda rng, F_n: 0.3 * rng.standard_t(2.2, F_n.size))
+    assert choose_noise(data, 100, seed=0).chosen == "student"
+
+
+def test_one_training_trial_leaves_nothing_to_choose_by():
+    data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
+    assert choose_noise(data, 50, seed=0).chosen == "constant"
+
+
+def test_tails_have_the_degrees_of_freedom_of_the_noise():
+    data = training(lambda rng, F_n: 0.3 * rng.standard_t(4.0, F_n.size), trials=20)
+    process = fit_gp(data.subset.inputs, data.subset.F_t)
+    tails = TailedNoise.of(process, data)
+    # 2300 samples determine nu = 4 to about a tenth
+    assert tails.nu == pytest.approx(4.0, abs=1.2)
+    assert 2.1 <= tails.nu <= 60.0
+
+
+def test_tails_keep_the_mean_and_state_their_standard_deviation():
+    normal = Prediction(np.array([1.0]), np.array([2.0]))
+    found = TailedNoise(nu=4.0, spread=0.5).applied_to(normal)
+    assert found.mean[0] == 1.0
+    assert found.sd[0] == pytest.approx(0.5 * 2.0 * np.sqrt(2.0))
+    assert found.scale[0] == pytest.approx(1.0)
+
+
+def test_without_rows_outside_the_chosen_there_are_no_tails():
+    data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
+    everything = Training(data.rows, data.lengths, np.arange(data.rows.count))
+    process = fit_gp(data.subset.inputs, data.subset.F_t)
+    assert TailedNoise.of(process, everything) is None

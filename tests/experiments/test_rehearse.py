@@ -1,0 +1,139 @@
+"""The rehearsed study through the whole program, in a short container."""
+
+import hashlib
+import json
+from concurrent.futures import Future
+
+import pytest
+
+from acquisition.trial_file.reader import TrialReader
+from experiments import rehearsal
+from experiments.settings import load_settings
+from experiments.store import list_sessions
+from tests.experiments.program import traction, write_config
+
+
+class InThisThread:
+    """An executor that does at once what it is given."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        return None
+
+    def submit(self, work, *arguments):
+        done = Future()
+        done.set_result(work(*arguments))
+        return done
+
+
+def in_this_process(arguments, place):
+    """Run a session here instead of in a process of its own, which starts slowly."""
+    done = traction(*arguments)
+    place.with_name(place.name + ".log").write_text(done.out + done.err)
+    return done.code
+
+
+def two_terrains(folder):
+    """Write settings with a bed of stones and a plate only."""
+    config = write_config(folder)
+    matrix = config.with_name("matrix.toml")
+    rows = matrix.read_text().split("[[terrains]]")
+    kept = [rows[0], *(r for r in rows if 'name = "B0"' in r or 'name = "TF"' in r)]
+    matrix.write_text("[[terrains]]".join(kept))
+    assert len(load_settings(config).matrix.terrains) == 2
+    return config
+
+
+def digests(data):
+    """Return what was recorded, by terrain: times apart, bit for bit."""
+    return {
+        session.terrain: [
+            hashlib.sha256(TrialReader(path).cycles().data.tobytes()).hexdigest()
+            for path in session.kept_trials()
+        ]
+        for session in list_sessions(data)
+    }
+
+
+@pytest.fixture(scope="module")
+def rehearsed(tmp_path_factory):
+    """Return (what was said, data folder) of a rehearsal of one trial each."""
+    folder = tmp_path_factory.mktemp("rehearsed")
+    config = two_terrains(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rehearsal, "_record", in_this_process)
+        patch.setattr(rehearsal, "_pool", lambda _: InThisThread())
+        done = traction(
+            *("rehearse", "--trials", 1, "--seed", 3, "--jobs", 1),
+            *("--config", config, "--data", folder),
+        )
+    return done, folder / "rehearsal_3"
+
+
+def test_a_study_outside_its_bands_ends_with_exit_code_6(rehearsed):
+    done, _ = rehearsed
+    assert done.code == 6  # one trial in seven centimetres shows no slips
+    assert "Outside their bands: " in done.err
+    assert "D1" in done.err
+
+
+def test_every_band_is_printed_with_its_limits(rehearsed):
+    done, _ = rehearsed
+    assert "slips per trial, each stone terrain" in done.out
+    assert "2.5 .. 13" in done.out
+    assert "T1" in done.out
+
+
+def test_the_bands_are_written_for_programs(rehearsed):
+    _, folder = rehearsed
+    found = json.loads((folder / "bands.json").read_text())
+    by_id = {band["id"]: band for band in found["bands"]}
+    assert found["plan"]["seed"] == 3
+    assert by_id["D1"]["is_met"] is False
+    assert by_id["T1"]["is_met"] is True  # signs, frames and kinematics are right
+
+
+def test_with_few_trials_the_bands_of_models_are_left_out(rehearsed):
+    found = json.loads((rehearsed[1] / "bands.json").read_text())
+    assert not {band["id"][0] for band in found["bands"]} & {"A", "B", "C"}
+
+
+def test_what_every_session_said_is_kept(rehearsed):
+    assert "Complete." in (rehearsed[1] / "TF.log").read_text()
+
+
+def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
+    config = two_terrains(tmp_path)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rehearsal, "_record", in_this_process)
+        patch.setattr(rehearsal, "_pool", lambda _: InThisThread())
+        done = traction(
+            *("rehearse", "--trials", 1, "--friction", 1, "--jobs", 1),
+            *("--config", config, "--data", tmp_path),
+        )
+    assert done.code == 0
+    assert "not gated at this friction" in done.out
+
+
+@pytest.mark.parametrize("option", [("--trials", 0), ("--friction", 3), ("--jobs", 99)])
+def test_what_makes_no_sense_is_refused(option):
+    done = traction("rehearse", *option)
+    assert done.code == 2
+    assert "Nothing was started." in done.err
+
+
+@pytest.mark.long
+def test_terrains_side_by_side_give_the_same_bits_as_one_by_one(tmp_path):
+    config = two_terrains(tmp_path)
+    found = []
+    for jobs in (1, 2):
+        data = tmp_path / str(jobs)
+        traction(
+            *("rehearse", "--trials", 2, "--jobs", jobs),
+            *("--config", config, "--data", data),
+        )
+        found.append(digests(data / "rehearsal_1"))
+    assert found[0] == found[1]
+    assert len(found[0]["TF"]) == 2

@@ -1,0 +1,135 @@
+"""One flipped sign or turned frame anywhere makes measured and true disagree.
+
+The proof that frames, signs, tare and kinematics are right is a comparison with what
+the simulation knows; here it is proven that the comparison can fail.
+"""
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import analysis.load
+import fakes.rig
+import ft_sensor.payload
+from analysis.load import load_trial
+from experiments.truth import truth_errors
+from ft_sensor.payload import Payload
+from tests.experiments.program import only_session, run_short, write_config
+from wam.transmission import Transmission
+
+LARGEST_V, LARGEST_F = 1.5e-3, 1.5  # m/s rms, N mean: drift and bias of one trial
+
+
+class ReadingRig(fakes.rig.FakeRig):
+    """A rig whose sensor is mounted in another way than rig.toml says."""
+
+    changes: ClassVar[dict] = {}
+
+    def __init__(self, scene, constants, tool, clock, options=None, network=None):
+        tool = replace(tool, **self.changes)
+        super().__init__(scene, constants, tool, clock, options, network)
+
+
+class TurnedRig(fakes.rig.FakeRig):
+    """A rig whose container lies 30 degrees beside where the matrix says."""
+
+    def __init__(self, scene, *rest, **options):
+        frame = replace(scene.frame, heading=scene.frame.heading + np.radians(30.0))
+        super().__init__(replace(scene, frame=frame), *rest, **options)
+
+
+def sensor(**changes):
+    def apply(patch):
+        patch.setattr(ReadingRig, "changes", changes)
+        patch.setattr(fakes.rig, "FakeRig", ReadingRig)
+
+    return apply
+
+
+def container_turned(patch):
+    patch.setattr(fakes.rig, "FakeRig", TurnedRig)
+
+
+def joint_reversed(joint):
+    """Let the driver count one joint backwards; the motors do not."""
+
+    def apply(patch):
+        right = Transmission.joints
+
+        def wrong(self, counts):
+            q = right(self, counts)
+            q[joint - 1] = -q[joint - 1]
+            return q
+
+        patch.setattr(Transmission, "joints", wrong)
+
+    return apply
+
+
+def force_turned_backwards(patch):
+    def wrong(self, wrench, rotation):
+        turned = np.swapaxes(rotation, -1, -2)
+        force = wrench[..., :3].dot(self.rotation.T)
+        return np.matmul(turned, force[..., None])[..., 0]
+
+    patch.setattr(Payload, "to_base", wrong)
+
+
+def traction_with(*signs):
+    """Let the projection onto the terrain's axes have these signs."""
+
+    def apply(patch):
+        right = ft_sensor.payload.traction
+
+        def wrong(axes, velocity, force):
+            return right(axes, velocity, force) * np.array(signs)
+
+        patch.setattr(analysis.load, "traction", wrong)
+
+    return apply
+
+
+FLIPS = {
+    "sensor sign": sensor(sensor_sign=-1.0),
+    "sensor turned by a quarter": sensor(sensor_angle=np.pi / 2),
+    "rotation of the force": force_turned_backwards,
+    "sign of v_t": traction_with(-1.0, 1.0, 1.0),
+    "sign of F_t": traction_with(1.0, -1.0, 1.0),
+    "sign of F_n": traction_with(1.0, 1.0, -1.0),
+    "heading of the container": container_turned,
+    "direction of joint 2": joint_reversed(2),
+    "direction of joint 6": joint_reversed(6),
+}
+QUICK = ("sensor sign", "sign of v_t")
+
+
+def agrees(folder, flip=None):
+    """Return whether a recorded trial agrees with its truth; no trial is no."""
+    config = write_config(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        if flip is not None:
+            flip(patch)
+        done = run_short(config, folder / "data", "S10")
+        if done.code:
+            return False
+        path = only_session(folder / "data") / "trials" / "T01.mcap"
+        found = truth_errors(load_trial(path))
+    assert found is not None
+    return found.v_t < LARGEST_V and max(found.F_t, found.F_n) < LARGEST_F
+
+
+def test_measured_and_true_agree_as_the_program_is(tmp_path):
+    assert agrees(tmp_path)
+
+
+@pytest.mark.parametrize("what", QUICK)
+def test_a_flipped_sign_is_noticed(tmp_path, what):
+    assert not agrees(tmp_path, FLIPS[what])
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("what", [name for name in FLIPS if name not in QUICK])
+def test_every_flipped_sign_and_turned_frame_is_noticed(tmp_path, what):
+    assert not agrees(tmp_path, FLIPS[what])
