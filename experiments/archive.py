@@ -1,4 +1,4 @@
-"""What becomes of a recorded trial: sealed, kept or rejected, with its sidecar."""
+"""What is written of a recorded trial: the sealed file, its sidecar, the flight."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,8 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.verify import Verified
 from acquisition.trial_file.writer import TrialHeader
 from experiments.rigs import Rig
-from experiments.store import iso_utc, move_file, read_json, write_json
+from experiments.session import KEEP
+from experiments.store import read_json, write_json
 from experiments.trial import SessionFacts, TrialName, write_flight, write_truth
 
 COMPLETE = frozenset({"travel", "key", "time-limit"})
@@ -31,6 +32,29 @@ class Outcome:
     def status(self) -> str:
         """The machine's word on the trial, never a verdict."""
         return "complete" if self.reason in COMPLETE else "interrupted"
+
+
+def sidecar_of(
+    name: TrialName, verified: Verified | None, outcome: Outcome
+) -> dict[str, object]:
+    """Return the sidecar of an attempt without a verdict; no file where None."""
+    return {
+        "trial": name.kept,
+        "attempt": name.attempt,
+        "sha256": verified.sha256 if verified else "",
+        "size": verified.size if verified else 0,
+        "cycles": verified.cycles if verified else 0,
+        "duration": round(verified.duration, 3) if verified else 0.0,
+        "worst_gap": round(verified.worst_gap, 6) if verified else 0.0,
+        "status": outcome.status,
+        "stop_reason": outcome.reason,
+        "displacement": round(outcome.displacement, 4),
+        "verdict": "",
+        "reason": "",
+        "who": "",
+        "when": "",
+        "history": [],
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,49 +84,33 @@ class Archive:
             return f"No flight record: {error}"
         return f"Flight record: faults/{path.name}."
 
-    def sidecar(
-        self, name: TrialName, verified: Verified, outcome: Outcome
-    ) -> dict[str, object]:
-        """Return the sidecar of a sealed trial, without a verdict."""
-        return {
-            "trial": name.kept,
-            "attempt": name.attempt,
-            "sha256": verified.sha256,
-            "size": verified.size,
-            "cycles": verified.cycles,
-            "duration": round(verified.duration, 3),
-            "worst_gap": round(verified.worst_gap, 6),
-            "status": outcome.status,
-            "stop_reason": outcome.reason,
-            "displacement": round(outcome.displacement, 4),
-            "verdict": "",
-            "reason": "",
-            "who": self.facts.operator,
-            "when": "",
-            "history": [],
-        }
+    def write_sidecar(
+        self,
+        name: TrialName,
+        verified: Verified,
+        outcome: Outcome,
+        ratio: float | None = None,
+    ) -> None:
+        """Write what is known of a sealed trial beside it, without a verdict.
+
+        Args:
+            name: the attempt.
+            verified: what reading the file back has shown.
+            outcome: how the recording ended.
+            ratio: slope of F_t over F_n; None = not known.
+
+        Raises:
+            TrialFileError: the disk is full or gone.
+        """
+        facts = {**sidecar_of(name, verified, outcome), "ratio": ratio}
+        write_json(self.facts.folder.trials / f"{name.kept}.json", facts)
 
     def kept_ratios(self) -> list[float]:
         """Return the quick fits of the trials kept so far, from their sidecars."""
         found: list[float] = []
         for path in sorted(self.facts.folder.trials.glob("T*.json")):
-            ratio = read_json(path).get("ratio")
-            if isinstance(ratio, float):
+            sidecar = read_json(path)
+            ratio = sidecar.get("ratio")
+            if sidecar.get("verdict") == KEEP and isinstance(ratio, float):
                 found.append(ratio)
         return found
-
-    def keep(self, name: TrialName, sidecar: dict[str, object]) -> None:
-        """Write the verdict `keep` beside the trial."""
-        sidecar.update(verdict="keep", when=iso_utc(self.rig.clock.utc_ns()))
-        write_json(self.facts.folder.trials / f"{name.kept}.json", sidecar)
-
-    def reject(self, name: TrialName, sidecar: dict[str, object], why: str) -> None:
-        """Move the trial to rejected/ with the verdict and its reason."""
-        when = iso_utc(self.rig.clock.utc_ns())
-        sidecar.update(verdict="reject", reason=why, when=when)
-        folder = self.facts.folder
-        for suffix in (".mcap", ".truth.mcap"):
-            source = folder.trials / f"{name.kept}{suffix}"
-            if source.exists():
-                move_file(source, folder.rejected / f"{name.rejected}{suffix}")
-        write_json(folder.rejected / f"{name.rejected}.json", sidecar)

@@ -1,6 +1,10 @@
 """Arguments that more than one command takes; imports nothing slow."""
 
+import shlex
 from argparse import ArgumentParser, ArgumentTypeError
+from pathlib import Path
+
+PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 
 
 def whole_number(text: str) -> int:
@@ -23,3 +27,39 @@ def add_seed(parser: ArgumentParser) -> None:
         metavar="N",
         help="of the choice of points (0)",
     )
+
+
+def add_reopening(parser: ArgumentParser) -> None:
+    """Declare what every command takes that opens a session once more."""
+    parser.add_argument(
+        "--fake", action="store_true", help="only a simulated session is meant"
+    )
+    parser.add_argument(
+        "--fast", action="store_true", help="stepped time, only if simulated"
+    )
+    parser.add_argument(
+        "--operator", default="", metavar="NAME", help="who pushes (as before)"
+    )
+    parser.add_argument(
+        "--force", action="store_true", help="record under other conditions, too"
+    )
+    parser.add_argument(
+        "--operator-script",
+        metavar="FILE|auto",
+        help="answers to the reviews, only if simulated",
+    )
+    parser.add_argument(
+        "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
+
+
+def add_author(parser: ArgumentParser) -> None:
+    """Declare whose word a note or a verdict is."""
+    parser.add_argument(
+        "--operator", default="", metavar="NAME", help="who says so (your login)"
+    )
+
+
+def data_option(data: Path) -> str:
+    """Return the option that names `data` in a command to be typed, "" if none."""
+    return "" if str(data) == "data" else f" --data {shlex.quote(str(data))}"

@@ -2,42 +2,71 @@
 
 from dataclasses import dataclass, field
 
-from experiments.rigs import Rig
-from experiments.session import SessionState, apply
-from experiments.store import iso_utc, write_json
-from experiments.trial import SessionFacts
+from acquisition.clock import Clock
+from acquisition.errors import SessionError
+from experiments.session import SessionState, apply, refusal, replay
+from experiments.shelf import decision_of, shelve
+from experiments.store import SessionFolder, iso_utc, read_json, write_json
 
 
 @dataclass(slots=True)
 class Book:
-    """Writes every event to the journal first and derives the state from it."""
+    """Writes every event to the journal first; state and files follow from it.
 
-    rig: Rig
-    facts: SessionFacts
+    Attributes:
+        folder: the session on the disk.
+        clock: whose time the events carry.
+        state: what the journal says.
+    """
+
+    folder: SessionFolder
+    clock: Clock
     state: SessionState = field(default_factory=SessionState)
 
     def note(self, event: str, **facts: object) -> None:
-        """Append an event of now, apply it, and replace session.json."""
-        utc = iso_utc(self.rig.clock.utc_ns())
+        """Append an event of now, apply it, and replace session.json.
+
+        Files of a trial move when the event is a verdict on it.
+
+        Raises:
+            SessionError: the event cannot happen in this state.
+            TrialFileError: the disk is full or gone.
+        """
+        utc = iso_utc(self.clock.utc_ns())
         entry: dict[str, object] = {"event": event, "utc": utc, **facts}
-        self.facts.folder.append_event(entry)
+        reason = refusal(self.state, entry)
+        if reason:
+            raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
+        self.folder.append_event(entry)
         self.state = apply(self.state, entry)
-        write_json(self.facts.folder.path / "session.json", self._summary())
+        decision = decision_of(entry)
+        if decision is not None:
+            shelve(self.folder, decision)
+        self._write_summary(facts)
 
     def saved(self) -> str:
         """Return what is safe on the disk, for a message."""
         kept = len(self.state.kept)
         trials = "1 trial is" if kept == 1 else f"{kept} trials are"
-        return f"{trials} safe in {self.facts.folder.path}."
+        return f"{trials} safe in {self.folder.path}."
 
-    def _summary(self) -> dict[str, object]:
-        return {
-            "id": self.facts.folder.id,
+    def _write_summary(self, facts: dict[str, object]) -> None:
+        path = self.folder.path / "session.json"
+        operator = facts.get("operator", read_json(path).get("operator", ""))
+        summary: dict[str, object] = {
+            "id": self.folder.id,
+            "phase": str(self.state.phase),
             "terrain": self.state.terrain,
-            "simulated": self.rig.is_simulated,
-            "operator": self.facts.operator,
+            "simulated": self.folder.is_simulated,
+            "operator": operator,
             "trials": self.state.wanted,
             "kept": [f"T{number:02d}" for number in self.state.kept],
             "rejected": self.state.rejected,
             "ended": self.state.ended,
         }
+        write_json(path, summary)
+
+
+def open_book(folder: SessionFolder, clock: Clock) -> Book:
+    """Return the book of a session that is on the disk already."""
+    return Book(folder, clock, replay(folder.events()))

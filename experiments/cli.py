@@ -12,15 +12,22 @@ from acquisition.errors import TractionError
 COMMANDS = {
     "check": "is the rig fit to run? one graded page",
     "run": "record a session of trials on one terrain",
+    "resume": "continue the session that is not finished",
+    "redo": "record any one trial of a session once more",
     "status": "the matrix board, counted from verified files",
+    "note": "write a remark on a session or a trial",
+    "verdict": "keep or reject a recorded trial, days later",
     "zero": "set the home position after confirmation",
     "bench": "what the loop achieves on this machine",
     "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
-    "replay": "what was said on the bus, in words",
+    "replay": "show a trial again, or a bus log in words",
+    "export": "trials as CSV tables with units and checksums",
+    "init": "write rig.toml and matrix.toml to be edited",
     "recover": "save what is sound of trials that were not ended",
     "rehearse": "the whole study simulated, held against what it has to show",
     "report": "fit and compare models of recorded sessions, write the report",
+    "identify": "which terrain is this? probabilities over time",
     "fit": "the same for tables that Traction did not record",
 }
 EXIT_CODES = """\

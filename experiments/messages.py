@@ -199,21 +199,21 @@ CATALOGUE: dict[str, Message] = {
     "estop": Message(
         "Stop pressed{when}.",
         "stopped by its hardware",
-        "Release it, press Shift-idle, zero the arm, then: traction run again.",
+        "Release it, press Shift-idle, zero the arm, then: traction resume.",
         4,
         "The hardware stop takes the power away; positions have to be defined anew.",
     ),
     "pendant-idle": Message(
         "The pendant or the safety module put the arm to idle{when}.",
         "idle, braked",
-        "Look at the pendant's lamps, then: traction run again.",
+        "Look at the pendant's lamps, then: traction resume.",
         4,
         "Shift-idle was pressed or a safety limit was exceeded.",
     ),
     "safety-idle": Message(
         "The safety module put the arm to idle: {causes}.",
         "idle, braked",
-        "Press Shift-idle to clear it, then: traction run again.",
+        "Press Shift-idle to clear it, then: traction resume.",
         4,
         "The module supervises speed, commanded torque, bus voltage and the traffic of "
         "the loop; its limits are in [safety] of rig.toml.",
@@ -222,7 +222,7 @@ CATALOGUE: dict[str, Message] = {
         "The safety module stopped the arm: {causes}.",
         "stopped by its hardware",
         "Check the arm's power supply, press Shift-idle, zero the arm, then: traction "
-        "run again.",
+        "resume.",
         4,
         "A voltage fault, or a speed above the limit for half a second, takes the "
         "power away; positions have to be defined anew.",
@@ -249,11 +249,34 @@ CATALOGUE: dict[str, Message] = {
         "Every file is read back before it counts.",
     ),
     "locked": Message(
-        "{session} is open in process {pid}.",
+        "{session} is open in process {pid} since {since} UTC.",
         "",
-        "To watch: traction status",
+        "To watch: traction status --follow",
         2,
-        "One session at a time writes into a data folder.",
+        "One process at a time writes into a session. When it dies, its lock is open.",
+    ),
+    "mismatch": Message(
+        "Unfinished session {session} is {terrain}, you asked for {asked}.",
+        "",
+        "[1] resume {terrain}  [2] close it and start {asked}",
+        2,
+        "Terrains stand in the room one at a time, so the one that is there is "
+        "finished first. A closed session keeps its trials.",
+    ),
+    "crash": Message(
+        "{session} ended without closing ({where}). {kept} kept.",
+        "",
+        "[r]esume{redone}  [n]ew: close it and start another",
+        2,
+        "Every event is on the disk before the next one begins. A trial without a "
+        "verdict is saved as far as it goes and recorded again.",
+    ),
+    "unfinished": Message(
+        "{session} {terrain} is unfinished, {kept} of {wanted} kept.",
+        "",
+        "[r]esume  [n]ew: close it and start another",
+        2,
+        "A session is unfinished until all its trials are kept or it is closed.",
     ),
     "interrupted": Message(
         "Interrupted.",

@@ -30,12 +30,14 @@ AUTO_PATIENCE = 60.0  # for a foot that is never lifted and still [s]
 class Prompt(Enum):
     """What the person is asked for."""
 
+    CHOICE = "choice"
     SUPPORT = "support"
     CLEAR = "clear"
     MOVING = "moving"
     TOUCH = "touch"
     LIFT = "lift"
     READY = "ready"
+    PAUSED = "paused"
     RECORDING = "recording"
     REVIEW = "review"
 
@@ -105,6 +107,7 @@ _AUTOMATIC: dict[Prompt, Callable[[Asked], str]] = {
     Prompt.CLEAR: lambda _: " ",
     Prompt.LIFT: _lift_key,
     Prompt.READY: _ready_key,
+    Prompt.PAUSED: lambda _: " ",
     Prompt.TOUCH: _touch_key,
     Prompt.REVIEW: _review_key,
 }

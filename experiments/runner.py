@@ -18,6 +18,7 @@ from experiments.company import FaultedError, StopAskedError
 from experiments.live import recording_screen
 from experiments.messages import CATALOGUE, Circumstances, fault_text, rest_text
 from experiments.operator import REJECT_REASONS, Prompt
+from experiments.phases import Event
 from experiments.review import Review, review_trial
 from experiments.stage import TICK, Stage
 from experiments.store import write_text
@@ -36,34 +37,42 @@ ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 class SessionRunner:
     """Runs one session on a rig that passed its preflight."""
 
-    def __init__(self, stage: Stage, facts: SessionFacts) -> None:
+    def __init__(self, stage: Stage, facts: SessionFacts, book: Book) -> None:
         self.stage = stage
         self.facts = facts
         self.rig = stage.rig
         self.control = stage.rig.crew.desk
         self.recorder = stage.rig.crew.recorder
-        self.book = Book(stage.rig, facts)
+        self.book = book
         self.archive = Archive(stage.rig, facts)
         self._place = Circumstances()
         self._faults = 0
 
-    def run(self, trials: int) -> int:
-        """Record until `trials` are kept; return the exit code.
+    def run(self, opening: Event, **asked: object) -> int:
+        """Record until nothing is left to record; return the exit code.
 
         Every way out - complete, stop, fault, bug - leaves the arm idle and what was
         recorded on the disk.
+
+        Args:
+            opening: how the session is opened: started, resumed, or for a redo.
+            asked: what the journal keeps of it.
         """
-        row = self.rig.row
-        self.book.note("session-started", terrain=row.name, trials=trials)
+        self.book.note(opening, **asked)
         code, reason = 1, "bug"
         try:
             activate(self.stage)
-            while not self.book.state.is_complete:
+            self.book.note(Event.ACTIVATED)
+            while not self.book.state.is_over:
                 self._try_trial()
-            code, reason = 0, "complete"
+            code = 0
+            reason = "complete" if self.book.state.is_complete else "unfinished"
         except StopAskedError:
             code, reason = 5, "unfinished"
-            self._say(CATALOGUE["interrupted"].text({}, self.book.saved()))
+            self._say(
+                f"{CATALOGUE['interrupted'].text({}, self.book.saved())} "
+                f"To go on: traction resume {self.facts.folder.id}"
+            )
         except FaultedError as fault:
             code, reason = 4, fault.verdict.reason
             self._tell_fault(fault.verdict)
@@ -75,7 +84,7 @@ class SessionRunner:
             self._tell_bug(traceback.format_exc())
         finally:
             self._make_safe()
-            self.book.note("session-ended", reason=reason)
+            self.book.note(Event.ENDED, reason=reason)
         return code
 
     # --- phases -------------------------------------------------------------------
@@ -104,9 +113,7 @@ class SessionRunner:
         )
         self._tare(name)
         self.control.request(ArmState.FLOAT)
-        self._say("Rake, level, foot at the far end, then [space] to record.")
-        while self.stage.tick(Prompt.READY, name) != " ":
-            pass
+        self._wait_ready(name)
         header = trial_header(self.rig, self.facts, name)
         outcome = Outcome("bug")
         try:
@@ -126,8 +133,28 @@ class SessionRunner:
                 self._end_recording(name, header, outcome)
             raise
         self.control.request(ArmState.HOLD)
-        sidecar = self._end_recording(name, header, outcome)
-        self._ask_verdict(name, sidecar, outcome)
+        self._end_recording(name, header, outcome)
+        self._ask_verdict(name, outcome)
+
+    def _wait_ready(self, name: TrialName) -> None:
+        """Wait for [space] while the terrain is reset; [p]ause in between."""
+        reset = ", ".join(self.rig.row.reset).capitalize()
+        while True:
+            self._say(f"{reset}, then [space] to record.  [p]ause")
+            while (key := self.stage.tick(Prompt.READY, name)) not in {" ", "p"}:
+                pass
+            if key == " ":
+                return
+            self._pause(name)
+
+    def _pause(self, name: TrialName) -> None:
+        self.control.request(ArmState.HOLD)
+        self.book.note(Event.PAUSED)
+        self._say("Paused. ARM: holding. [space] to go on.")
+        while self.stage.tick(Prompt.PAUSED, name) != " ":
+            pass
+        self.book.note(Event.CONTINUED)
+        self.control.request(ArmState.FLOAT)
 
     def _tare(self, name: TrialName) -> None:
         """Wait until the foot is lifted and still, then tare; repeat if it moved."""
@@ -151,7 +178,7 @@ class SessionRunner:
             bias = self.rig.tared.bias.tolist()
             self.control.set_bias(bias)
             self.book.note(
-                "tared",
+                Event.TARED,
                 trial_number=name.number,
                 bias=[round(v, 4) for v in bias],
                 spread=round(float(result.spread), 3),
@@ -171,7 +198,8 @@ class SessionRunner:
     def _record(self, name: TrialName, header: TrialHeader, outcome: Outcome) -> None:
         """Record until the trial is over; `outcome` is kept up to date."""
         path = self.facts.folder.trials / f"{name.kept}.mcap"
-        self.book.note("trial-started", trial=name.number, attempt=name.attempt)
+        self._set_aside(name.number)
+        self.book.note(Event.TRIAL_STARTED, trial=name.number, attempt=name.attempt)
         self.recorder.start(path, header)
         self.recorder.event(20, "operator", "trial started")
         self.control.watch_trial(is_recording=True)
@@ -182,6 +210,12 @@ class SessionRunner:
         finally:
             self.stage.look(None)
             self.stage.company.console.bell()
+
+    def _set_aside(self, number: int) -> None:
+        """Make room for the repetition of a kept trial."""
+        attempt = self.book.state.kept_attempt(number)
+        if attempt:
+            self._judge(Event.SET_ASIDE, TrialName(number, attempt), "redone")
 
     def _follow(self, name: TrialName, outcome: Outcome) -> None:
         """Let the trial run until it is over by itself or by key."""
@@ -205,19 +239,16 @@ class SessionRunner:
 
     def _end_recording(
         self, name: TrialName, header: TrialHeader, outcome: Outcome
-    ) -> dict[str, object]:
-        """Seal the files and say what they are worth; an interrupted one is rejected.
-
-        Returns:
-            The sidecar, not yet written.
-        """
+    ) -> None:
+        """Seal the files, say what they are worth; an interrupted one is rejected."""
         archive = self.archive
         self.control.watch_trial(is_recording=False)
         self.control.advance(TICK)  # what the devices said until now is written down
         self.recorder.event(20, "link", self.control.device_facts().get("link", ""))
         self.recorder.event(20, "stop", outcome.reason)
         verified = self.stage.aside(lambda: archive.seal(header, name, outcome.reason))
-        sidecar = archive.sidecar(name, verified, outcome)
+        archive.write_sidecar(name, verified, outcome)
+        self.book.note(Event.TRIAL_RECORDED, trial=name.number, attempt=name.attempt)
         self._say(
             f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · "
             f"{verified.cycles} samples · written and verified"
@@ -226,16 +257,14 @@ class SessionRunner:
             path = self.facts.folder.trials / f"{name.kept}.mcap"
             review = self.stage.aside(lambda: review_trial(path))
             self._say_review(review)
-            return {**sidecar, "ratio": review.known_ratio}
-        self._reject(name, sidecar, f"interrupted: {outcome.reason}")
+            archive.write_sidecar(name, verified, outcome, review.known_ratio)
+            return
+        self._reject(name, f"interrupted: {outcome.reason}")
         self._say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
         if outcome.reason != "interrupted":
             self._say(archive.flight(header, name, outcome.reason))
-        return sidecar
 
-    def _ask_verdict(
-        self, name: TrialName, sidecar: dict[str, object], outcome: Outcome
-    ) -> None:
+    def _ask_verdict(self, name: TrialName, outcome: Outcome) -> None:
         reasons = "  ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
         self._say(f"[k]eep   [r]edo: {reasons}")
         self._place = Circumstances(name.kept)
@@ -246,26 +275,32 @@ class SessionRunner:
             except FaultedError as fault:
                 # The trial is whole: only the end of the session takes it away.
                 if fault.verdict.reason in ENDING:
-                    self._reject(name, sidecar, "session ended at the review")
+                    self._reject(name, "session ended at the review")
                     raise
                 self._tell_fault(fault.verdict)
                 self.stage.mend()
                 continue
             if key == "k":
-                self.archive.keep(name, sidecar)
-                self.book.note("trial-kept", trial=name.number, attempt=name.attempt)
+                self._judge(Event.TRIAL_KEPT, name, "")
                 return
             if key[:1] == "r" and key[1:] in REJECT_REASONS:
-                self._reject(name, sidecar, REJECT_REASONS[key[1:]])
+                self._reject(name, REJECT_REASONS[key[1:]])
                 return
             if key == "q" or self.stage.company.stop.count:
-                self._reject(name, sidecar, "session ended at the review")
+                self._reject(name, "session ended at the review")
                 raise StopAskedError
 
-    def _reject(self, name: TrialName, sidecar: dict[str, object], why: str) -> None:
-        self.archive.reject(name, sidecar, why)
+    def _reject(self, name: TrialName, why: str) -> None:
+        self._judge(Event.TRIAL_REJECTED, name, why)
+
+    def _judge(self, event: Event, name: TrialName, why: str) -> None:
+        """Write a verdict into the journal; the files of the trial follow it."""
         self.book.note(
-            "trial-rejected", trial=name.number, attempt=name.attempt, reason=why
+            event,
+            trial=name.number,
+            attempt=name.attempt,
+            reason=why,
+            who=self.facts.operator,
         )
 
     # --- words --------------------------------------------------------------------

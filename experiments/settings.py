@@ -20,6 +20,7 @@ _Vector3 = tuple[_Near, _Near, _Near]
 _Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
+_Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
 _M = TypeVar("_M", bound=BaseModel)
 Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
 Mass = Annotated[Number, Field(gt=0, le=20)]
@@ -177,7 +178,10 @@ class RigSettings(_Section):
 
 
 class TerrainRow(_Section):
-    """One row of the matrix."""
+    """One row of the matrix.
+
+    `reset`: what a person does to the terrain before every trial.
+    """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
     stones: Literal["small", "big", "none"] = Field(examples=["small"])
@@ -187,6 +191,12 @@ class TerrainRow(_Section):
     heading_deg: Number = Field(ge=-180, le=180, examples=[0.0])
     travel: Number = Field(gt=0.05, le=1.0, examples=[0.45])
     trials: Whole = Field(ge=1, le=99, examples=[10])
+    reset: tuple[_Task, ...] = Field(
+        default=("rake", "level", "foot at the far end"),
+        min_length=1,
+        max_length=9,
+        examples=[["rake", "level", "foot at the far end"]],
+    )
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
     calibration: _File | None = Field(default=None, examples=["terrain_S10.toml"])
 

@@ -97,8 +97,8 @@ def stepped(
         model.constants,
         tool_of(facts["tool"]),
         clock,
-        PlantOptions(friction=facts["friction"]),
-        network,
+        options=PlantOptions(friction=facts["friction"]),
+        network=network,
     )
     clock.world = simulation
     link = CanLink(simulation.bus)

@@ -5,12 +5,12 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Generator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, BinaryIO, cast
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, SettingsError, TrialFileError
@@ -57,38 +57,40 @@ class SessionFolder:
     def append_event(self, event: Mapping[str, object]) -> None:
         """Append one line to the journal and force it to the disk.
 
+        A line that a kill has torn is ended first, so that it spoils no other.
+
         Raises:
             TrialFileError: the disk is full or gone.
         """
-        line = json.dumps(event, allow_nan=False) + "\n"
+        line = (json.dumps(event, allow_nan=False) + "\n").encode()
         path = self.path / "events.jsonl"
-        with _writing(path), path.open("ab") as file:
-            file.write(line.encode())
+        with _writing(path), path.open("a+b") as file:
+            file.write(b"\n" + line if _is_torn(file) else line)
             file.flush()
             os.fsync(file.fileno())
 
     def events(self) -> list[dict[str, Any]]:
-        """Return the journal; a torn last line is left out."""
+        """Return the journal; a torn line is left out."""
         path = self.path / "events.jsonl"
         if not path.exists():
             return []
-        events: list[dict[str, Any]] = []
-        for line in path.read_bytes().splitlines():
-            event = _as_object(line)
-            if event is None:
-                break
-            events.append(event)
-        return events
+        lines = map(_as_object, path.read_bytes().splitlines())
+        return [event for event in lines if event is not None]
 
-    def kept_trials(self) -> list[Path]:
-        """Return the kept trial files, in order, whose checksum is right."""
+    def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
+        """Return the kept trial files, in order, whose checksum is right.
+
+        Args:
+            digest: what computes the checksum of a file; None = `sha256_of`.
+        """
+        digest = digest or sha256_of
         kept: list[Path] = []
         for sidecar in sorted(self.trials.glob("T*.json")):
             if not _TRIAL_FILE.match(sidecar.name):
                 continue
             facts = read_json(sidecar)
             path = sidecar.with_suffix(".mcap")
-            is_sound = path.is_file() and sha256_of(path) == facts.get("sha256")
+            is_sound = path.is_file() and digest(path) == facts.get("sha256")
             if facts.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
@@ -153,11 +155,14 @@ def write_new_text(path: Path, text: str) -> None:
 def move_file(source: Path, target: Path) -> None:
     """Give `source` the name `target` in another folder; never replaces a file.
 
+    A move that a kill has cut short, so that the file has both names, is finished.
+
     Raises:
         TrialFileError: `target` exists, or the disk is full or gone.
     """
     with _writing(target):
-        target.hardlink_to(source)
+        if not (target.exists() and target.samefile(source)):
+            target.hardlink_to(source)
         source.unlink()
 
 
@@ -233,6 +238,14 @@ def create_session(
             hint="Name another folder with --data. Nothing was started.",
         ) from error
     return SessionFolder(path, f"S{number:03d}", terrain, is_simulated)
+
+
+def _is_torn(journal: BinaryIO) -> bool:
+    """Return whether the last line of `journal` has no end."""
+    if not journal.seek(0, os.SEEK_END):
+        return False
+    journal.seek(-1, os.SEEK_END)
+    return journal.read(1) != b"\n"
 
 
 def _session_at(path: Path) -> SessionFolder | None:

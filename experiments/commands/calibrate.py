@@ -11,18 +11,20 @@ if TYPE_CHECKING:
     from experiments.stage import Stage
 
 EXAMPLES = """\
-  traction calibrate gravity                what the arm weighs, with its tool
-  traction calibrate sensor                 mounting and offset of the sensor, its foot
-  traction calibrate foot --terrain Tf      another foot on the same sensor
-  traction calibrate terrain --terrain S10  where the container stands
-  traction calibrate gravity --fake --fast  the same steps with simulated devices"""
+  traction calibrate terrain --terrain S10  where the container of a terrain stands
+  traction calibrate sensor --fake --fast   the same steps with simulated devices"""
 
 _MOST = 60  # poses
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `calibrate`."""
-    parser.add_argument("what", choices=tuple(_WORK), help="what is calibrated")
+    parser.add_argument(
+        "what",
+        choices=tuple(_WORK),
+        help="what the arm weighs; how the sensor is mounted and what its foot weighs; "
+        "another foot; where a container stands",
+    )
     parser.add_argument(
         "--terrain",
         metavar="NAME",

@@ -31,7 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--config-only", action="store_true", help="check the settings, no device"
     )
-    parser.add_argument("--explain", metavar="NAME", help="more about a message")
+    parser.add_argument(
+        "--explain",
+        metavar="NAME|states",
+        help="more about a message; the table of all states",
+    )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
@@ -42,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.bus_log import logging_bus
     from experiments.console import GOOD, Console
     from experiments.gravity_choice import read_gravity
+    from experiments.origins import origin_lines
     from experiments.preflight import connect_rig, run_preflight
     from experiments.rigs import FakeOptions
     from experiments.settings import load_settings
@@ -53,8 +58,8 @@ def run(args: argparse.Namespace) -> int:
     if args.config_only:
         read_gravity(settings)
         console.check(GOOD, "config", f"{settings.origin}")
-        for key, value in settings.rig.model_dump().items():
-            console.say(f"   {key} = {value}")
+        for line in origin_lines(settings):
+            console.say(f"   {line}")
         return 0
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
@@ -70,12 +75,17 @@ def run(args: argparse.Namespace) -> int:
 def _explain(name: str, console: Console) -> int:
     from acquisition.errors import SettingsError
     from experiments.messages import CATALOGUE
+    from experiments.phases import table_lines
 
+    if name == "states":
+        for line in table_lines():
+            console.say(line)
+        return 0
     message = CATALOGUE.get(name)
     if message is None:
         raise SettingsError(
             f"There is no message called {name!r}.",
-            hint=f"Known: {', '.join(sorted(CATALOGUE))}.",
+            hint=f"Known: states, {', '.join(sorted(CATALOGUE))}.",
         )
     console.say(f"{name}: {message.what}")
     if message.arm:

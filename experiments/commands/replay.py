@@ -1,4 +1,4 @@
-"""traction replay: what was said on the bus, in words."""
+"""traction replay: a trial shown again, or a bus log in words."""
 
 from __future__ import annotations
 
@@ -11,24 +11,72 @@ if TYPE_CHECKING:
     from wam.bus_words import Spoken, Tally
 
 EXAMPLES = """\
-  traction replay --can bus.log             every frame, then the sums
-  traction replay --can bus.log --summary   the sums only"""
+  traction replay S012 T04 --speed 2        a trial, twice as fast as it was
+  traction replay --can bus.log --summary   a bus log, the sums only"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `replay`."""
     parser.add_argument(
+        "session", nargs="?", metavar="SESSION", help="S012 or a folder"
+    )
+    parser.add_argument(
+        "trial", nargs="?", metavar="TRIAL", help="T04, or T04a of rejected/"
+    )
+    parser.add_argument(
+        "--speed", type=_speed, default=1.0, metavar="N", help="times as fast (1)"
+    )
+    parser.add_argument(
         "--can",
         type=Path,
-        required=True,
         metavar="FILE",
         help="a bus log of --can-log, or of candump -L",
     )
     parser.add_argument("--summary", action="store_true", help="only the sums")
 
 
+def _speed(text: str) -> float:
+    """Return how many times as fast.
+
+    Raises:
+        ArgumentTypeError: it is no number of 0.01 to 10000.
+    """
+    try:
+        speed = float(text)
+    except ValueError:
+        speed = 0.0
+    if not 0.01 <= speed <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r} - expected a number > 0, e.g. 2")
+    return speed
+
+
 def run(args: argparse.Namespace) -> int:
-    """Print the log in words and return the exit code."""
+    """Show a trial or a bus log and return the exit code."""
+    from acquisition.errors import SettingsError
+
+    is_trial = args.session is not None and args.trial is not None
+    if is_trial == (args.can is not None) or (args.session and not args.trial):
+        raise SettingsError(
+            "Either a session and a trial are shown, or a bus log.",
+            hint="For example: traction replay S012 T04, or traction replay --can FILE",
+        )
+    return _show_trial(args) if is_trial else _show_log(args)
+
+
+def _show_trial(args: argparse.Namespace) -> int:
+    from acquisition.clock import SystemClock
+    from experiments.console import Console
+    from experiments.playback import play
+    from experiments.records import trial_path
+    from experiments.store import find_session
+
+    console = Console(color=not args.no_color)
+    path = trial_path(find_session(args.data, args.session), args.trial)
+    play(path, args.speed, SystemClock(), console)
+    return 0
+
+
+def _show_log(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
     from experiments.console import Console
     from wam.bus_words import BusReader

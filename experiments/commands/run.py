@@ -6,11 +6,12 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import PACES, data_option
+
 if TYPE_CHECKING:
-    from experiments.console import Console
-    from experiments.preflight import Preflight
-    from experiments.rigs import Rig
-    from experiments.trial import SessionFacts
+    from experiments.conduct import Request
+    from experiments.reopening import Reopening
+    from experiments.wreckage import Unfinished
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -38,8 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--pace",
-        choices=("steady", "slow", "fast", "clumsy"),
-        default="steady",
+        choices=PACES,
+        default=PACES[0],
         help="how the simulated person pushes (steady)",
     )
     parser.add_argument(
@@ -51,58 +52,85 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="answers to the reviews, one per line: keep, redo 1..5, quit",
     )
     parser.add_argument(
+        "--new", action="store_true", help="close what is unfinished first"
+    )
+    parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
 
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    from experiments.bus_log import logging_bus
-    from experiments.company import Company, StopFlag, signals_ask
+    from experiments.conduct import Opening, Request, conduct
     from experiments.console import Console
-    from experiments.faults import plan_fault
-    from experiments.operator import RehearsedHand, choose_keys
-    from experiments.preflight import connect_rig, run_preflight
+    from experiments.operator import choose_keys
+    from experiments.phases import Event
+    from experiments.reopening import resume
     from experiments.rigs import FakeOptions
-    from experiments.runner import SessionRunner
     from experiments.settings import load_settings
-    from experiments.stage import Stage
-    from experiments.terminal import keyboard
-    from experiments.wreckage import find_wreckage, held_open
 
     _check_arguments(args)
     settings = load_settings(args.config)
-    row = settings.row(args.terrain)
-    console = Console(color=not args.no_color)
-    keys = choose_keys(args.operator_script, is_fake=args.fake)
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(args.fast, args.seed, args.friction, args.pace)
-    rig = connect_rig(settings, row, fake)
-    stop = StopFlag()
-    with logging_bus(rig, args.can_log, console):
-        fault = plan_fault(args.fault, rig.rehearsal) if args.fault else None
-        kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
-        console.say(f"traction run {row.name}        {kind}")
-        for wreck in find_wreckage(Path(args.data)):
-            console.say(f"▲ {wreck.text()}")
-        page = run_preflight(rig, Path(args.data), console)
-        with signals_ask(stop), keyboard(keys):
-            facts = _open_session(args, rig, page, console)
-            hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
-            company = Company(keys, console, stop, hand, fault)
-            stage = Stage(rig, company)
-            with held_open(facts.folder):
-                code = SessionRunner(stage, facts).run(args.trials or row.trials)
-    if company.fault is not None:
-        console.say(
-            f"▲ The fault {company.fault.name} was planned for "
-            f"T{company.fault.trial:02d} + {company.fault.seconds} s, which never came."
-        )
-    if code == 0:
-        data = f" --data {args.data}" if str(args.data) != "data" else ""
-        console.say(f"Complete. Next: traction report {facts.folder.id}{data}")
-    return code
+    request = Request(
+        data=args.data,
+        settings=settings,
+        config=args.config,
+        row=settings.row(args.terrain),
+        fake=fake,
+        operator=args.operator,
+        keys=choose_keys(args.operator_script, is_fake=args.fake),
+        console=Console(color=not args.no_color),
+        fault=args.fault,
+        can_log=args.can_log,
+    )
+    unfinished = _make_room(request, is_new=args.new)
+    if unfinished is not None:
+        return resume(unfinished.folder, _as_reopening(args, request))
+    trials = args.trials or request.row.trials
+    asked = {"terrain": request.row.name, "trials": trials}
+    return conduct(request, Opening(Event.STARTED, asked))
+
+
+def _make_room(request: Request, *, is_new: bool) -> Unfinished | None:
+    """Return the session to be resumed instead, None when none is in the way."""
+    from experiments.choosing import Choice, choose
+    from experiments.reopening import close
+    from experiments.wreckage import find_unfinished
+
+    is_fake, terrain = request.fake is not None, request.row.name
+    found = [
+        session
+        for session in find_unfinished(request.data)
+        if session.folder.is_simulated is is_fake
+    ]
+    while found:
+        choice = Choice.CLOSE
+        if not is_new:
+            data = data_option(request.data)
+            choice = choose(found, terrain, data, request.keys, request.console)
+        newest = found.pop()
+        if choice is Choice.RESUME:
+            return newest
+        close(newest.folder, f"closed to start {terrain}", request.console)
+    return None
+
+
+def _as_reopening(args: argparse.Namespace, request: Request) -> Reopening:
+    from experiments.reopening import Reopening
+
+    return Reopening(
+        data=request.data,
+        config=request.config,
+        console=request.console,
+        is_fast=args.fast,
+        is_fake=args.fake,
+        operator=request.operator,
+        script=args.operator_script,
+        can_log=request.can_log,
+    )
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
@@ -127,33 +155,3 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(
             f"--seed {args.seed} - expected a whole number >= 0, e.g. 1.", hint=nothing
         )
-
-
-def _open_session(
-    args: argparse.Namespace, rig: Rig, page: Preflight, console: Console
-) -> SessionFacts:
-    """Create the session's folder and write what is known at its start."""
-    from experiments.store import (
-        create_session,
-        session_utc_ns,
-        write_json,
-        write_text,
-    )
-    from experiments.trial import collect_facts
-
-    folder = create_session(
-        Path(args.data),
-        rig.row.name,
-        is_simulated=rig.is_simulated,
-        utc_ns=session_utc_ns(),
-    )
-    console.say(f"session {folder.id}: {folder.path}")
-    operator = args.operator or ("auto" if rig.is_simulated else "")
-    seed = args.seed if rig.is_simulated else None
-    facts = collect_facts(folder, operator, seed, page.devices)
-    write_json(folder.path / "preflight.json", page.as_dict())
-    write_json(folder.path / "provenance.json", facts.provenance)
-    write_text(folder.path / "config.toml", rig.settings.rig_text)
-    write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
-    write_text(folder.path / "diff.patch", facts.diff)
-    return facts

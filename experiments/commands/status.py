@@ -1,42 +1,113 @@
 """traction status: the matrix board."""
 
+from __future__ import annotations
+
 import argparse
-from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from experiments.board import BoardLine
+    from experiments.console import Console
 
 EXAMPLES = """\
-  traction status                           the board
-  traction status --data /srv/traction      of another data folder"""
+  traction status                           the board, and what comes next
+  traction status --where kind=live,stones=big --follow   watch a part of it"""
+
+_HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
+_LOOK_NS = 1_000_000_000
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `status`."""
     parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument(
+        "--where",
+        default="",
+        metavar="K=V,...",
+        help="only these: terrain, stones, incline_deg, foot, kind, session, operator",
+    )
+    parser.add_argument(
+        "--follow", action="store_true", help="again whenever it changes, until Ctrl-C"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
     import json
 
-    from experiments.board import count_board
+    from experiments.board import KnownDigests, count_board, next_steps, parse_where
     from experiments.console import Console
     from experiments.settings import load_settings
 
     settings = load_settings(args.config)
-    board = count_board(Path(args.data), settings.matrix)
+    where, digest = parse_where(args.where), KnownDigests()
     console = Console(color=not args.no_color)
+
+    def count() -> list[BoardLine]:
+        return count_board(args.data, settings.matrix, where, digest)
+
+    def steps(board: Sequence[BoardLine]) -> list[str]:
+        kinds = {line.is_simulated for line in board if line.sessions} or {False}
+        return [
+            step
+            for is_simulated in sorted(kinds)
+            for step in next_steps(
+                args.data, settings.matrix, is_simulated=is_simulated
+            )
+        ]
+
+    if args.follow:
+        return _follow(lambda: [*_plain(board := count()), *steps(board)], console)
+    board = count()
     if args.json:
         console.say(json.dumps([line.as_dict() for line in board], indent=1))
         return 0
-    rows = [
-        (
-            line.terrain,
-            "simulated" if line.is_simulated else "live",
-            f"{line.kept}/{line.wanted}",
-            "█" * line.kept + "·" * max(0, line.wanted - line.kept),
-            str(line.rejected),
-            " ".join(line.sessions) or "-",
-        )
-        for line in board
+    console.table(_HEADER, [_row(line) for line in board])
+    for step in steps(board):
+        console.say(step)
+    return 0
+
+
+def _row(line: BoardLine) -> tuple[str, ...]:
+    return (
+        line.terrain,
+        "simulated" if line.is_simulated else "live",
+        f"{line.kept}/{line.wanted}",
+        line.cells(),
+        str(line.rejected),
+        " ".join(line.sessions) or "-",
+    )
+
+
+def _plain(board: Sequence[BoardLine]) -> list[str]:
+    """Return the board as lines of text."""
+    rows = [_HEADER, *(_row(line) for line in board)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADER))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+        for row in rows
     ]
-    console.table(("terrain", "kind", "kept", "trials", "rejected", "sessions"), rows)
+
+
+def _follow(look: Callable[[], list[str]], console: Console) -> int:
+    """Show what `look` returns whenever it has changed, until Ctrl-C."""
+    from acquisition.clock import SystemClock
+
+    clock = SystemClock()
+    shown: list[str] = []
+    try:
+        while not console.is_lost:
+            lines = look()
+            if lines != shown and console.is_live:
+                console.panel(lines)
+            elif lines != shown:
+                for line in [*([""] if shown else []), *lines]:
+                    console.say(line)
+            shown = lines
+            clock.sleep_until(clock.now_ns() + _LOOK_NS)
+    except KeyboardInterrupt:
+        pass
+    console.end_panel()
     return 0

@@ -4,6 +4,8 @@ import contextlib
 import hashlib
 import io
 import json
+import os
+import signal
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -108,3 +110,29 @@ def run_watched(config, data, *arguments, press=None):
             patch.setattr(AutoKeys, "answer", answer)
         done = run_short(config, data, "TF", *arguments)
     return Watched(done, only_session(data), seen[0])
+
+
+def run_killed(config, data, *arguments, press):
+    """Run a session in a copy of this process, which `press` kills; return its folder.
+
+    What a kill leaves is on the disk then, and nothing has been tidied up.
+    """
+    child = os.fork()
+    if child == 0:
+        try:
+            run_watched(config, data, *arguments, press=press)
+        finally:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    assert os.WIFSIGNALED(status), "the session was not killed"
+    return only_session(data)
+
+
+def kill_this_process():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def kept_and_sound(folder):
+    """Return the names of the kept trials that are what their sidecars say."""
+    paths = sorted((folder / "trials").glob("T??.mcap"))
+    return [p.stem for p in paths if sidecar(p)["sha256"] == digest(p)]

@@ -39,7 +39,7 @@ class HeavierRig(fakes.rig.FakeRig):
 
     made: ClassVar[list["HeavierRig"]] = []
 
-    def __init__(self, scene, constants, tool, clock, network=None):
+    def __init__(self, scene, constants, tool, clock, options=None, network=None):
         # Nothing touches the ground, so one step per cycle is fine enough.
         arm, options = perturbed(constants), PlantOptions(substeps=1)
         self.truth = ArmModel(arm, tool)

@@ -60,8 +60,10 @@ def test_a_stale_sensor_interrupts_the_trial_and_it_is_redone(stale):
     assert stale.done.code == 0
     assert [e["event"] for e in journal(stale.folder) if "trial" in e] == [
         "trial-started",
+        "trial-recorded",
         "trial-rejected",
         "trial-started",
+        "trial-recorded",
         "trial-kept",
     ]
     facts = json.loads((stale.folder / "session.json").read_text())

@@ -32,7 +32,7 @@ class Bench:
         self.rig = build_rig(settings, row, FakeOptions(is_fast=True, seed=1))
         crew = self.rig.crew
         self.desk = crew.desk
-        self.plant = self.rig.rehearsal._rig.plant
+        self.plant = self.rig.rehearsal.rig.plant
         crew.start_arm()
         crew.open_sensor()
         crew.begin()

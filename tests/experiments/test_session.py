@@ -1,38 +1,56 @@
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.session import SessionState, apply, replay
+from experiments.phases import OPEN, Event, Phase
+from experiments.session import SessionState, apply, refusal, replay
 
 START = {"event": "session-started", "terrain": "S0", "trials": 2}
+ACTIVE = {"event": "activated"}
+END = {"event": "session-ended", "reason": "unfinished"}
+BEGIN = (START, ACTIVE)
 
 
-def event(name, trial):
-    return {"event": f"trial-{name}", "trial": trial}
+def event(name, trial=None, **facts):
+    given = {"event": name, **facts}
+    return given if trial is None else {**given, "trial": trial}
 
 
 def attempt(trial, verdict):
-    return [event("started", trial), event(verdict, trial)]
+    names = ("trial-started", "trial-recorded", f"trial-{verdict}")
+    return [event(name, trial) for name in names]
+
+
+def verdict(trial, number, what):
+    return event("verdict-changed", trial, attempt=number, verdict=what)
 
 
 numbers = st.one_of(
     st.integers(-1, 4), st.none(), st.booleans(), st.text(max_size=2), st.floats()
 )
+likely = st.sampled_from(
+    [ACTIVE, END, *attempt(1, "kept"), *attempt(2, "kept"), *attempt(2, "rejected")]
+)
 events = st.lists(
     st.one_of(
-        st.builds(event, st.sampled_from(["started", "kept", "rejected"]), numbers),
+        likely,
         st.fixed_dictionaries(
-            {"event": st.sampled_from(["session-started", "session-ended", "tared"])},
+            {"event": st.sampled_from([str(name) for name in Event])},
             optional={
                 "terrain": st.text(max_size=2),
                 "trials": numbers,
+                "trial": numbers,
+                "attempt": numbers,
+                "verdict": st.sampled_from(["keep", "reject", "", 1]),
                 "reason": numbers,
             },
         ),
         st.just(START),
         st.dictionaries(st.text(max_size=3), numbers, max_size=2),
     ),
-    max_size=30,
+    max_size=40,
 )
 
 
@@ -40,21 +58,24 @@ def check_possible(state):
     attempts = dict(state.attempts)
     assert len(set(state.kept)) == len(state.kept)
     assert all(number >= 1 for number in attempts)
-    assert set(state.kept) <= set(attempts)  # nothing is kept that never started
+    # nothing is kept that was never attempted
+    assert all(1 <= k <= attempts[number] for number, k in state.kept_attempts)
     running = 0 if state.running is None else 1
-    assert sum(attempts.values()) >= len(state.kept) + state.rejected + running
+    # every attempt is kept, rejected or running
+    assert sum(attempts.values()) == len(state.kept) + state.rejected + running
     assert state.running not in state.kept
-    assert state.running is None or attempts[state.running] >= 1
-    assert not (attempts and not state.terrain)
-    assert not (state.ended and not state.terrain)
-    assert not (state.ended and running)
-    assert state.next_trial not in state.kept
+    is_unjudged = state.phase in {Phase.RECORDING, Phase.REVIEW, Phase.CRASHED}
+    assert state.running is None or is_unjudged
+    assert (state.phase is Phase.PLANNED) == (not state.terrain)
+    assert state.ended == "" or state.phase not in OPEN
+    assert (state.phase is Phase.COMPLETE) <= state.is_complete
+    assert state.next_trial not in state.kept or state.redoing is not None
 
 
 @given(events)
 def test_no_journal_leads_to_an_impossible_state(journal):
     state = SessionState()
-    for entry in [START, *journal]:
+    for entry in [*BEGIN, *journal]:
         state = apply(state, entry)
         check_possible(state)
 
@@ -64,40 +85,68 @@ def test_no_journal_without_a_start_leads_anywhere_impossible(journal):
     check_possible(replay(journal))
 
 
-@given(events, st.integers(0, 30))
+@given(events, st.integers(0, 40))
 def test_a_journal_can_be_replayed_in_two_parts(journal, cut):
-    state = replay([START, *journal[:cut]])
+    state = replay([*BEGIN, *journal[:cut]])
     for entry in journal[cut:]:
         state = apply(state, entry)
-    assert state == replay([START, *journal])
+    assert state == replay([*BEGIN, *journal])
 
 
-def test_a_session_is_complete_when_enough_trials_were_kept():
-    state = replay([START, *attempt(1, "kept")])
+@given(events)
+def test_a_kept_trial_is_lost_by_nothing_but_a_word_on_it(journal):
+    states = [SessionState()]
+    for entry in [*BEGIN, *attempt(1, "kept"), *journal]:
+        states.append(apply(states[-1], entry))
+    entries = [*BEGIN, *attempt(1, "kept"), *journal]
+    for entry, (before, after) in zip(entries, pairwise(states), strict=True):
+        lost = set(before.kept_attempts) - set(after.kept_attempts)
+        if lost:
+            ((number, _),) = lost
+            assert entry["event"] in {"verdict-changed", "trial-set-aside"}
+            assert entry["trial"] == number
+
+
+@given(events)
+def test_what_is_refused_changes_nothing_and_what_is_not_never_raises(journal):
+    state = replay(BEGIN)
+    for entry in journal:
+        after = apply(state, entry)
+        if refusal(state, entry):
+            assert after == state
+        state = after
+
+
+def test_a_session_is_complete_when_enough_trials_were_kept_and_it_has_ended():
+    state = replay([*BEGIN, *attempt(1, "kept")])
     assert not state.is_complete
-    state = replay([START, *attempt(1, "kept"), *attempt(2, "kept")])
-    assert state.is_complete
+    state = replay([*BEGIN, *attempt(1, "kept"), *attempt(2, "kept")])
+    assert (state.is_complete, state.phase) == (True, Phase.READY)
     assert state.kept == (1, 2)
+    assert apply(state, END).phase is Phase.COMPLETE
 
 
 def test_a_rejected_trial_is_done_again_under_its_number():
-    state = replay([START, *attempt(1, "rejected")])
+    state = replay([*BEGIN, *attempt(1, "rejected")])
     assert (state.next_trial, state.attempt(1), state.rejected) == (1, 1, 1)
-    state = replay([START, *attempt(1, "rejected"), *attempt(1, "kept")])
-    assert (state.next_trial, state.attempt(1), state.kept) == (2, 2, (1,))
+    state = replay([*BEGIN, *attempt(1, "rejected"), *attempt(1, "kept")])
+    assert (state.next_trial, state.attempt(1), state.kept_attempt(1)) == (2, 2, 2)
 
 
 @pytest.mark.parametrize(
     "journal",
     [
-        [event("kept", 1)],
-        [event("started", 1), event("kept", 2)],
-        [event("started", 1), event("started", 2)],
-        [{"event": "session-ended", "reason": "complete"}, event("started", 1)],
+        [event("trial-kept", 1)],
+        [event("trial-started", 1), event("trial-recorded", 2)],
+        [event("trial-started", 1), event("trial-started", 2)],
+        [END, event("trial-started", 1)],
+        [*attempt(1, "kept"), event("trial-started", 1)],
     ],
 )
 def test_impossible_events_change_nothing(journal):
-    assert replay([START, *journal]) == replay([START, journal[0]])
+    before = replay([*BEGIN, *journal[:-1]])
+    assert refusal(before, journal[-1])
+    assert apply(before, journal[-1]) == before
 
 
 def test_a_second_start_changes_nothing():
@@ -105,7 +154,45 @@ def test_a_second_start_changes_nothing():
     assert replay([START, again]) == replay([START])
 
 
-def test_an_end_closes_the_running_trial():
-    end = {"event": "session-ended", "reason": "fault"}
-    state = replay([START, event("started", 1), end])
-    assert (state.ended, state.running) == ("fault", None)
+def test_an_end_in_a_running_trial_is_a_crash():
+    state = replay([*BEGIN, event("trial-started", 1), event("session-ended")])
+    assert (state.phase, state.running) == (Phase.CRASHED, 1)
+
+
+def test_a_crashed_session_is_not_resumed_before_its_trial_was_put_away():
+    crashed = replay([*BEGIN, event("trial-started", 1), event("crash-found")])
+    resumed = event("session-resumed")
+    assert refusal(crashed, resumed) == "T01 has no verdict yet"
+    state = apply(apply(crashed, event("trial-rejected", 1)), resumed)
+    assert (state.phase, state.openings) == (Phase.PREFLIGHT, 2)
+
+
+def test_a_redo_records_one_trial_and_is_over():
+    whole = [*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END]
+    state = replay([*whole, event("redo-started", 1), ACTIVE])
+    assert (state.next_trial, state.is_over) == (1, False)
+    assert state.kept == (1, 2)  # until the new one begins
+    state = apply(state, event("trial-set-aside", 1, attempt=1))
+    for entry in attempt(1, "kept"):
+        state = apply(state, entry)
+    assert (state.is_over, state.kept_attempt(1), state.rejected) == (True, 2, 1)
+    assert apply(state, END).phase is Phase.COMPLETE
+
+
+def test_a_redo_of_what_was_never_recorded_is_refused():
+    state = replay([*BEGIN, *attempt(1, "kept"), END])
+    assert refusal(state, event("redo-started", 2)) == "T02 was never recorded"
+
+
+def test_a_verdict_changes_what_is_kept_and_back():
+    state = replay([*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END])
+    state = apply(state, verdict(1, 1, "reject"))
+    assert (state.kept, state.rejected, state.phase) == ((2,), 1, Phase.UNFINISHED)
+    state = apply(state, verdict(1, 1, "keep"))
+    assert (state.kept, state.rejected, state.phase) == ((2, 1), 0, Phase.COMPLETE)
+
+
+def test_two_attempts_at_one_trial_are_never_kept_together():
+    state = replay([*BEGIN, *attempt(1, "rejected"), *attempt(1, "kept"), END])
+    assert refusal(state, verdict(1, 1, "keep")) == "another attempt at T01 is kept"
+    assert refusal(state, verdict(1, 3, "keep")) == "there is no such attempt"

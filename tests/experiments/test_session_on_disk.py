@@ -21,6 +21,8 @@ SESSION_FILES = {
     "preflight.json",
     "provenance.json",
     "diff.patch",
+    "conditions.json",
+    ".lock",
 }
 TRIAL_FILES = {
     f"T0{number}{suffix}"

@@ -44,7 +44,7 @@ def test_ctrl_c_in_a_running_trial_closes_it_and_keeps_the_earlier_one(
 ):
     with start(config, tmp_path) as process:
         wait_for(process, "trial 2 of 9")
-        wait_for(process, "Rake, level, foot at the far end")
+        wait_for(process, "Wipe, foot at the far end")
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (5, "")

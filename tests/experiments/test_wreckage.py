@@ -1,23 +1,33 @@
+import os
+
 import pytest
 
-from experiments.runner import SessionRunner
+from experiments.choosing import Choice, choose
+from experiments.console import Console
+from experiments.lock import session_lock
+from experiments.operator import Prompt
 from experiments.store import create_session
-from experiments.wreckage import find_wreckage, held_open
+from experiments.terminal import TerminalKeys
+from experiments.wreckage import find_unfinished
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.experiments.program import run_short, traction
 
 START = {"event": "session-started", "utc": "U0", "terrain": "S10", "trials": 10}
-END = {"event": "session-ended", "utc": "U9", "reason": "complete"}
+ACTIVE = {"event": "activated", "utc": "U0"}
+LEFT = {"event": "session-ended", "utc": "U9", "reason": "unfinished"}
 KEPT_AND_RUNNING = (
-    {"event": "trial-started", "utc": "U1", "trial": 1},
-    {"event": "trial-kept", "utc": "U2", "trial": 1},
-    {"event": "trial-started", "utc": "U3", "trial": 2},
+    START,
+    ACTIVE,
+    {"event": "trial-started", "utc": "U1", "trial": 1, "attempt": 1},
+    {"event": "trial-recorded", "utc": "U1", "trial": 1, "attempt": 1},
+    {"event": "trial-kept", "utc": "U2", "trial": 1, "attempt": 1},
+    {"event": "trial-started", "utc": "U3", "trial": 2, "attempt": 1},
 )
 
 
-def make_session(data, *events):
+def make_session(data, *events, terrain="S10"):
     folder = create_session(
-        data, "S10", is_simulated=True, utc_ns=1_800_000_000 * 10**9
+        data, terrain, is_simulated=True, utc_ns=1_800_000_000 * 10**9
     )
     for event in events:
         folder.append_event(event)
@@ -32,97 +42,163 @@ def leave_partial(folder, name="T02"):
 
 
 def test_a_session_that_was_not_closed_is_found(tmp_path):
-    folder = make_session(tmp_path, START, *KEPT_AND_RUNNING)
-    partial = leave_partial(folder)
-    (wreck,) = find_wreckage(tmp_path)
-    assert (wreck.folder, wreck.kept, wreck.running) == (folder, 1, "T02")
-    assert wreck.partials == (partial,)
-    assert wreck.seconds == pytest.approx(0.4)
-    assert wreck.last_utc == "U3"
-    assert wreck.text() == (
-        "S001 ended without closing (T02 at 0.4 s). 1 kept. "
-        f"To save the rest: traction recover {partial}"
-    )
+    folder = make_session(tmp_path, *KEPT_AND_RUNNING)
+    leave_partial(folder)
+    (found,) = find_unfinished(tmp_path)
+    assert (found.folder, found.state.kept, found.running) == (folder, (1,), "T02")
+    assert found.seconds == pytest.approx(0.4)  # 201 cycles of 2 ms
+    assert (found.last_utc, found.is_crashed) == ("U3", True)
+    assert found.text() == "S001 ended without closing (T02 at 0.4 s). 1 kept."
 
 
-def test_a_session_that_was_closed_is_none(tmp_path):
-    make_session(tmp_path, START, *KEPT_AND_RUNNING, END)
-    assert find_wreckage(tmp_path) == []
+def test_a_session_that_is_complete_or_closed_is_not_unfinished(tmp_path):
+    one = {**START, "trials": 1}
+    make_session(tmp_path, one, *KEPT_AND_RUNNING[1:-1], LEFT)
+    make_session(tmp_path, START, ACTIVE, LEFT, {"event": "session-closed"})
+    assert find_unfinished(tmp_path) == []
+
+
+def test_a_session_left_on_purpose_is_unfinished_and_no_crash(tmp_path):
+    make_session(tmp_path, *KEPT_AND_RUNNING[:-1], LEFT)
+    (found,) = find_unfinished(tmp_path)
+    assert not found.is_crashed
+    assert found.text() == "S001 S10 is unfinished, 1 of 10 kept."
 
 
 def test_a_folder_in_which_nothing_happened_is_none(tmp_path):
     make_session(tmp_path)
-    assert find_wreckage(tmp_path / "nowhere") == find_wreckage(tmp_path) == []
+    assert find_unfinished(tmp_path / "nowhere") == find_unfinished(tmp_path) == []
 
 
 def test_a_session_of_a_living_process_is_none(tmp_path):
     folder = make_session(tmp_path, START)
-    with held_open(folder):
-        assert find_wreckage(tmp_path) == []
-    assert len(find_wreckage(tmp_path)) == 1
+    with session_lock(folder):
+        assert find_unfinished(tmp_path) == []
+    assert len(find_unfinished(tmp_path)) == 1
 
 
 def test_a_trial_without_verdict_is_told_apart(tmp_path):
-    make_session(tmp_path, START, *KEPT_AND_RUNNING)
-    (wreck,) = find_wreckage(tmp_path)
-    assert wreck.text() == (
-        "S001 ended without closing (T02 before its verdict). 1 kept."
-    )
+    make_session(tmp_path, *KEPT_AND_RUNNING)
+    (found,) = find_unfinished(tmp_path)
+    assert "(T02 before its verdict)" in found.text()
 
 
 def test_a_session_left_between_trials_is_told_apart(tmp_path):
-    make_session(tmp_path, START, *KEPT_AND_RUNNING[:2])
-    (wreck,) = find_wreckage(tmp_path)
-    assert wreck.text() == "S001 ended without closing (between trials). 1 kept."
-
-
-def test_several_files_are_named_by_their_session(tmp_path):
-    data = tmp_path / "my data"
-    folder = make_session(data, START, *KEPT_AND_RUNNING)
-    leave_partial(folder)
-    leave_partial(folder, "T01.truth")
-    (wreck,) = find_wreckage(data)
-    assert wreck.text().endswith(f"traction recover '{folder.path}'")
-
-
-def test_what_was_recovered_is_not_asked_for_again(tmp_path):
-    folder = make_session(tmp_path, START, *KEPT_AND_RUNNING)
-    traction("recover", leave_partial(folder))
-    (wreck,) = find_wreckage(tmp_path)
-    assert wreck.partials == ()
-    assert "recover" not in wreck.text()
+    make_session(tmp_path, *KEPT_AND_RUNNING[:-1])
+    (found,) = find_unfinished(tmp_path)
+    assert "(between trials)" in found.text()
 
 
 def test_a_damaged_journal_or_partial_stops_nothing(tmp_path):
-    folder = make_session(tmp_path, START, *KEPT_AND_RUNNING)
+    folder = make_session(tmp_path, *KEPT_AND_RUNNING)
     (folder.trials / "T02.mcap.partial").write_bytes(b"nothing")
     with (folder.path / "events.jsonl").open("ab") as journal:
         journal.write(b'{"event": "trial-ke')
-    (wreck,) = find_wreckage(tmp_path)
-    assert (wreck.running, wreck.seconds) == ("T02", 0.0)
+    (found,) = find_unfinished(tmp_path)
+    assert (found.running, found.seconds) == ("T02", 0.0)
 
 
 def test_a_folder_that_cannot_be_read_is_left_out(tmp_path):
     folder = make_session(tmp_path)
     (folder.path / "events.jsonl").mkdir()
     make_session(tmp_path, START)
-    assert [wreck.folder.id for wreck in find_wreckage(tmp_path)] == ["S002"]
+    assert [found.folder.id for found in find_unfinished(tmp_path)] == ["S002"]
 
 
-def test_a_run_tells_of_a_wreck_and_is_none_while_it_lasts(
-    tmp_path, config, monkeypatch
-):
-    make_session(tmp_path, START)
-    seen = []
+# --- another run is asked for ---------------------------------------------------------
 
-    def run(runner, trials):
-        runner.book.note("session-started", terrain="TF", trials=trials)
-        seen.extend(wreck.folder.id for wreck in find_wreckage(tmp_path))
-        return 5
 
-    monkeypatch.setattr(SessionRunner, "run", run)
-    done = run_short(config, tmp_path)
-    assert done.code == 5
-    assert "▲ S001 ended without closing (between trials). 0 kept." in done.out
-    assert seen == ["S001"]
-    assert [wreck.folder.id for wreck in find_wreckage(tmp_path)] == ["S001", "S002"]
+class Early(TerminalKeys):
+    """A keyboard on which the question was answered before it was asked."""
+
+    def __init__(self, descriptor):
+        super().__init__(descriptor)
+        self._prompt = Prompt.CHOICE
+
+
+def press(keys, found, terrain):
+    """Answer the question with `keys` from a keyboard."""
+    read, write = os.pipe()
+    try:
+        os.write(write, keys)
+        return choose(found, terrain, "", Early(read), Console())
+    finally:
+        os.close(read)
+        os.close(write)
+
+
+@pytest.mark.parametrize(
+    ("keys", "choice"),
+    [
+        (b"1", Choice.RESUME),
+        (b"r", Choice.RESUME),
+        (b"2", Choice.CLOSE),
+        (b"x n", Choice.CLOSE),
+    ],
+)
+def test_a_key_says_what_becomes_of_the_unfinished_session(tmp_path, keys, choice):
+    make_session(tmp_path, START, ACTIVE, LEFT)
+    assert press(keys, find_unfinished(tmp_path), "B0") is choice
+
+
+def test_both_terrains_and_both_choices_are_named(tmp_path, capsys):
+    make_session(tmp_path, START, ACTIVE, LEFT)
+    press(b"1", find_unfinished(tmp_path), "B0")
+    assert capsys.readouterr().out == (
+        "▲ Unfinished session S001 is S10, you asked for B0. [1] resume S10  "
+        "[2] close it and start B0  [q]uit\n"
+    )
+
+
+def test_a_crash_is_told_with_what_a_resume_does(tmp_path, capsys):
+    leave_partial(make_session(tmp_path, *KEPT_AND_RUNNING))
+    press(b"r", find_unfinished(tmp_path), "S10")
+    assert capsys.readouterr().out.startswith(
+        "▲ S001 ended without closing (T02 at 0.4 s). 1 kept. [r]esume - T02 will be "
+        "redone, its data are in rejected/"
+    )
+
+
+def test_without_a_terminal_a_run_is_refused_with_the_command_to_type(tmp_path, config):
+    make_session(tmp_path, *KEPT_AND_RUNNING[:-1], LEFT)
+    done = run_short(config, tmp_path, "TF")
+    assert (done.code, done.out) == (2, "")
+    assert done.err == (
+        "Unfinished session S001 is S10, you asked for TF. To go on: traction resume "
+        f"S001 --data {tmp_path}   To close what is unfinished: the same command with "
+        "--new. Nothing was started.\n"
+    )
+    assert len(list((tmp_path / "sessions").glob("*_S*"))) == 1
+
+
+def test_a_simulated_session_is_no_obstacle_to_a_real_one(tmp_path, config):
+    make_session(tmp_path, START, ACTIVE, LEFT)
+    done = traction("run", "TF", "--config", config, "--data", tmp_path)
+    assert "needs a person at a terminal" in done.err  # and nothing else is in the way
+
+
+def test_a_resume_lists_the_sessions_where_there_are_several(tmp_path):
+    make_session(tmp_path, START, ACTIVE, LEFT)
+    make_session(tmp_path, {**START, "terrain": "B0"}, terrain="B0")
+    done = traction("resume", "--data", tmp_path)
+    assert done.code == 2
+    assert done.err == (
+        "2 sessions are unfinished: S001 S10 is unfinished, 0 of 10 kept. S002 ended "
+        "without closing (between trials). 0 kept. Name one, e.g. traction resume "
+        "S002\n"
+    )
+
+
+def test_a_resume_of_nothing_is_refused(tmp_path):
+    done = traction("resume", "--data", tmp_path)
+    assert done.code == 2
+    assert done.err.startswith("There is no unfinished session in")
+
+
+def test_real_and_simulated_sessions_are_not_taken_for_each_other(tmp_path):
+    folder = create_session(tmp_path, "S10", is_simulated=False, utc_ns=10**18)
+    for event in (START, ACTIVE, LEFT):
+        folder.append_event(event)
+    done = traction("resume", "S001", "--fake", "--data", tmp_path)
+    assert done.code == 2
+    assert done.err.startswith("S001 is a session with the real arm.")

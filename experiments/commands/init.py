@@ -1,0 +1,48 @@
+"""traction init: write rig.toml and matrix.toml to be edited."""
+
+import argparse
+from pathlib import Path
+
+EXAMPLES = """\
+  traction init                             into this folder
+  traction init lab                         into lab/, made where it is missing"""
+
+_FILES = ("rig.toml", "matrix.toml")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `init`."""
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=Path(), metavar="DIR", help="where (.)"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write both files, or neither where one is there already."""
+    from importlib import resources
+
+    from acquisition.errors import SettingsError
+    from experiments.console import Console
+    from experiments.store import write_new_text
+
+    folder: Path = args.folder
+    there = [str(folder / name) for name in _FILES if (folder / name).exists()]
+    if there:
+        raise SettingsError(
+            f"{' and '.join(there)} exists already.",
+            hint="Name another folder; nothing is ever overwritten.",
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingsError(
+            f"{folder} cannot be made ({error.strerror}).", hint="Nothing was written."
+        ) from error
+    console = Console(color=not args.no_color)
+    for name in _FILES:
+        text = (resources.files("experiments.data") / name).read_text()
+        write_new_text(folder / name, text)
+        console.say(f"wrote {folder / name}")
+    config = folder / _FILES[0]
+    console.say(f"Edit both, then: traction check --config-only --config {config}")
+    return 0

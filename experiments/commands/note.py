@@ -1,0 +1,36 @@
+"""traction note: write a remark on a session or a trial."""
+
+import argparse
+
+from experiments.arguments import add_author
+
+EXAMPLES = """\
+  traction note S012 "heater on since noon"     on the session
+  traction note S012 T04 "a stone was wedged"   on a trial"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `note`."""
+    parser.add_argument("session", metavar="SESSION", help="S012 or a folder")
+    parser.add_argument(
+        "words",
+        nargs="+",
+        metavar="[TRIAL] TEXT",
+        help="T04 or T04a where one trial is meant, then the remark",
+    )
+    add_author(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the remark into the journal, and beside the trial."""
+    from experiments.console import Console
+    from experiments.records import add_note, looks_like_trial
+    from experiments.store import find_session
+
+    folder = find_session(args.data, args.session)
+    words: list[str] = args.words
+    trial = words[0] if len(words) > 1 and looks_like_trial(words[0]) else ""
+    text = " ".join(words[1:] if trial else words)
+    said = add_note(folder, trial, text, args.operator)
+    Console(color=not args.no_color).say(said)
+    return 0

@@ -1,0 +1,81 @@
+"""traction resume: continue the session that is not finished."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from experiments.arguments import add_reopening
+
+if TYPE_CHECKING:
+    from experiments.reopening import Reopening
+    from experiments.store import SessionFolder
+
+EXAMPLES = """\
+  traction resume                           the only unfinished session
+  traction resume S012 --operator mk        one of several, by another person"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `resume`."""
+    parser.add_argument(
+        "session", nargs="?", metavar="SESSION", help="S012, a folder, or left out"
+    )
+    add_reopening(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Record what is missing and return the exit code."""
+    from experiments.reopening import resume
+    from experiments.store import find_session
+
+    if args.session is None:
+        folder = _only_one(args.data, is_fake=args.fake)
+    else:
+        folder = find_session(args.data, args.session)
+    return resume(folder, reopening(args))
+
+
+def reopening(args: argparse.Namespace) -> "Reopening":
+    """Return what the options say about how a session is opened once more."""
+    from experiments.console import Console
+    from experiments.reopening import Reopening
+
+    return Reopening(
+        data=args.data,
+        config=args.config,
+        console=Console(color=not args.no_color),
+        is_fast=args.fast,
+        is_fake=args.fake,
+        is_forced=args.force,
+        operator=args.operator,
+        script=args.operator_script,
+        can_log=args.can_log,
+    )
+
+
+def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
+    """Return the one unfinished session below `data`.
+
+    Raises:
+        SessionError: there is none, or more than one.
+    """
+    from acquisition.errors import SessionError
+    from experiments.wreckage import find_unfinished
+
+    found = [
+        session
+        for session in find_unfinished(data)
+        if session.folder.is_simulated or not is_fake
+    ]
+    if not found:
+        raise SessionError(
+            f"There is no unfinished session in {data / 'sessions'}.",
+            hint="Start one: traction run TERRAIN",
+        )
+    if len(found) > 1:
+        raise SessionError(
+            f"{len(found)} sessions are unfinished: "
+            + " ".join(session.text() for session in found),
+            hint=f"Name one, e.g. traction resume {found[-1].folder.id}",
+        )
+    return found[0].folder

@@ -1,0 +1,33 @@
+"""traction verdict: keep or reject a recorded trial, days later."""
+
+import argparse
+
+from experiments.arguments import add_author
+
+EXAMPLES = """\
+  traction verdict S012 T04 reject "foot tilted"   T04 goes to rejected/
+  traction verdict S012 T04a keep "it was fine"    back to trials/ as T04"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `verdict`."""
+    parser.add_argument("session", metavar="SESSION", help="S012 or a folder")
+    parser.add_argument("trial", metavar="TRIAL", help="T04, or T04a of rejected/")
+    parser.add_argument("verdict", choices=("keep", "reject"), help="the new verdict")
+    parser.add_argument("reason", nargs="+", metavar="REASON", help="why")
+    add_author(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Change the verdict; files and journal follow, the history is kept."""
+    from experiments.console import Console
+    from experiments.records import change_verdict
+    from experiments.store import find_session
+
+    folder = find_session(args.data, args.session)
+    reason = " ".join(args.reason)
+    said = change_verdict(folder, args.trial, args.verdict, reason, args.operator)
+    console = Console(color=not args.no_color)
+    for line in said:
+        console.say(line)
+    return 0

@@ -1,0 +1,233 @@
+"""A kill at every step of a verdict, and whether files and journal agree again."""
+
+import json
+import os
+from contextlib import contextmanager
+from itertools import takewhile
+from pathlib import Path
+
+import pytest
+
+from acquisition.trial_file.verify import verify
+from experiments.aftermath import settle
+from experiments.book import Book, open_book
+from experiments.phases import Event, Phase
+from experiments.store import create_session, read_json, sha256_of, write_json
+from tests.acquisition.trials import make_cycles, write_trial
+
+STEPS = ("hardlink_to", "unlink", "replace")
+MOST = 60  # steps on the disk that anything here takes
+
+
+class KilledError(BaseException):
+    """The process is gone."""
+
+
+@pytest.fixture(autouse=True)
+def no_disk(monkeypatch):
+    """Do not wait for the disk: nothing here cuts the power."""
+    monkeypatch.setattr(os, "fsync", lambda _: None)
+
+
+class Now:
+    def utc_ns(self):
+        return 1_800_000_000 * 10**9
+
+
+@contextmanager
+def killed_at(step, monkeypatch):
+    """Let the process end before its `step`-th change of the disk.
+
+    Gives a list that is empty when there were fewer steps.
+    """
+    left, was_killed = [step], []
+
+    def count(original):
+        def counted(*arguments, **named):
+            left[0] -= 1
+            if left[0] <= 0:
+                raise KilledError
+            return original(*arguments, **named)
+
+        return counted
+
+    with monkeypatch.context() as patch:
+        for name in STEPS:
+            patch.setattr(Path, name, count(getattr(Path, name)))
+        patch.setattr(os, "fsync", count(os.fsync))
+        try:
+            yield was_killed
+        except KilledError:
+            was_killed.append(step)
+
+
+def make_session(data):
+    """Return the book of an ended session: T01 and T02 kept, T01 rejected once."""
+    folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
+    book = Book(folder, Now())
+    book.note(Event.STARTED, terrain="S0", trials=2)
+    book.note(Event.ACTIVATED)
+    record(book, 1, 1, Event.TRIAL_REJECTED)
+    record(book, 1, 2, Event.TRIAL_KEPT)
+    record(book, 2, 1, Event.TRIAL_KEPT)
+    book.note(Event.ENDED, reason="complete")
+    return book
+
+
+def record(book, number, attempt, verdict):
+    facts = {"trial": number, "attempt": attempt}
+    book.note(Event.TRIAL_STARTED, **facts)
+    path = book.folder.trials / f"T{number:02d}.mcap"
+    path.write_bytes(f"{number}.{attempt}".encode())
+    path.with_suffix(".truth.mcap").write_bytes(f"truth {number}.{attempt}".encode())
+    name = f"T{number:02d}"
+    sidecar = {"trial": name, "attempt": attempt, "sha256": sha256_of(path)}
+    write_json(path.with_suffix(".json"), sidecar)
+    book.note(Event.TRIAL_RECORDED, **facts)
+    book.note(verdict, **facts, reason="", who="mk")
+
+
+def contents(folder):
+    """Return {content: place} of every file of a trial."""
+    paths = [*folder.trials.iterdir(), *folder.rejected.iterdir()]
+    files = [p for p in paths if p.suffix != ".json"]
+    found = {p.read_text(): f"{p.parent.name}/{p.name}" for p in files}
+    assert len(found) == len(files), "a file is there twice"
+    return found
+
+
+def check_agreement(folder):
+    """Hold the files against the journal."""
+    book = open_book(folder, Now())
+    kept = [path.stem for path in folder.kept_trials()]
+    assert kept == sorted(f"T{number:02d}" for number in book.state.kept)
+    for number, attempt in book.state.kept_attempts:
+        assert (folder.trials / f"T{number:02d}.mcap").read_text() == (
+            f"{number}.{attempt}"
+        )
+    assert len(folder.rejected_sidecars()) == book.state.rejected
+    names = {f.name for f in [*folder.trials.iterdir(), *folder.rejected.iterdir()]}
+    assert not [name for name in names if name.endswith((".tmp", ".partial"))]
+
+
+def kill_in_verdict(data, monkeypatch, step, verdict):
+    """Kill a process that gives a verdict on T01, settle; return if it was killed."""
+    book = make_session(data)
+    before = set(contents(book.folder))
+    facts = {"trial": 1, "verdict": "reject", "attempt": 2, "reason": "", "who": "mk"}
+    if verdict == "keep":  # the other attempt at the same number
+        book.note(Event.VERDICT, **facts)
+        facts |= {"verdict": "keep", "attempt": 1}
+    with killed_at(step, monkeypatch) as was_killed:
+        book.note(Event.VERDICT, **facts)
+    settle(open_book(book.folder, Now()))
+    check_agreement(book.folder)
+    assert set(contents(book.folder)) == before
+    return bool(was_killed)
+
+
+@pytest.mark.parametrize("verdict", ["reject", "keep"])
+def test_a_kill_at_any_step_of_a_verdict_loses_nothing(tmp_path, monkeypatch, verdict):
+    steps = range(1, MOST)
+    killed = takewhile(
+        lambda n: kill_in_verdict(tmp_path / str(n), monkeypatch, n, verdict), steps
+    )
+    assert 5 < len(list(killed)) < MOST - 1  # all of them were tried
+
+
+def test_settling_what_is_in_order_changes_nothing(tmp_path):
+    folder = make_session(tmp_path).folder
+    texts = {p: p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
+    assert settle(open_book(folder, Now())) == ""
+    assert texts == {p: p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
+
+
+def crash(data):
+    """Return the book of a session that was killed in T01."""
+    folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
+    book = Book(folder, Now())
+    book.note(Event.STARTED, terrain="S0", trials=2)
+    book.note(Event.ACTIVATED)
+    book.note(Event.TRIAL_STARTED, trial=1, attempt=1)
+    return book
+
+
+def leave_partial(book):
+    """Leave a `.partial` of 0.4 s as a kill does."""
+    writer = write_trial(book.folder.trials / "T01.mcap", make_cycles(201), block=67)
+    writer.close_partial()
+    return writer.partial
+
+
+@pytest.fixture
+def crashed(tmp_path):
+    return crash(tmp_path)
+
+
+def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
+    source = sha256_of(leave_partial(crashed))
+    assert settle(crashed) == "T01 will be redone, its data are in rejected/T01a.*"
+    rejected = crashed.folder.rejected
+    assert verify(rejected / "T01a.mcap").cycles == 201
+    assert sha256_of(rejected / "T01a.partial") == source
+    assert read_json(rejected / "T01a.json")["cycles"] == 201
+    assert list(crashed.folder.trials.iterdir()) == []
+    assert (crashed.state.phase, crashed.state.running) == (Phase.CRASHED, None)
+
+
+def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
+    path = crashed.folder.trials / "T01.mcap"
+    path.write_bytes(b"1.1")
+    sidecar = {"trial": "T01", "attempt": 1, "displacement": 0.4, "verdict": ""}
+    write_json(path.with_suffix(".json"), sidecar)
+    settle(crashed)
+    facts = read_json(crashed.folder.rejected / "T01a.json")
+    assert (facts["displacement"], facts["verdict"]) == (0.4, "reject")
+    assert (crashed.folder.rejected / "T01a.mcap").read_bytes() == b"1.1"
+
+
+@pytest.mark.parametrize("content", [None, b"", b"nothing that can be saved"])
+def test_a_trial_of_which_nothing_is_left_is_a_rejected_attempt_too(crashed, content):
+    if content is not None:
+        (crashed.folder.trials / "T01.mcap.partial").write_bytes(content)
+    settle(crashed)
+    assert read_json(crashed.folder.rejected / "T01a.json")["sha256"] == ""
+    assert (crashed.folder.rejected / "T01a.partial").exists() == (content is not None)
+    assert crashed.state.rejected == 1
+
+
+def kill_in_settling(data, monkeypatch, step):
+    """Kill a process that settles a crash, settle; return if it was killed."""
+    crashed = crash(data)
+    leave_partial(crashed)
+    with killed_at(step, monkeypatch) as was_killed:
+        settle(crashed)
+    settle(open_book(crashed.folder, Now()))
+    book = open_book(crashed.folder, Now())
+    assert (book.state.running, book.state.rejected) == (None, 1)
+    rejected = crashed.folder.rejected
+    assert verify(rejected / "T01a.mcap").cycles == 201
+    assert (rejected / "T01a.partial").exists()
+    left = [p.name for p in crashed.folder.trials.iterdir() if p.name[0] != "."]
+    assert left == []
+    return bool(was_killed)
+
+
+def test_a_kill_at_any_step_of_settling_a_crash_loses_nothing(tmp_path, monkeypatch):
+    steps = range(1, MOST)
+    killed = takewhile(
+        lambda n: kill_in_settling(tmp_path / str(n), monkeypatch, n), steps
+    )
+    assert 5 < len(list(killed)) < MOST - 1  # all of them were tried
+
+
+def test_a_torn_line_is_ended_before_the_next_one(crashed):
+    path = crashed.folder.path / "events.jsonl"
+    with path.open("ab") as file:
+        file.write(b'{"event": "trial-rec')
+    book = open_book(crashed.folder, Now())
+    book.note(Event.NOTED, text="after the kill")
+    *_, torn, last = path.read_text().splitlines()
+    assert torn == '{"event": "trial-rec'
+    assert json.loads(last)["text"] == "after the kill"
+    assert open_book(crashed.folder, Now()).state == book.state

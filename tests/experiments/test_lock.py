@@ -1,0 +1,74 @@
+import os
+import signal
+
+import pytest
+
+from acquisition.errors import SessionError
+from experiments.lock import owner_of, session_lock
+from experiments.store import create_session
+from tests.experiments.program import traction
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return create_session(tmp_path, "S0", is_simulated=True, utc_ns=10**18)
+
+
+def hold_elsewhere(folder):
+    """Return a process that holds the lock until it is killed."""
+    ready, told = os.pipe()
+    child = os.fork()
+    if child == 0:
+        with session_lock(folder):
+            os.write(told, b"!")
+            signal.pause()
+        os._exit(0)
+    os.read(ready, 1)
+    os.close(ready)
+    os.close(told)
+    return child
+
+
+def end(child):
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+
+
+def test_a_session_is_open_in_one_process_only(folder, tmp_path):
+    child = hold_elsewhere(folder)
+    try:
+        owner = owner_of(folder)
+        done = traction("note", "S001", "hello", "--data", tmp_path)
+    finally:
+        end(child)
+    assert owner.pid == child
+    assert done.code == 2
+    assert done.err == (
+        f"S001 is open in process {child} since {owner.since} UTC. "
+        "To watch: traction status --follow\n"
+    )
+
+
+def test_the_lock_of_a_dead_process_is_taken_over(folder):
+    child = hold_elsewhere(folder)
+    assert owner_of(folder) is not None
+    end(child)
+    assert owner_of(folder) is None
+    with session_lock(folder):
+        assert owner_of(folder).pid == os.getpid()
+    assert owner_of(folder) is None
+
+
+def test_a_lock_is_not_taken_twice_in_one_process(folder):
+    with (
+        session_lock(folder),
+        pytest.raises(SessionError, match="is open in"),
+        session_lock(folder),
+    ):
+        pytest.fail("two have it")
+
+
+def test_a_damaged_lock_file_is_no_obstacle(folder):
+    (folder.path / ".lock").write_bytes(b"\xff[")
+    with session_lock(folder):
+        assert owner_of(folder).pid == os.getpid()

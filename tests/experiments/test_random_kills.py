@@ -1,0 +1,73 @@
+"""A session is killed at random moments, again and again, and resumed every time."""
+
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock
+from experiments.aftermath import settle
+from experiments.book import open_book
+from experiments.lock import session_lock
+from experiments.phases import Phase
+from experiments.session import replay
+from experiments.store import list_sessions
+from tests.experiments.program import digest, kept_and_sound, run_watched, traction
+from tests.experiments.test_resuming import short
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
+KILLS = 20
+CLOCK = SystemClock()
+
+
+def run_until(config, data, seconds):
+    """Run or resume a session in a child, kill it after `seconds`; return how."""
+    child = os.fork()
+    if child == 0:
+        with Path(os.devnull).open("w") as nothing:
+            os.dup2(nothing.fileno(), 1)
+            os.dup2(nothing.fileno(), 2)
+        code = 1
+        try:
+            code = run_or_resume(config, data)
+        finally:
+            os._exit(code)
+    CLOCK.sleep_until(CLOCK.now_ns() + round(seconds * 1e9))
+    os.kill(child, signal.SIGKILL)
+    return os.waitpid(child, 0)[1]
+
+
+def run_or_resume(config, data):
+    if list_sessions(data):
+        command = ("resume", "--operator-script", "auto", "--data", data)
+        return traction(*command).code
+    seen = run_watched(config, data, 3, press=lambda asked, _: short(asked))
+    return seen.done.code
+
+
+def test_every_kill_is_survived_and_no_kept_trial_is_lost(tmp_path, config):
+    rng = np.random.default_rng(7)
+    kills, number = 0, 0
+    while kills < KILLS:
+        number += 1
+        data = tmp_path / str(number)
+        safe = {}
+        while kills < KILLS:
+            status = run_until(config, data, float(rng.uniform(0.2, 5.0)))
+            kills += os.WIFSIGNALED(status)
+            if not list_sessions(data):
+                continue
+            (folder,) = list_sessions(data)
+            with session_lock(folder):
+                settle(open_book(folder, CLOCK))
+            state = replay(folder.events())
+            kept = [f"T{n:02d}" for n in sorted(state.kept)]
+            assert kept == kept_and_sound(folder.path)
+            assert [path.stem for path in folder.kept_trials()] == kept
+            now = {name: digest(folder.trials / f"{name}.mcap") for name in kept}
+            assert now.items() >= safe.items()
+            safe = now
+            if state.phase in {Phase.COMPLETE, Phase.PLANNED} or state.is_complete:
+                break

@@ -1,0 +1,368 @@
+"""Notes, verdicts, tables and pictures of a session that is over."""
+
+import csv
+import json
+import shutil
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.trial_file.reader import TrialReader
+from analysis.load import load_trial
+from experiments.order import confounding, suggest_order
+from experiments.records import parse_trial
+from experiments.session import replay
+from experiments.settings import load_settings
+from tests.experiments.program import (
+    digest,
+    journal,
+    kept_and_sound,
+    only_session,
+    sidecar,
+    traction,
+)
+
+
+@dataclass(frozen=True)
+class Copy:
+    data: Path
+    folder: Path
+
+    def say(self, command, *arguments):
+        return traction(command, *arguments, "--data", self.data)
+
+
+@pytest.fixture
+def copied(tmp_path, recorded):
+    """Return a copy of the session of two trials, to be changed."""
+    shutil.copytree(recorded.data, tmp_path / "data")
+    return Copy(tmp_path / "data", only_session(tmp_path / "data"))
+
+
+# --- verdict --------------------------------------------------------------------------
+
+
+def test_a_rejected_trial_moves_with_reason_author_and_history(copied):
+    before = digest(copied.folder / "trials" / "T01.mcap")
+    done = copied.say(
+        "verdict", "S001", "T01", "reject", "foot tilted", "--operator=mk"
+    )
+    assert (done.code, done.err) == (0, "")
+    assert done.out == "rejected/T01a: reject. S001 has 1 of 2 kept.\n"
+    path = copied.folder / "rejected" / "T01a.mcap"
+    facts = sidecar(path)
+    assert digest(path) == before == facts["sha256"]
+    assert (facts["verdict"], facts["reason"], facts["who"]) == (
+        *("reject", "foot tilted", "mk"),
+    )
+    assert facts["when"].endswith("Z")
+    (old,) = facts["history"]
+    assert (old["verdict"], old["who"]) == ("keep", "auto")
+    assert kept_and_sound(copied.folder) == ["T02"]
+    assert replay(journal(copied.folder)).phase == "unfinished"
+
+
+def test_a_trial_that_is_kept_again_is_the_same_file_with_a_longer_history(copied):
+    before = digest(copied.folder / "trials" / "T01.mcap")
+    copied.say("verdict", "S001", "T01", "reject", "why")
+    done = copied.say("verdict", "S001", "T01a", "keep", "it was fine")
+    assert (done.code, done.out.split(".")[0]) == (0, "trials/T01: keep")
+    path = copied.folder / "trials" / "T01.mcap"
+    assert digest(path) == before
+    assert [old["verdict"] for old in sidecar(path)["history"]] == ["keep", "reject"]
+    assert list((copied.folder / "rejected").iterdir()) == []
+    facts = json.loads((copied.folder / "session.json").read_text())
+    assert (facts["phase"], facts["rejected"]) == ("complete", 0)
+
+
+def test_a_trial_whose_file_has_changed_is_not_kept(copied):
+    copied.say("verdict", "S001", "T01", "reject", "why")
+    path = copied.folder / "rejected" / "T01a.mcap"
+    path.chmod(0o644)
+    path.write_bytes(b"something else")
+    done = copied.say("verdict", "S001", "T01", "keep", "why not")
+    assert done.code == 2
+    assert done.err.startswith("T01a.mcap is missing or is not what was recorded.")
+    assert kept_and_sound(copied.folder) == ["T02"]
+
+
+@pytest.mark.parametrize(
+    ("trial", "text"),
+    [
+        ("T09", "There is no T09 in S001. Trials: T01 T02."),
+        ("T01b", "There is no T01b in S001. Trials: T01 T02."),
+        ("../T01", "'../T01' is no trial."),
+    ],
+)
+def test_a_verdict_on_no_trial_is_refused(copied, trial, text):
+    done = copied.say("verdict", "S001", trial, "reject", "why")
+    assert (done.code, done.err[: len(text)]) == (2, text)
+    assert kept_and_sound(copied.folder) == ["T01", "T02"]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [("T04", (4, 0)), ("4", (4, 0)), ("T04b", (4, 2)), ("T04aa", (4, 27))],
+)
+def test_trials_are_named_as_their_files_are(text, found):
+    assert parse_trial(text) == found
+
+
+# --- note -----------------------------------------------------------------------------
+
+
+def test_a_note_on_a_session_goes_into_its_journal(copied):
+    done = copied.say("note", "S001", "heater on", "--operator", "mk")
+    assert (done.code, done.out) == (0, "Noted on S001.\n")
+    entry = journal(copied.folder)[-1]
+    assert (entry["event"], entry["text"], entry["who"]) == (
+        *("noted", "heater on", "mk"),
+    )
+    assert replay(journal(copied.folder)).phase == "complete"
+
+
+def test_a_note_on_a_trial_stands_beside_it_too(copied):
+    done = copied.say("note", "S001", "T02", "a stone\n was \x1b[31mwedged")
+    assert done.out == "Noted on S001 T02.\n"
+    (note,) = sidecar(copied.folder / "trials" / "T02.mcap")["notes"]
+    assert note["text"] == "a stone was [31mwedged"  # no control characters
+    assert kept_and_sound(copied.folder) == ["T01", "T02"]
+
+
+@pytest.mark.parametrize("text", ["", "  ", "x" * 2001])
+def test_a_note_without_a_usable_text_is_refused(copied, text):
+    done = copied.say("note", "S001", text)
+    assert done.code == 2
+    assert "characters, expected 1 to 2000" in done.err
+
+
+# --- init -----------------------------------------------------------------------------
+
+
+def test_init_writes_both_files_with_their_comments(tmp_path):
+    done = traction("init", tmp_path / "lab")
+    assert done.code == 0
+    for name in ("rig.toml", "matrix.toml"):
+        shipped = (resources.files("experiments.data") / name).read_text()
+        assert (tmp_path / "lab" / name).read_text() == shipped
+        assert "#" in shipped
+    check = traction("check", "--config-only", "--config", tmp_path / "lab/rig.toml")
+    assert check.code == 0
+
+
+def test_init_overwrites_nothing(tmp_path):
+    (tmp_path / "matrix.toml").write_text("mine")
+    done = traction("init", tmp_path)
+    assert done.code == 2
+    assert done.err.startswith(f"{tmp_path / 'matrix.toml'} exists already.")
+    assert [path.name for path in tmp_path.iterdir()] == ["matrix.toml"]
+
+
+def test_every_setting_is_printed_with_where_it_comes_from(config):
+    lines = traction("check", "--config-only", "--config", config).out.splitlines()
+    beside = config.with_name("matrix.toml")
+    assert f'   can.channel = "can0"   ({config})' in lines
+    assert f"   terrains[1].incline_deg = 10.0   ({beside})" in lines
+    assert "   arm.mech_at_home = none   (default, not in rig.toml)" in lines
+    reset = "['rake', 'level', 'foot at the far end']"
+    assert f"   terrains[0].reset = {reset}   (default, not in matrix.toml)" in lines
+    assert f"   terrains[6].reset = ['wipe', 'foot at the far end']   ({beside})" in (
+        lines
+    )
+    shipped = traction("check", "--config-only").out
+    assert '   can.channel = "can0"   (shipped default)' in shipped
+    assert tomllib.loads(config.read_text())["can"]["channel"] == "can0"
+
+
+# --- export ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def exported(recorded, tmp_path_factory):
+    to = tmp_path_factory.mktemp("tables") / "new"
+    done = traction("export", "S001", "--to", to, "--data", recorded.data)
+    assert (done.code, done.err) == (0, "")
+    return to
+
+
+def table(path):
+    header, *_ = path.read_text().splitlines()
+    return header.split(","), np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+def test_a_table_holds_every_cycle_with_units(exported, recorded, first_trial):
+    header, rows = table(exported / recorded.folder.name / "T01.csv")
+    trial = load_trial(first_trial)
+    assert len(rows) == len(trial.t)
+    assert {"t [s]", "q1 [rad]", "v_t [m/s]", "F_n [N]"} <= set(header)
+    # twelve digits were written
+    columns = {name: rows[:, i] for i, name in enumerate(header)}
+    assert columns["F_n [N]"] == pytest.approx(trial.traction[:, 2], rel=1e-11)
+    q7 = TrialReader(first_trial).cycles().data["position"][:, 6]
+    assert columns["q7 [rad]"] == pytest.approx(q7, rel=1e-11)
+
+
+def test_the_kept_samples_are_those_inside_the_window(exported, recorded):
+    header, rows = table(exported / recorded.folder.name / "T01.kept.csv")
+    assert header == ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]"]
+    v_t = rows[:, 1]
+    assert 0.005 <= v_t.min() <= v_t.max() <= 0.2
+
+
+def test_every_column_is_in_the_dictionary(exported, recorded):
+    with (exported / "data_dictionary.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for name in ("T01.csv", "T01.kept.csv"):
+        told = [f"{r['column']} [{r['unit']}]" for r in rows if r["table"] == name]
+        assert told == table(exported / recorded.folder.name / name)[0]
+    assert all(row["meaning"] for row in rows)
+
+
+def test_checksums_of_all_tables_are_right(exported, recorded):
+    lines = (exported / "SHA256SUMS").read_text().splitlines()
+    told = dict(reversed(line.split("  ")) for line in lines)
+    assert set(told) == {
+        str(path.relative_to(exported)) for path in exported.rglob("*.csv")
+    }
+    assert all(digest(exported / name) == value for name, value in told.items())
+
+
+def test_simulated_trials_say_so_in_the_index(exported, first_trial):
+    with (exported / "trials.csv").open() as file:
+        first, second = csv.DictReader(file)
+    assert first["simulated"] == second["simulated"] == "true"
+    assert first["sha256 of the recording"] == digest(first_trial)
+
+
+def test_an_export_overwrites_nothing(recorded, exported):
+    done = traction("export", "S001", "--to", exported, "--data", recorded.data)
+    assert done.code == 2
+    assert "is not empty" in done.err
+
+
+# --- replay ---------------------------------------------------------------------------
+
+
+class Jumping(SystemClock):
+    """A clock that waits by moving on."""
+
+    def __init__(self):
+        super().__init__()
+        self.now = 0
+
+    def now_ns(self):
+        return self.now
+
+    def sleep_until(self, t_ns):
+        self.now = max(self.now, t_ns)
+
+
+def test_a_trial_is_shown_again_at_the_speed_asked_for(recorded, monkeypatch):
+    clock = Jumping()
+    monkeypatch.setattr("acquisition.clock.SystemClock", lambda: clock)
+    options = ("--speed", "2", "--data", recorded.data)
+    done = traction("replay", "S001", "T01", *options)
+    lasted = load_trial(recorded.folder / "trials" / "T01.mcap").t[-1]
+    lines = done.out.splitlines()
+    assert (done.code, done.err) == (0, "")
+    assert clock.now == pytest.approx(lasted / 2 * 1e9, abs=10)
+    assert len(lines) == int(lasted) + 2  # one a second from 0 on, and the last
+    assert lines[-1].startswith(f"▶ S001/T01  {lasted:5.2f} s  ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("S001",), "Either a session and a trial are shown, or a bus log."),
+        ((), "Either a session and a trial are shown, or a bus log."),
+        (("S001", "T07"), "There is no T07 in S001. Trials: T01 T02."),
+        (("S001", "T01a"), "There is no T01a in S001. Trials: T01 T02."),
+    ],
+)
+def test_a_replay_of_nothing_is_refused(recorded, arguments, text):
+    done = traction("replay", *arguments, "--data", recorded.data)
+    assert (done.code, done.err[: len(text)]) == (2, text)
+
+
+# --- status ---------------------------------------------------------------------------
+
+
+def test_the_board_shows_which_trials_are_kept(recorded, config):
+    options = ("--data", recorded.data, "--config", config)
+    done = traction("status", "--json", "--where", "kind=simulated", *options)
+    (line,) = json.loads(done.out)
+    assert (line["terrain"], line["kept"], line["trials"]) == (
+        *("TF", 2, [1, 1] + [0] * 8),
+    )
+    board = traction("status", *options).out
+    assert "██········" in board
+
+
+@pytest.mark.parametrize(
+    ("where", "names"),
+    [
+        ("stones=big", ["B0", "B10", "B15"]),
+        ("incline_deg=10,kind=live", ["S10", "B10"]),
+        ("operator=auto", ["TF"]),
+        ("session=S007", []),
+    ],
+)
+def test_the_board_can_be_narrowed(recorded, config, where, names):
+    options = ("--data", recorded.data, "--config", config)
+    done = traction("status", "--json", "--where", where, *options)
+    assert [line["terrain"] for line in json.loads(done.out)] == names
+
+
+@pytest.mark.parametrize("where", ["colour=red", "kind", "kind="])
+def test_a_condition_that_is_none_is_refused(where):
+    done = traction("status", "--where", where)
+    assert done.code == 2
+    assert "expected KEY=VALUE, e.g. kind=live" in done.err
+
+
+def test_the_board_is_followed_until_ctrl_c(recorded, config, monkeypatch):
+    class Looked(Jumping):
+        looks = 0
+
+        def sleep_until(self, t_ns):
+            self.looks += 1
+            if self.looks == 3:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr("acquisition.clock.SystemClock", Looked)
+    options = ("--data", recorded.data, "--config", config)
+    done = traction("status", "--follow", *options)
+    assert done.code == 0
+    assert done.out.count("terrain") == 1 + done.out.count("Next terrains")
+    assert "██········" in done.out
+
+
+def test_the_suggested_order_does_not_go_with_time():
+    rows = load_settings(None).matrix.terrains
+    names = [row.name for row in rows]
+    order = suggest_order(rows, [])
+    factors = {
+        row.name: (
+            row.incline_deg,
+            float(row.stones == "big"),
+            float(row.stones == "none"),
+        )
+        for row in rows
+    }
+    assert sorted(order) == sorted(names)
+    # as listed the plates come last; a good order has next to no trend
+    assert confounding(order, factors) < 0.25
+    assert confounding(names, factors) > 0.6
+
+
+def test_what_was_recorded_is_not_suggested_again():
+    rows = load_settings(None).matrix.terrains
+    assert set(suggest_order(rows, ["S0", "B15", "S0"])) == {
+        *("S10", "S15", "B0", "B10", "TF", "Tf"),
+    }
+    assert suggest_order(rows, [row.name for row in rows]) == []
