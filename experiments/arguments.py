@@ -4,6 +4,7 @@ import shlex
 from argparse import ArgumentParser, ArgumentTypeError
 from pathlib import Path
 
+FRICTION = 0.02  # of the simulated joints, as a share of another arm's
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 
 

@@ -4,10 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from analysis.identify import LEVELS, WINDOWS, identify_study
 from analysis.load import RecordedTrial
 from analysis.report import ReportTable
+from analysis.study import Study
 from experiments.store import SessionFolder
 from experiments.truth import truth_errors
+
+_KEPT_PER_SECOND = 100
 
 
 def report_tables(
@@ -18,6 +22,44 @@ def report_tables(
     tables = [_session_table(sessions), _rejected_table(sessions), _health(every)]
     truth = _truth_table(every)
     return [*tables, *([truth] if truth else []), _provenance(every)]
+
+
+def identification_tables(study: Study) -> list[ReportTable]:
+    """Return how well windows of motion tell the terrains apart; none for one."""
+    found = identify_study(study)
+    if found is None:
+        return []
+    shares = [
+        (
+            f"{size / _KEPT_PER_SECOND:g} s",
+            *(f"{found.by_density[size][level].accuracy:.2f}" for level in LEVELS),
+            *(f"{found.by_error[size][level].accuracy:.2f}" for level in LEVELS),
+        )
+        for size in WINDOWS
+    ]
+    confusion = found.by_density[100]["terrain"]
+    counts = [
+        (name, *map(str, row))
+        for name, row in zip(confusion.names, confusion.counts.tolist(), strict=True)
+    ]
+    return [
+        ReportTable(
+            "Telling terrains apart",
+            (
+                "window",
+                *(f"by density: {level}" for level in LEVELS),
+                *(f"by error: {level}" for level in LEVELS),
+            ),
+            shares,
+            note="Share of windows recognised by models that never saw the trial, mean "
+            "over kinds. By error: the model with the smallest mean absolute error.",
+        ),
+        ReportTable(
+            "Windows of 1 s: from (rows), taken for (columns)",
+            ("", *confusion.names),
+            counts,
+        ),
+    ]
 
 
 def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:

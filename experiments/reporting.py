@@ -1,20 +1,28 @@
 """From sessions to a report: which trials, what is said about them."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
+from analysis.identify import identify_study
 from analysis.load import RecordedTrial, load_trial
-from analysis.models import FitOptions
+from analysis.models import GP_SE, FitOptions
 from analysis.prepare import PrepareOptions
 from analysis.report import ReportContext, write_report
 from analysis.results import ResultStore
-from analysis.study import StudyOptions, run_study
+from analysis.study import Study, StudyOptions, run_study
+from analysis.terrain_export import database_of
 from experiments.console import Console
-from experiments.report_tables import report_tables
-from experiments.store import SessionFolder, find_session, iso_utc, list_sessions
+from experiments.report_tables import identification_tables, report_tables
+from experiments.store import (
+    SessionFolder,
+    find_session,
+    iso_utc,
+    list_sessions,
+    write_new_text,
+)
 
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 
@@ -95,12 +103,29 @@ def _load_trials(
     return trials, problems
 
 
-def report_sessions(
-    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
-) -> Path:
-    """Load the kept trials, fit, and write the report; return the page.
+@dataclass(frozen=True, slots=True)
+class Studied:
+    """Sessions and what a study makes of them.
 
-    One session is reported into its own folder, several into `data`/study.
+    Attributes:
+        study: the result.
+        trials: the kept trials by terrain, in the matrix's order.
+        problems: what was left out, and why.
+    """
+
+    study: Study
+    trials: dict[str, list[RecordedTrial]]
+    problems: list[str]
+
+
+def study_sessions(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    order: Order,
+    console: Console,
+    fit: FitOptions,
+) -> Studied:
+    """Load the kept trials and fit; finished folds are kept below `data`.
 
     Raises:
         SessionError: no session has a kept trial.
@@ -117,20 +142,64 @@ def report_sessions(
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
         prepare=PrepareOptions(container_travel=travel),
-        fit=FitOptions(seed=order.seed),
+        fit=fit,
         scheduler=order.scheduler,
     )
     series = {name: [t.series() for t in group] for name, group in trials.items()}
     store = ResultStore(data / FOLDS)
     study = run_study(series, options, simulated=is_simulated, store=store)
+    return Studied(study, trials, problems)
+
+
+def export_terrains(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    out: Path,
+    order: Order,
+    console: Console,
+) -> None:
+    """Write a terrain database of all models of the sessions' terrains to `out`.
+
+    Raises:
+        SessionError: no session has a kept trial.
+        TrialFileError: `out` exists or cannot be written.
+    """
+    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
+    done = study_sessions(sessions, data, order, console, judged)
+    study = done.study
+    options = replace(study.options, fit=FitOptions(seed=order.seed, draws=0))
+    text = database_of(
+        replace(study, options=options),
+        identify_study(study),
+        iso_utc(SystemClock().utc_ns()),
+        store=ResultStore(data / FOLDS),
+    )
+    write_new_text(out, text)
+    console.say(f"{len(study.terrains)} terrains: {out}")
+
+
+def report_sessions(
+    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
+) -> Path:
+    """Load the kept trials, fit, and write the report; return the page.
+
+    One session is reported into its own folder, several into `data`/study.
+
+    Raises:
+        SessionError: no session has a kept trial.
+    """
+    fit = FitOptions(seed=order.seed)
+    done = study_sessions(sessions, data, order, console, fit)
+    study, trials = done.study, done.trials
+    count = sum(len(group) for group in trials.values())
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
         subtitle=f"{count} trials on {', '.join(trials)}",
-        is_simulated=is_simulated,
+        is_simulated=study.simulated,
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
-        tables=report_tables(sessions, trials),
-        warnings=problems,
+        tables=[*identification_tables(study), *report_tables(sessions, trials)],
+        warnings=done.problems,
     )
     return write_report(study, out, context)

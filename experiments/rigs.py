@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
+from experiments.arguments import FRICTION
 from experiments.calibrated import with_calibrations
 from experiments.crews import Crew, Jobs, ProcessCrew
 from experiments.gravity_choice import build_law_model, read_gravity
@@ -40,7 +41,7 @@ class FakeOptions:
 
     is_fast: bool
     seed: int
-    friction: float = 0.05
+    friction: float = FRICTION
     pace: str = "steady"
 
 

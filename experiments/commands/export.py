@@ -1,30 +1,54 @@
-"""traction export: trials as CSV tables with units and checksums."""
+"""traction export: trials as CSV tables, or terrains as one file of models."""
 
 import argparse
 from pathlib import Path
 
+from experiments.arguments import add_seed
+
 EXAMPLES = """\
   traction export S012 --to tables          kept trials of a session
-  traction export S012 S013 --to tables     of several, one folder each"""
+  traction export --terrain-db terrains.json   all models of all sessions' terrains"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `export`."""
     parser.add_argument(
-        "sessions", nargs="+", metavar="SESSION", help="S012 or a folder"
+        "sessions", nargs="*", metavar="SESSION", help="S012 or a folder"
     )
     parser.add_argument(
-        "--to", type=Path, required=True, metavar="DIR", help="an empty or new folder"
+        "--to", type=Path, metavar="DIR", help="CSV tables into an empty or new folder"
     )
+    parser.add_argument(
+        "--terrain-db", type=Path, metavar="FILE", help="the terrain database, JSON"
+    )
+    add_seed(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the tables and return the exit code."""
+    from acquisition.errors import SettingsError
     from experiments.console import Console
     from experiments.export import export_sessions
-    from experiments.reporting import choose_sessions
+    from experiments.reporting import Order, choose_sessions, export_terrains
+    from experiments.settings import load_settings
 
+    if (args.to is None) == (args.terrain_db is None):
+        raise SettingsError(
+            "Export what: tables with --to DIR, or models with --terrain-db FILE?",
+            hint="Name one of the two. Nothing was written.",
+        )
     console = Console(color=not args.no_color)
-    sessions = choose_sessions(args.data, args.sessions, every=False)
-    export_sessions(sessions, args.to, console)
+    every = args.to is None and not args.sessions
+    sessions = choose_sessions(args.data, args.sessions, every=every)
+    if args.to is not None:
+        export_sessions(sessions, args.to, console)
+        return 0
+    if args.terrain_db.exists():
+        raise SettingsError(
+            f"{args.terrain_db} exists and is never overwritten.",
+            hint="Choose another name. Nothing was written.",
+        )
+    order = [row.name for row in load_settings(args.config).matrix.terrains]
+    wanted = Order(order, args.seed)
+    export_terrains(sessions, args.data, args.terrain_db, wanted, console)
     return 0

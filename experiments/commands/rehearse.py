@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import FRICTION
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -18,7 +20,6 @@ EXAMPLES = """\
   traction rehearse --friction 1            the joints of another arm; not gated"""
 
 _FAILED = 6
-_USUAL = 0.05  # share of friction that the bands are meant for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,9 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--friction",
         type=float,
-        default=_USUAL,
+        default=FRICTION,
         metavar="SHARE",
-        help="of the joints: 1 = as identified on another arm (0.05)",
+        help="of the joints: 1 = as identified on another arm (0.02)",
     )
     parser.add_argument(
         "--jobs", type=int, metavar="N", help="processes at a time (one per core)"
@@ -93,7 +94,7 @@ def _print(plan: Plan, found: Sequence[Finding], folder: Path, console: Console)
     console.say(f"{met}. {folder / 'bands.json'}")
     if not failed:
         return 0
-    if plan.friction != _USUAL:
+    if plan.friction != FRICTION:
         console.say(f"Outside: {', '.join(failed)}; not gated at this friction.")
         return 0
     console.problem(f"Outside their bands: {', '.join(failed)}.")

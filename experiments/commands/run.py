@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import PACES, data_option
+from experiments.arguments import FRICTION, PACES, data_option
 
 if TYPE_CHECKING:
     from experiments.conduct import Request
@@ -33,9 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--friction",
         type=float,
-        default=0.05,
+        default=FRICTION,
         metavar="SHARE",
-        help="of the simulated joints: 1 = as identified on another arm (0.05)",
+        help="of the simulated joints: 1 = as identified on another arm (0.02)",
     )
     parser.add_argument(
         "--pace",
@@ -148,7 +148,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
         )
     if not 0.0 <= args.friction <= 2.0:
         raise SettingsError(
-            f"--friction {args.friction:g} - expected a number 0..2, e.g. 0.05.",
+            f"--friction {args.friction:g} - expected a number 0..2, e.g. 0.02.",
             hint=nothing,
         )
     if args.seed < 0:

@@ -1,0 +1,63 @@
+"""Models of recorded terrains for other programs, and what they recognise."""
+
+import json
+
+import pytest
+
+from analysis.terrain_db import load
+from tests.experiments.program import run_short, traction, write_config
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory):
+    """Return (data folder, database) of two short terrains, two trials each."""
+    folder = tmp_path_factory.mktemp("exported")
+    config = write_config(folder)
+    for terrain in ("S0", "Tf"):
+        assert run_short(config, folder / "data", terrain, 2).code == 0
+    path = folder / "terrains.json"
+    done = traction("export", "--terrain-db", path, "--data", folder / "data")
+    assert done.code == 0, done.err
+    return folder / "data", path
+
+
+def test_every_terrain_has_all_five_models(exported):
+    database = load(exported[1])
+    assert set(database.terrains) == {"S0", "Tf"}
+    assert database.is_simulated
+    models = database.terrain("Tf").tables
+    assert set(models) == {"tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin"}
+    assert 0.1 < database.terrain("Tf").predict(3.0, 0.05).mean < 2.0
+
+
+def test_a_recorded_trial_is_recognised(exported):
+    data, path = exported
+    (trial,) = data.glob("sessions/*_Tf.fake/trials/T02.mcap")
+    done = traction("identify", trial, "--models", path, "--window", 50)
+    assert done.code == 0, done.err
+    assert "0.5 s windows" in done.out
+    told = traction("identify", trial, "--models", path, "--window", 50, "--json")
+    (answer,) = json.loads(told.out)
+    assert answer["terrain"] == "Tf"
+    assert answer["recognition"]["terrains"] == ["S0", "Tf"]
+
+
+def test_a_database_is_never_overwritten(exported):
+    data, path = exported
+    done = traction("export", "--terrain-db", path, "--data", data)
+    assert done.code == 2
+    assert "never overwritten" in done.err
+
+
+@pytest.mark.parametrize("options", [(), ("--to", "x", "--terrain-db", "y")])
+def test_an_export_is_of_one_kind(options):
+    done = traction("export", "S001", *options)
+    assert done.code == 2
+    assert "Name one of the two" in done.err
+
+
+def test_a_file_that_is_no_database_is_refused(exported, tmp_path):
+    (tmp_path / "db.json").write_text("{}")
+    done = traction("identify", exported[1], "--models", tmp_path / "db.json")
+    assert done.code == 2
+    assert "no terrain database" in done.err
