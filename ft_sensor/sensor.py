@@ -112,7 +112,7 @@ class BotaSensor:
             "filter": f"sinc {settings.sinc}, FIR {fir}",
             "nominal_rate": f"{settings.rate:.1f} Hz",
             "measured_rate": f"{self._started.rate:.1f} Hz",
-            "time": "arrival less wire time; filter delay unknown, not subtracted",
+            "time": "device clock, fitted to arrival less wire time; filter unknown",
         }
 
     def close(self) -> None:
