@@ -10,6 +10,7 @@ from acquisition.board import Board, Role
 from acquisition.channel import ChannelClosedError, Handler
 from acquisition.clock import SystemClock
 from acquisition.errors import TrialFileError
+from acquisition.memory import give_back_heap
 from acquisition.processes import Child, Station, name_process
 from acquisition.realtime import Wish, request
 from acquisition.recorder import Recorder
@@ -35,7 +36,7 @@ def main(station: Station) -> None:
             Path(told["path"]), _HEADER.validate_python(told["header"])
         ),
         "event": lambda told: recorder.event(*told),
-        "finish": lambda reason: _VERIFIED.dump_python(recorder.finish(reason)),
+        "finish": lambda reason: _finish(recorder, reason),
         "abandon": lambda _: recorder.abandon(),
     }
     try:
@@ -48,6 +49,12 @@ def main(station: Station) -> None:
         recorder.drain()
         if recorder.is_recording:
             recorder.finish("console lost")
+
+
+def _finish(recorder: Recorder, reason: str) -> dict[str, Any]:
+    verified = _VERIFIED.dump_python(recorder.finish(reason))
+    give_back_heap()
+    return verified
 
 
 class RemoteRecorder:
