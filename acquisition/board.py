@@ -29,11 +29,11 @@ WRENCH_DTYPE = np.dtype(
         ("counter", "<u4"),
         ("status", "<u2"),
         ("is_valid", "?"),
-        ("is_saturated", "?"),
+        ("saturated", "u1"),
         ("wrench", "<f8", (6,)),
     ]
 )
-_WRENCH: Final = struct.Struct("<QIH??6d")
+_WRENCH: Final = struct.Struct("<QIH?B6d")
 FRAME_DTYPE = np.dtype(
     [
         ("t_ns", "<u8"),
@@ -152,7 +152,7 @@ def pack_wrench(sample: WrenchSample) -> bytes:
         sample.counter & 0xFFFFFFFF,
         sample.status & 0xFFFF,
         sample.is_valid,
-        sample.is_saturated,
+        sample.saturated,
         *sample.wrench,
     )
 

@@ -56,7 +56,7 @@ class WrenchSample:
         wrench: fx fy fz tx ty tz in the sensor frame [N, N m], calibrated, not tared.
         status: device status bits as received.
         is_valid: the device vouches for the numbers.
-        is_saturated: a measuring range was exceeded.
+        saturated: bit i set = axis i (fx fy fz tx ty tz) is beyond its range.
     """
 
     t_ns: int
@@ -64,7 +64,7 @@ class WrenchSample:
     wrench: tuple[float, float, float, float, float, float]
     status: int
     is_valid: bool
-    is_saturated: bool
+    saturated: int
 
 
 class Arm(Protocol):

@@ -41,7 +41,7 @@ def of_safety(arm: Arm, mode: SafetyMode) -> int:
 def of_wrench(wrench: WrenchSample | None, *, is_new: bool) -> int:
     """Return how good the force sample in use is."""
     flags = _FT_FRESH if is_new else 0
-    if wrench is not None and wrench.is_saturated:
+    if wrench is not None and wrench.saturated:
         flags |= _FT_SATURATED
     return flags
 

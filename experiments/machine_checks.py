@@ -7,6 +7,7 @@ import numpy as np
 
 from acquisition.sample import Record
 from experiments.console import GOOD, WARNING
+from ft_sensor.reading import axis_names
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
@@ -64,9 +65,10 @@ def check_wrenches(samples: Record, now_ns: int) -> Finding:
     age = (now_ns - int(samples["t_ns"][-1])) * 1e-6
     forces = samples["wrench"][-max(2, int(rate * 0.2)) :, :3]
     noise = float(forces.std(axis=0).max())
-    saturated = int(samples["is_saturated"].sum())
+    saturated = int((samples["saturated"] != 0).sum())
     text = f"{rate:.0f} Hz, age {age:.1f} ms, noise {noise:.2f} N"
     if saturated:
-        text += f", {saturated} saturated"
+        axes = axis_names(int(np.bitwise_or.reduce(samples["saturated"])))
+        text += f", {saturated} saturated ({', '.join(axes)})"
     is_fine = age < OLD_MS and noise < NOISY and not saturated
     return Finding(GOOD if is_fine else WARNING, name, text)

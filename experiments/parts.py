@@ -12,17 +12,18 @@ from acquisition.board import Board
 from acquisition.clock import Clock
 from acquisition.cycle import Cycle
 from acquisition.devices import WrenchSample, WrenchSensor
+from acquisition.errors import SettingsError
 from acquisition.flight import FrameTape
 from acquisition.guard import Limits
 from acquisition.sample import Flag
 from acquisition.shared_sensor import SharedSensor, publish
+from experiments.sensor_settings import build_device
 from experiments.settings import FootSection, RigSettings, TerrainRow
 from ft_sensor.barrett import BarrettSensor
 from ft_sensor.observer import LiveFoot
 from ft_sensor.payload import TerrainFrame, payload_of
-from ft_sensor.sensor import BotaSensor
-from ft_sensor.sensor_settings import SensorSettings
 from ft_sensor.serial_link import SerialLink, SerialPort
+from ft_sensor.serial_sensor import SerialSensor
 from wam.arm import WamArm
 from wam.arm_settings import ArmSettings
 from wam.can_link import CanLink
@@ -131,16 +132,18 @@ def open_bus_sensor(arm: WamArm, link: CanLink, clock: Clock) -> BarrettSensor:
 
 def build_sensor(
     rig: RigSettings, port: SerialPort, clock: Clock, *, is_simulated: bool
-) -> BotaSensor:
-    """Return the wrist sensor on `port`, not opened yet."""
-    section = rig.ft_sensor
-    settings = SensorSettings(
-        "simulated" if is_simulated else section.port,
-        baudrate=section.baudrate,
-        sinc=section.sinc,
-        rate_check=0.5 if is_simulated else 2.0,
-    )
-    return BotaSensor(SerialLink(port), clock, settings)
+) -> SerialSensor:
+    """Return the wrist sensor on `port`, not opened yet.
+
+    Raises:
+        SettingsError: the sensor is not a serial one.
+    """
+    device = build_device(rig.ft_sensor, is_simulated=is_simulated)
+    if device is None:
+        raise SettingsError(
+            "The F/T sensor has no serial line.", hint="Check ft_sensor.kind."
+        )
+    return SerialSensor(SerialLink(port), clock, device)
 
 
 @dataclass(frozen=True, slots=True)

@@ -150,6 +150,6 @@ def _jobs(
         "can": rig.can.model_dump(mode="json"),
         "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
     }
-    is_on_bus = rig.ft_sensor.kind == "barrett"
-    reader = None if is_on_bus else {**common, "port": rig.ft_sensor.port}
+    sensor = rig.ft_sensor
+    reader = None if sensor.is_on_bus else {**common, "port": sensor.port}
     return Jobs(control, reader, world)

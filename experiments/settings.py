@@ -5,33 +5,32 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, cast
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, Field, ValidationError
 
 from acquisition.errors import SettingsError
+from experiments.sensor_settings import SensorSection, build_device
+from experiments.settings_base import (
+    File,
+    Mass,
+    Near,
+    Number,
+    Positive,
+    Section,
+    Vector3,
+    Whole,
+)
 from experiments.settings_errors import explain
 
-# strict: a number in quotes, or `true`, is a mistake and no number
-Number = Annotated[float, Field(strict=True)]
-Whole = Annotated[int, Field(strict=True)]
-_Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this room
-_Vector3 = tuple[_Near, _Near, _Near]
-_Angles = tuple[_Near, _Near, _Near, _Near, _Near, _Near, _Near]
+_Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
-_File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
 _M = TypeVar("_M", bound=BaseModel)
-Positive = Annotated[Number, Field(gt=0, allow_inf_nan=False)]
-Mass = Annotated[Number, Field(gt=0, le=20)]
 _Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class CanSettings(_Section):
+class CanSettings(Section):
     """The CAN interface, in python-can's words."""
 
     interface: str = Field(examples=["socketcan"])
@@ -39,7 +38,7 @@ class CanSettings(_Section):
     bitrate: Whole = Field(gt=0, examples=[1000000])
 
 
-class ArmSection(_Section):
+class ArmSection(Section):
     """This arm.
 
     Attributes:
@@ -52,52 +51,26 @@ class ArmSection(_Section):
     )
 
 
-class SensorSection(_Section):
-    """The wrist sensor and how it is mounted.
-
-    A "bota" has a serial line; a "barrett" is on the arm's bus, and the keys of the
-    line can be left out.
-    """
-
-    kind: Literal["bota", "barrett"] = Field(examples=["bota"])
-    port: str = Field(examples=["/dev/ttyUSB0"])
-    baudrate: Whole = Field(gt=0, examples=[460800])
-    sinc: Whole = Field(ge=51, le=512, examples=[64])
-    mass: Mass = Field(examples=[0.136])
-    height: Number = Field(ge=0, le=0.2, examples=[0.012])
-    angle_deg: Number = Field(ge=-360, le=360, examples=[0.0])
-    sign: Literal[1, -1] = Field(examples=[1])
-    calibration: _File | None = Field(default=None, examples=["ft_sensor.toml"])
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_line(cls, data: object) -> object:
-        given = cast("dict[str, object]", data) if isinstance(data, dict) else {}
-        if given.get("kind") != "barrett":
-            return cast("object", data)
-        return {"port": "none", "baudrate": 460800, "sinc": 64, **given}
-
-
-class FootSection(_Section):
+class FootSection(Section):
     """A foot with its adapter, in frame 7."""
 
     mass: Mass = Field(examples=[0.45])
-    com: _Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
+    com: Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
     inertia: tuple[Positive, Positive, Positive] = Field(
         examples=[[4e-4, 5.5e-4, 4.5e-4]]
     )
-    sole: _Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
-    calibration: _File | None = Field(default=None, examples=["foot_tread.toml"])
+    sole: Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
+    calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
 
 
-class Feet(_Section):
+class Feet(Section):
     """The two feet of the experiment."""
 
     tread: FootSection
     bare: FootSection
 
 
-class ControlSection(_Section):
+class ControlSection(Section):
     """The control law's numbers."""
 
     virtual_mass: Number = Field(ge=0, le=2, examples=[0.30])
@@ -105,7 +78,7 @@ class ControlSection(_Section):
     lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
 
 
-class GravitySection(_Section):
+class GravitySection(Section):
     """Which model of gravity floats the arm.
 
     "cad": masses of the drawings; "shipped": first moments of another arm;
@@ -113,10 +86,10 @@ class GravitySection(_Section):
     """
 
     model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
-    file: _File = Field(default="gravity.toml", examples=["gravity.toml"])
+    file: File = Field(default="gravity.toml", examples=["gravity.toml"])
 
 
-class LimitSection(_Section):
+class LimitSection(Section):
     """Where the guard steps in."""
 
     speed: _Limits = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
@@ -130,7 +103,7 @@ class LimitSection(_Section):
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
 
 
-class SafetySection(_Section):
+class SafetySection(Section):
     """What the safety module tolerates; a warning left out is 0.9 of its fault."""
 
     speed_warning: Annotated[Number, Field(gt=0, le=2)] | None = Field(
@@ -152,7 +125,7 @@ _POWER_UP = SafetySection(
 )
 
 
-class LoopSection(_Section):
+class LoopSection(Section):
     """How the loop keeps time.
 
     Attributes:
@@ -163,7 +136,7 @@ class LoopSection(_Section):
     spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
 
 
-class RigSettings(_Section):
+class RigSettings(Section):
     """Everything in rig.toml."""
 
     can: CanSettings
@@ -177,7 +150,7 @@ class RigSettings(_Section):
     safety: SafetySection = _POWER_UP
 
 
-class TerrainRow(_Section):
+class TerrainRow(Section):
     """One row of the matrix.
 
     `reset`: what a person does to the terrain before every trial.
@@ -187,7 +160,7 @@ class TerrainRow(_Section):
     stones: Literal["small", "big", "none"] = Field(examples=["small"])
     incline_deg: Number = Field(ge=0, le=30, examples=[10.0])
     foot: Literal["tread", "bare"] = Field(examples=["tread"])
-    far_end: _Vector3 = Field(examples=[[0.70, 0.0, 0.12]])
+    far_end: Vector3 = Field(examples=[[0.70, 0.0, 0.12]])
     heading_deg: Number = Field(ge=-180, le=180, examples=[0.0])
     travel: Number = Field(gt=0.05, le=1.0, examples=[0.45])
     trials: Whole = Field(ge=1, le=99, examples=[10])
@@ -198,10 +171,10 @@ class TerrainRow(_Section):
         examples=[["rake", "level", "foot at the far end"]],
     )
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
-    calibration: _File | None = Field(default=None, examples=["terrain_S10.toml"])
+    calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
 
 
-class MatrixSettings(_Section):
+class MatrixSettings(Section):
     """Everything in matrix.toml."""
 
     terrains: tuple[TerrainRow, ...] = Field(min_length=1)
@@ -292,6 +265,7 @@ def load_settings(config: Path | None) -> Settings:
         if beside.exists():
             matrix_text = _read(beside)
     rig = _parse(RigSettings, rig_text, "rig.toml")
+    build_device(rig.ft_sensor)
     matrix = _parse(MatrixSettings, matrix_text, "matrix.toml")
     names = [row.name for row in matrix.terrains]
     twice = sorted({name for name in names if names.count(name) > 1})

@@ -18,6 +18,7 @@ from experiments.parts import (
     terrain_frame,
 )
 from experiments.rehearsing import Rehearsing
+from experiments.sensor_settings import SensorSection
 from experiments.settings import RigSettings, Settings, TerrainRow
 from wam.can_link import CanLink
 from wam.model import ArmModel
@@ -60,14 +61,25 @@ class World:
             },
             "start_q": list(self.row.start_q),
             "seed": self.seed,
+            "sensor": sensor_facts(self.rig.ft_sensor),
         }
         return {
             "scene": scene,
             "tool": tool_facts(build_tool(self.rig, self.row.foot)),
-            "has_sensor": self.rig.ft_sensor.kind == "barrett",
             "friction": self.friction,
             "pace": self.pace,
         }
+
+
+def sensor_facts(section: SensorSection) -> dict[str, Any]:
+    """Return which simulated sensor fits the settings, in plain values."""
+    return {
+        "kind": section.kind,
+        "sinc": section.sinc,
+        "baudrate": section.baudrate,
+        "sensitivity": section.sensitivity,
+        "serial_number": section.serial_number,
+    }
 
 
 def stepped(
@@ -82,7 +94,6 @@ def stepped(
     `models`: the arm with its tool, and as the control law weighs it.
     """
     from fakes.clock import SteppedClock
-    from fakes.network_options import NetworkOptions
     from fakes.plant import PlantOptions
     from fakes.push import PACES
     from fakes.rig import FakeRig, Rehearsal
@@ -90,15 +101,13 @@ def stepped(
 
     clock, facts = SteppedClock(), world.facts()
     model, law_model = models
-    is_on_bus: bool = facts["has_sensor"]
-    network = NetworkOptions(has_sensor=is_on_bus)
+    is_on_bus = settings.rig.ft_sensor.is_on_bus
     simulation = FakeRig(
         scene_of(facts["scene"]),
         model.constants,
         tool_of(facts["tool"]),
         clock,
         options=PlantOptions(friction=facts["friction"]),
-        network=network,
     )
     clock.world = simulation
     link = CanLink(simulation.bus)

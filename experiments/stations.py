@@ -31,8 +31,8 @@ from experiments.parts import (
     open_bus_sensor,
 )
 from experiments.settings import RigSettings, TerrainRow
-from ft_sensor.sensor import BotaSensor
 from ft_sensor.serial_link import open_port
+from ft_sensor.serial_sensor import SerialSensor
 from wam.arm import WamArm
 from wam.can_link import CanLink, open_bus
 from wam.constants import load_constants
@@ -176,7 +176,7 @@ class ReaderStation:
     def __init__(self, station: Station) -> None:
         self._station = station
         self._clock = SystemClock()
-        self._sensor: BotaSensor | None = None
+        self._sensor: SerialSensor | None = None
         self._grants = request(Wish(READER_PRIORITY, station.settings.get("core")))
 
     def serve(self) -> None:
@@ -206,7 +206,7 @@ class ReaderStation:
         self._sensor = sensor
         return sensor.describe()
 
-    def _read(self, sensor: BotaSensor) -> None:
+    def _read(self, sensor: SerialSensor) -> None:
         """Publish what arrives within 20 ms; a port that has gone leaves stale ones."""
         clock, board = self._clock, self._station.board
         clock.wait(sensor, clock.now_ns() + READ_NS)

@@ -12,7 +12,6 @@ from fakes.can_bus import FakeCanBus
 from fakes.container import Container
 from fakes.faults import mend_network, network_faults
 from fakes.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
-from fakes.ft_streams import BotaOptions, BotaStream
 from fakes.network_options import NetworkOptions
 from fakes.plant import CYCLE_NS, ArmPlant, PlantOptions
 from fakes.pucks import PuckNetwork
@@ -20,6 +19,7 @@ from fakes.push import Pace
 from fakes.randomness import trial_generators
 from fakes.safety_module import PendantAction
 from fakes.sensor_errors import SensorErrors
+from fakes.sensor_kinds import SensorChoice, make_stream
 from fakes.serial_port import FakeSerialPort
 from fakes.terrain import make_terrain
 from fakes.truth import truth_records
@@ -33,6 +33,7 @@ _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
 ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
 _CLOSE = 1e-9  # m and rad, where the search for the start pose ends
 _LARGEST_STEP = 0.5  # rad
+_ANY_SENSOR = SensorChoice()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class Scene:
         frame: where the container is.
         start_q: joint positions with the foot at the far end [rad], shape (7,).
         seed: of everything random.
+        sensor: which wrist sensor the arm has.
     """
 
     terrain: str
@@ -54,6 +56,7 @@ class Scene:
     frame: TerrainFrame
     start_q: Array
     seed: int
+    sensor: SensorChoice = _ANY_SENSOR
 
 
 def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
@@ -107,17 +110,16 @@ class FakeRig:
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
         found = replace(network or NetworkOptions(), mt=constants.mt)
+        if scene.sensor.is_on_bus:
+            found = replace(found, has_sensor=True)
         self.rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if found.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
         self.bus = FakeCanBus(self.network, clock)
-        self.stream = BotaStream(
-            self.plant.sensor_load,
-            self.errors,
-            BotaOptions(is_running=True, sinc=64, clock_error_ppm=20.0),
-            clock.now_ns(),
+        self.stream = make_stream(
+            scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
         self._port: FakeSerialPort | None = None
 

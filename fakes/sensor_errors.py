@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fakes.randomness import NormalStream, OrnsteinUhlenbeck
-from ft_sensor.bota import Wrench
+from ft_sensor.reading import Wrench
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,10 +16,10 @@ from acquisition.clock import SystemClock
 from acquisition.processes import Station, name_process
 from acquisition.realtime import Wish, request
 from fakes.can_hub import SocketHub
-from fakes.network_options import NetworkOptions
 from fakes.plant import PlantOptions
 from fakes.push import PACES
 from fakes.rig import FakeRig, Rehearsal, Scene
+from fakes.sensor_kinds import SensorChoice
 from fakes.serial_pty import SerialPty
 from fakes.truth import truth_records
 from fakes.wire import WiredNetwork
@@ -169,6 +169,7 @@ def scene_of(facts: dict[str, Any]) -> Scene:
         ),
         start_q=np.array(facts["start_q"]),
         seed=facts["seed"],
+        sensor=SensorChoice(**facts["sensor"]),
     )
 
 
@@ -187,7 +188,6 @@ def main(station: Station) -> None:
             tool_of(settings["tool"]),
             clock,
             PlantOptions(friction=settings["friction"]),
-            NetworkOptions(has_sensor=settings["has_sensor"]),
         )
         rehearsal = Rehearsal(rig, PACES[settings["pace"]])
         RigServer(rehearsal, clock, folder, station.channel).serve()

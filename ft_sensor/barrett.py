@@ -5,7 +5,12 @@ from dataclasses import dataclass
 from acquisition.clock import Clock
 from acquisition.devices import WrenchSample
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
-from ft_sensor.barrett_frames import BarrettCounters, WrenchPairing, status_words
+from ft_sensor.barrett_frames import (
+    RANGES,
+    BarrettCounters,
+    WrenchPairing,
+    status_words,
+)
 from wam.can_link import Link
 from wam.dialogue import Dialogue
 from wam.frames import SENSOR_NODE, Payload, encode_get
@@ -118,6 +123,7 @@ class BarrettSensor:
             "firmware": f"{_text(found.vers)} (unreliable)",
             "role": _role_text(found.role),
             "port": "the arm's CAN bus",
+            "ranges": " ".join(f"{most:g}" for most in RANGES),
             "nominal_rate": "one sample per cycle",
             "measured_rate": f"{found.answered} of {_QUESTIONS} questions answered",
             "time": "question handed over + 191 us; filter delay unknown",

@@ -7,6 +7,7 @@ that says whether they can be believed comes with the torque.
 from dataclasses import dataclass
 
 from acquisition.devices import WrenchSample
+from ft_sensor.reading import ALL_AXES, axes_beyond
 from wam.frames import (
     SENSOR_NODE,
     FrameError,
@@ -108,12 +109,14 @@ class WrenchPairing:
             return None
         self._counters.samples += 1
         wrench = (*force, *torque)
-        is_full = any(abs(v) >= top for v, top in zip(wrench, RANGES, strict=True))
+        beyond = axes_beyond(wrench, RANGES)
+        if status & ~_RETARE:  # a gauge, or bad data: which axes, nobody knows
+            beyond = ALL_AXES
         return WrenchSample(
             t_ns=asked_ns + SAMPLING_DELAY_NS,
             counter=0,
             wrench=wrench,
             status=status,
             is_valid=not status & _BAD,
-            is_saturated=is_full or bool(status & ~_RETARE),
+            saturated=beyond,
         )

@@ -12,11 +12,12 @@ from binascii import crc_hqx
 from dataclasses import dataclass
 from enum import IntFlag
 
-Wrench = tuple[float, float, float, float, float, float]
+from ft_sensor.framing import FrameScanner
+from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
 
 HEADER = 0xAA
 FRAME_SIZE = 37
-BITS_PER_BYTE = 10  # 8N1: a start bit, eight data bits, a stop bit
+CLOCK_MODULUS = 1 << 32  # of its microseconds
 SINC_STEP_NS = 19_531.25  # output period per unit of sinc length
 BAUD_CODES = {9600: 0, 57600: 1, 115200: 2, 230400: 3, 460800: 4}
 MAX_COMMAND_SIZE = 64  # the device's input buffer
@@ -47,6 +48,8 @@ class BotaStatus(IntFlag):
     RAW_GAUGE = 0x8
 
 
+_OVER_RANGE = int(BotaStatus.OVER_RANGE)
+_UNTRUSTED = int(BotaStatus.INVALID | BotaStatus.RAW_GAUGE)
 _WORDS = {
     BotaStatus.SKIPPED: "measurements skipped: sinc length too short",
     BotaStatus.OVER_RANGE: "measuring range exceeded",
@@ -119,97 +122,28 @@ def decode_frame(data: bytes, start: int = 0) -> BotaFrame | None:
     return BotaFrame(status, (fx, fy, fz, tx, ty, tz), device_us, temperature)
 
 
-@dataclass(slots=True)
-class ParserCounters:
-    """What a parser has met so far.
+def scanner(ranges: Wrench) -> FrameScanner[Reading]:
+    """Return a scanner for the frames of a sensor with these `ranges` [N, N m]."""
 
-    Attributes:
-        frames: good frames.
-        crc_errors: header bytes whose 37 bytes failed the checksum; one damaged frame
-            counts once for every 0xAA in it.
-        discarded: bytes that belong to no good frame.
-        resyncs: times the stream was lost.
-    """
+    def read(data: bytes, start: int) -> Reading | None:
+        frame = decode_frame(data, start)
+        if frame is None:
+            return None
+        status, wrench = frame.status, frame.wrench
+        if not status:
+            return Reading(frame.device_us, wrench, 0, True, 0)
+        beyond = 0
+        if status & _OVER_RANGE:  # which axis it is, the device does not say
+            beyond = axes_beyond(wrench, ranges) or ALL_AXES
+        is_trusted = not status & _UNTRUSTED
+        return Reading(frame.device_us, wrench, status, is_trusted, beyond)
 
-    frames: int = 0
-    crc_errors: int = 0
-    discarded: int = 0
-    resyncs: int = 0
-
-
-class BotaParser:
-    """Finds frames in a byte stream that may be damaged anywhere.
-
-    After a failed checksum the search goes on one byte later, so that one damaged
-    byte costs one frame. Between calls it holds less than one frame.
-    """
-
-    def __init__(self) -> None:
-        self.counters = ParserCounters()
-        self._held = b""
-        self._is_lost = False
-
-    def feed(self, data: bytes) -> list[BotaFrame]:
-        """Return the frames completed by `data`, oldest first."""
-        frames: list[BotaFrame] = []
-        start = 0
-        if self._held:
-            # A frame that begins in the held bytes ends within the next 36.
-            held = len(self._held)
-            seam = self._held + data[: FRAME_SIZE - 1]
-            reached = self._scan(seam, 0, held, frames)
-            if reached < held:
-                self._held = seam[reached:]
-                return frames
-            start = reached - held
-        self._held = data[self._scan(data, start, len(data), frames) :]
-        return frames
-
-    def _scan(self, data: bytes, start: int, stop: int, frames: list[BotaFrame]) -> int:
-        """Collect the frames that begin in [start, stop); return where to go on."""
-        counters = self.counters
-        while start < stop:
-            header = data.find(HEADER, start, stop)
-            if header != start:
-                header = stop if header < 0 else header
-                self._discard(header - start)
-                start = header
-                continue
-            if len(data) - start < FRAME_SIZE:
-                break
-            frame = decode_frame(data, start)
-            if frame is None:
-                counters.crc_errors += 1
-                self._discard(1)
-                start += 1
-            else:
-                frames.append(frame)
-                counters.frames += 1
-                self._is_lost = False
-                start += FRAME_SIZE
-        return start
-
-    def _discard(self, count: int) -> None:
-        self.counters.discarded += count
-        if not self._is_lost:
-            self._is_lost = True
-            self.counters.resyncs += 1
-
-
-def unwrap_us(device_us: int, last_us: int) -> int:
-    """Return the time [us] nearest to `last_us` that the 32-bit clock shows so."""
-    half = 1 << 31
-    return last_us + (device_us - last_us + half) % (1 << 32) - half
+    return FrameScanner(b"\xaa", FRAME_SIZE, read)
 
 
 def frame_period_ns(sinc: int) -> float:
     """Return the output period [ns] at a sinc length: rate = 51200 / sinc Hz."""
     return sinc * SINC_STEP_NS
-
-
-def wire_time_ns(size: int, baudrate: int) -> int:
-    """Return how long `size` bytes occupy the wire [ns]."""
-    return size * BITS_PER_BYTE * 1_000_000_000 // baudrate
 
 
 def communication_command(baudrate: int) -> bytes:

@@ -17,7 +17,11 @@ _STEEPEST = 500e-6  # no two clocks run further apart
 
 
 class ClockFit:
-    """Turns device time into host time; needs no more memory as it goes on."""
+    """Turns device time into host time; needs no more memory as it goes on.
+
+    Attributes:
+        has_line: it follows the difference of the two clocks; before, the least delay.
+    """
 
     def __init__(self) -> None:
         self.restart()
@@ -30,7 +34,7 @@ class ClockFit:
         self._origin_ns = 0
         self._offset_ns = 0.0
         self._slope = 0.0
-        self._has_line = False
+        self.has_line = False
 
     def offer(self, device_ns: int, arrival_ns: int) -> None:
         """Take a message of the device's time that was there at `arrival_ns`.
@@ -51,7 +55,7 @@ class ClockFit:
             self._draw_line()
         elif offset < window[1]:
             self._window = (device_ns, offset)
-        if not self._has_line:
+        if not self.has_line:
             self._hold_least()
 
     def host_ns(self, device_ns: int) -> int:
@@ -86,7 +90,7 @@ class ClockFit:
         slope, offset = _line(t[kept], y[kept])
         self._slope = float(np.clip(slope, -_STEEPEST, _STEEPEST))
         self._offset_ns = base + offset
-        self._has_line = True
+        self.has_line = True
 
 
 def _line(t: np.ndarray, y: np.ndarray) -> tuple[float, float]:

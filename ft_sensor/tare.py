@@ -86,7 +86,7 @@ def tare(
 
 
 def _refuse_flagged(samples: Sequence[WrenchSample]) -> None:
-    flagged = [s for s in samples if s.status or s.is_saturated or not s.is_valid]
+    flagged = [s for s in samples if s.status or s.saturated or not s.is_valid]
     if flagged:
         raise TareError(
             f"{len(flagged)} of {len(samples)} F/T samples were flagged during tare "

@@ -46,7 +46,7 @@ def test_areas_do_not_overlap():
     st.tuples(*[finite] * 6),
     st.integers(0, 2**16 - 1),
     st.booleans(),
-    st.booleans(),
+    st.integers(0, 63),
 )
 def test_a_sample_survives_the_ring(t_ns, counter, wrench, status, valid, saturated):
     sample = WrenchSample(t_ns, counter, wrench, status, valid, saturated)

@@ -166,7 +166,7 @@ class Bench:
 
     def wrench(self, force, **changes):
         values = (0.0, 0.0, force, 0.0, 0.0, 0.0)
-        sample = WrenchSample(self.now_ns, self.number, values, 0, True, False)
+        sample = WrenchSample(self.now_ns, self.number, values, 0, True, 0)
         return replace(sample, **changes)
 
     def record(self, index=-1):
@@ -336,7 +336,7 @@ def test_invalid_samples_alone_age_the_force(bench):
 
 def test_saturation_is_flagged(bench):
     assert not has(bench.run(), Flag.FT_SATURATED)
-    bench.sensor.queue = [bench.wrench(9.0, is_saturated=True)]
+    bench.sensor.queue = [bench.wrench(9.0, saturated=1)]
     assert has(bench.run(force=None), Flag.FT_SATURATED)
 
 

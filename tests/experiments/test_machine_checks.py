@@ -63,10 +63,10 @@ def test_noise_and_age_are_marked(trouble):
 
 def test_saturation_is_marked():
     records = samples()
-    records["is_saturated"][3] = True
+    records["saturated"][3] = 0b100
     found = check_wrenches(records, NOW_NS)
     assert found.mark == WARNING
-    assert found.text.endswith("1 saturated")
+    assert found.text.endswith("1 saturated (Fz)")
 
 
 @pytest.mark.parametrize("count", [0, 1])

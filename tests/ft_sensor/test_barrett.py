@@ -49,38 +49,38 @@ def test_force_and_torque_in_either_order_make_one_sample(pairing, order):
     # Half a count of each.
     assert sample.wrench[:3] == pytest.approx((1.0, -2.5, -9.81), abs=0.002)
     assert sample.wrench[3:] == pytest.approx((0.1, -0.25, 0.015), abs=0.00013)
-    assert (sample.status, sample.is_valid, sample.is_saturated) == (0, True, False)
+    assert (sample.status, sample.is_valid, sample.saturated) == (0, True, 0)
     assert sample.t_ns == 5 * MS + SAMPLING_DELAY_NS
 
 
 @pytest.mark.parametrize(
-    ("status", "is_valid", "is_saturated"),
-    [(0x80, True, False), (0x84, True, True), (0x01, True, True), (0xC4, False, True)],
+    ("status", "is_valid", "saturated"),
+    [(0x80, True, 0), (0x84, True, 0x3F), (0x01, True, 0x3F), (0xC4, False, 0x3F)],
 )
 def test_the_status_after_the_torque_judges_the_force_too(
-    pairing, status, is_valid, is_saturated
+    pairing, status, is_valid, saturated
 ):
     (sample,) = hear(pairing, (FORCE_ID, FORCE), (TORQUE_ID, TORQUE + bytes((status,))))
-    assert (sample.is_valid, sample.is_saturated) == (is_valid, is_saturated)
+    assert (sample.is_valid, sample.saturated) == (is_valid, saturated)
     assert sample.status == status
 
 
 @pytest.mark.parametrize(
-    ("wrench", "is_saturated"),
+    ("wrench", "saturated"),
     [
-        ((79.9, 0, 0, 0, 0, 0), False),
-        ((0, -80.0, 0, 0, 0, 0), True),
-        ((0, 0, 127.9, 0, 0, 0), False),
-        ((0, 0, 135.0, 0, 0, 0), True),
-        ((0, 0, -135.0, 0, 0, 0), True),
-        ((0, 0, 0, 2.74, 0, 0), False),
-        ((0, 0, 0, 0, 0, -2.75), True),
+        ((79.9, 0, 0, 0, 0, 0), 0),
+        ((0, -80.0, 0, 0, 0, 0), 0b000010),
+        ((0, 0, 127.9, 0, 0, 0), 0),
+        ((0, 0, 135.0, 0, 0, 0), 0b000100),
+        ((90.0, 0, -135.0, 0, 0, 0), 0b000101),
+        ((0, 0, 0, 2.74, 0, 0), 0),
+        ((0, 0, 0, 0, 0, -2.75), 0b100000),
     ],
 )
-def test_a_reading_at_its_range_is_saturated(pairing, wrench, is_saturated):
+def test_a_reading_at_its_range_is_saturated_in_that_axis(pairing, wrench, saturated):
     force, torque = encode_force(wrench[:3]), encode_torque(wrench[3:])
     (sample,) = hear(pairing, (FORCE_ID, force), (TORQUE_ID, torque))
-    assert sample.is_saturated == is_saturated
+    assert sample.saturated == saturated
     assert sample.is_valid
 
 

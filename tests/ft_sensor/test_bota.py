@@ -11,9 +11,11 @@ from ft_sensor.bota import (
     Acknowledgement,
     BootText,
     BotaFrame,
-    BotaParser,
     BotaStatus,
 )
+from ft_sensor.framing import FrameScanner, wire_time_ns
+from ft_sensor.reading import StreamTiming
+from tests.ft_sensor.damage import damaged_stream, double, drop, flip
 
 NORMAL = bytes.fromhex(
     "AA000000 00A03F00 0020C000 00204100 00003E000080BD00 00003F87 D6120000 00CC4109 37"
@@ -39,6 +41,8 @@ A, B, C = (
     )
 )
 
+TIMING = StreamTiming(1.25e6, 802_951, bota.CLOCK_MODULUS, 1000.0, 50_000_000, 37)
+
 float32 = st.floats(width=32, allow_nan=False)
 frames = st.builds(
     BotaFrame,
@@ -49,8 +53,8 @@ frames = st.builds(
 )
 
 
-def parse(data: bytes, chunk: int) -> tuple[list[BotaFrame], BotaParser]:
-    parser = BotaParser()
+def parse(data: bytes, chunk: int) -> tuple[list[BotaFrame], FrameScanner[BotaFrame]]:
+    parser = FrameScanner(b"\xaa", bota.FRAME_SIZE, bota.decode_frame)
     found = [
         frame
         for start in range(0, len(data), chunk)
@@ -142,7 +146,7 @@ def test_a_lost_byte_costs_its_frame_only(chunk):
     assert [frame.device_us for frame in found] == [1_000_000, 1_002_500]
     assert parser.counters.discarded == 36
     assert parser.counters.resyncs == 1
-    assert parser.counters.crc_errors == 1
+    assert parser.counters.bad_checks == 1
 
 
 @given(st.binary(max_size=300), st.integers(1, 80))
@@ -156,10 +160,10 @@ def test_counters_do_not_depend_on_the_chunking(noise, chunk):
 
 @given(st.binary(max_size=200))
 def test_parser_holds_less_than_a_frame(noise):
-    parser = BotaParser()
+    parser = FrameScanner(b"\xaa", bota.FRAME_SIZE, bota.decode_frame)
     for byte in noise + b"\xaa" * 50:
         parser.feed(bytes((byte,)))
-        assert len(parser._held) < bota.FRAME_SIZE
+        assert parser.held < bota.FRAME_SIZE
 
 
 def noisy_frame(rng: random.Random, number: int) -> BotaFrame:
@@ -176,40 +180,12 @@ def header_frame(rng: random.Random, number: int) -> BotaFrame:
     )
 
 
-def damaged_stream(make, fault, seed: int) -> tuple[bytes, list[BotaFrame], set[int]]:
-    """150 frames, 30 of them with one damaged byte; the last one is whole.
-
-    Damaged frames are never neighbours: the last byte of one could then stand in for
-    the lost header of the next, which is a recovery and no loss.
-    """
-    rng = random.Random(seed)
-    sent = [make(rng, number) for number in range(150)]
-    encoded = [bytearray(bota.encode_frame(frame)) for frame in sent]
-    hit = set(rng.sample(range(0, 149, 2), 30))
-    for number in hit:
-        fault(rng, encoded[number])
-    return b"".join(encoded), sent, hit
-
-
-def flip(rng: random.Random, data: bytearray) -> None:
-    data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-
-
-def drop(rng: random.Random, data: bytearray) -> None:
-    del data[rng.randrange(len(data))]
-
-
-def double(rng: random.Random, data: bytearray) -> None:
-    position = rng.randrange(len(data))
-    data.insert(position, data[position])
-
-
 @pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
 @pytest.mark.parametrize("make", [noisy_frame, header_frame])
 @pytest.mark.parametrize("fault", [flip, drop])
 def test_one_bad_byte_costs_exactly_one_frame(make, fault, chunk):
     for seed in range(10):
-        data, sent, hit = damaged_stream(make, fault, seed)
+        data, sent, hit = damaged_stream(make, bota.encode_frame, fault, seed)
         found, _ = parse(data, chunk)
         assert found == [f for number, f in enumerate(sent) if number not in hit]
 
@@ -218,7 +194,7 @@ def test_one_bad_byte_costs_exactly_one_frame(make, fault, chunk):
 @pytest.mark.parametrize("make", [noisy_frame, header_frame])
 def test_a_doubled_byte_costs_at_most_one_frame(make, chunk):
     for seed in range(10):
-        data, sent, hit = damaged_stream(make, double, seed)
+        data, sent, hit = damaged_stream(make, bota.encode_frame, double, seed)
         found, parser = parse(data, chunk)
         got = {frame.device_us for frame in found}
         lost = {n for n, frame in enumerate(sent) if frame.device_us not in got}
@@ -228,12 +204,12 @@ def test_a_doubled_byte_costs_at_most_one_frame(make, chunk):
 
 
 def test_device_time_unwraps_over_the_end_of_32_bits():
-    assert bota.unwrap_us(100, 2**32 - 1150) == 2**32 + 100
-    assert bota.unwrap_us(100, 5 * 2**32 + 50) == 5 * 2**32 + 100
+    assert TIMING.unwrap(100, 2**32 - 1150) == 2**32 + 100
+    assert TIMING.unwrap(100, 5 * 2**32 + 50) == 5 * 2**32 + 100
 
 
 def test_device_time_that_steps_back_stays_a_step_back():
-    assert bota.unwrap_us(2**32 - 10, 2**32 + 5) == 2**32 - 10
+    assert TIMING.unwrap(2**32 - 10, 2**32 + 5) == 2**32 - 10
 
 
 def test_status_is_told_in_words():
@@ -286,7 +262,7 @@ def test_boot_text_waits_for_the_end_of_a_line():
 
 
 def test_wire_time_of_a_frame_is_four_fifths_of_a_millisecond():
-    assert bota.wire_time_ns(37, 460800) == 802_951
+    assert wire_time_ns(37, 460800) == 802_951
 
 
 def test_rate_is_51200_over_the_sinc_length():

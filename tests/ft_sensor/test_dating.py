@@ -1,33 +1,36 @@
 from itertools import pairwise
 
-from ft_sensor.bota import BotaFrame
 from ft_sensor.dating import FrameDating
-from ft_sensor.sensor_settings import SensorSettings
+from ft_sensor.reading import Reading, StreamTiming
 
 MS = 1_000_000
+SHOWN = StreamTiming(1.25 * MS, 802_951, 1 << 32, 1000.0, 50 * MS, 37)
+COUNTED = StreamTiming(1.0 * MS, 206_000, 0, 1.0 * MS, 1000 * MS, 19)
+
+
+def reading(ticks, force):
+    return Reading(ticks, (force, 0.0, 0.0, 0.0, 0.0, 0.0), 0, True, 0)
 
 
 def test_non_finite_numbers_are_invalid():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frame = BotaFrame(0, (0.0, float("nan"), 0.0, 0.0, 0.0, 0.0), 5, 25.0)
+    dating = FrameDating(SHOWN)
+    frame = reading(5, float("nan"))
     (sample,) = dating.date([frame], 10 * MS)
     assert not sample.is_valid
 
 
 def test_dates_rise_when_a_late_batch_reaches_back():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frames = [
-        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), 1250 * k, 25.0) for k in range(4)
-    ]
+    dating = FrameDating(SHOWN)
+    frames = [reading(1250 * k, k) for k in range(4)]
     found = dating.date(frames[:1], 100 * MS)
     found += dating.date(frames[1:], 101 * MS)
     assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
 
 
 def test_a_jump_of_the_device_clock_does_not_move_the_dates():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
+    dating = FrameDating(SHOWN)
     frames = [
-        BotaFrame(0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), t_us, 25.0)
+        reading(t_us, k)
         for k, t_us in enumerate([1000, 2250, 2_000_000_000, 2_000_001_250])
     ]
     found = dating.date(frames, 100 * MS)
@@ -35,13 +38,8 @@ def test_a_jump_of_the_device_clock_does_not_move_the_dates():
 
 
 def test_wrap_inside_a_run_loses_nothing():
-    dating = FrameDating(SensorSettings("/dev/sensor"))
-    frames = [
-        BotaFrame(
-            0, (k, 0.0, 0.0, 0.0, 0.0, 0.0), (2**32 - 2500 + 1250 * k) % 2**32, 25.0
-        )
-        for k in range(5)
-    ]
+    dating = FrameDating(SHOWN)
+    frames = [reading((2**32 - 2500 + 1250 * k) % 2**32, k) for k in range(5)]
     found = dating.date(frames, 100 * MS)
     assert all(sample.is_valid for sample in found)
     assert dating.lost == 0

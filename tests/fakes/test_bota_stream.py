@@ -3,20 +3,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fakes.ft_streams import (
-    BotaOptions,
-    BotaStream,
+from fakes.bota_stream import BotaOptions, bota_stream
+from fakes.sensor_errors import SensorErrors
+from fakes.sensor_stream import (
     ByteFault,
+    SensorStream,
     damage,
 )
-from fakes.sensor_errors import SensorErrors
 from ft_sensor.bota import (
     Acknowledgement,
-    BotaParser,
     BotaStatus,
+    decode_frame,
     find_acknowledgements,
     find_boot_text,
 )
+from ft_sensor.framing import FrameScanner
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -29,31 +30,35 @@ def ramp(t_ns: int) -> tuple[float, ...]:
     return (t_ns / 1000, 1.0, 2.0, 3.0, 4.0, 5.0)
 
 
-def frames_of(stream: BotaStream, t_ns: int):
-    return BotaParser().feed(b"".join(data for _, data in stream.due(t_ns)))
+def parsed(data: bytes):
+    return FrameScanner(b"\xaa", 37, decode_frame).feed(data)
 
 
-def text_of(stream: BotaStream, t_ns: int) -> bytes:
+def frames_of(stream: SensorStream, t_ns: int):
+    return parsed(text_of(stream, t_ns))
+
+
+def text_of(stream: SensorStream, t_ns: int) -> bytes:
     return b"".join(data for _, data in stream.due(t_ns))
 
 
-def configured(options: BotaOptions = FAST) -> BotaStream:
+def configured(options: BotaOptions = FAST) -> SensorStream:
     """A device in configuration mode at 100 ms, with nothing left to say."""
-    stream = BotaStream(ramp, options=options)
+    stream = bota_stream(ramp, options=options)
     stream.receive(50 * MS, b"C")
     stream.due(100 * MS)
     return stream
 
 
 def test_frame_is_emitted_when_its_last_byte_has_left_the_wire():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     assert stream.due(WIRE_NS - 1) == []
     ((t_ns, data),) = stream.due(WIRE_NS)
     assert (t_ns, len(data)) == (WIRE_NS, 37)
 
 
 def test_next_event_is_when_bytes_come():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     for _ in range(5):
         event = stream.next_event_ns()
         assert event is not None
@@ -62,7 +67,7 @@ def test_next_event_is_when_bytes_come():
 
 
 def test_load_is_that_of_the_sampling_instant():
-    frames = frames_of(BotaStream(ramp, options=FAST), 100 * MS)
+    frames = frames_of(bota_stream(ramp, options=FAST), 100 * MS)
     assert [frame.wrench[0] for frame in frames] == [1250.0 * k for k in range(80)]
     assert all(frame.wrench[0] == frame.device_us for frame in frames)
 
@@ -71,7 +76,7 @@ def test_load_is_that_of_the_sampling_instant():
 def test_bytes_do_not_depend_on_how_often_they_are_fetched(steps):
     def sent(count: int) -> bytes:
         errors = SensorErrors(np.random.default_rng(5))
-        stream = BotaStream(ramp, errors, FAST)
+        stream = bota_stream(ramp, errors, FAST)
         return b"".join(text_of(stream, S // count * k) for k in range(1, count + 1))
 
     whole = sent(1)
@@ -83,18 +88,18 @@ def test_bytes_do_not_depend_on_how_often_they_are_fetched(steps):
 
 @pytest.mark.parametrize(("sinc", "rate"), [(51, 1003.9), (64, 800), (512, 100)])
 def test_rate_is_51200_over_the_sinc_length(sinc, rate):
-    stream = BotaStream(ramp, options=BotaOptions(is_running=True, sinc=sinc))
+    stream = bota_stream(ramp, options=BotaOptions(is_running=True, sinc=sinc))
     assert len(frames_of(stream, 10 * S)) == pytest.approx(10 * rate, abs=1)
 
 
 def test_shipped_device_sends_100_hz():
-    stream = BotaStream(ramp, options=BotaOptions(is_running=True))
+    stream = bota_stream(ramp, options=BotaOptions(is_running=True))
     assert len(stream.due(S)) == pytest.approx(100, abs=1)
 
 
 def test_fast_device_clock_shows_more_time_than_passed():
     options = BotaOptions(is_running=True, sinc=64, clock_error_ppm=200)
-    frames = frames_of(BotaStream(ramp, options=options), 10 * S)
+    frames = frames_of(bota_stream(ramp, options=options), 10 * S)
     host_us = frames[-1].wrench[0]
     # 200 ppm of 10 s are 2000 us; float32 shows ten million to one.
     assert frames[-1].device_us - host_us == pytest.approx(2000, abs=3)
@@ -104,12 +109,12 @@ def test_fast_device_clock_shows_more_time_than_passed():
 
 def test_device_clock_wraps_at_32_bits():
     options = BotaOptions(is_running=True, sinc=64, clock_start_us=2**32 - 1250)
-    frames = frames_of(BotaStream(ramp, options=options), 4 * MS)
+    frames = frames_of(bota_stream(ramp, options=options), 4 * MS)
     assert [frame.device_us for frame in frames] == [2**32 - 1250, 0, 1250]
 
 
 def test_boot_text_comes_late_and_before_the_stream():
-    stream = BotaStream(ramp)
+    stream = bota_stream(ramp)
     assert stream.due(300 * MS) == []
     text = find_boot_text(text_of(stream, 900 * MS))
     assert text == BotaOptions().boot_text
@@ -117,19 +122,19 @@ def test_boot_text_comes_late_and_before_the_stream():
 
 
 def test_commands_during_the_boot_are_lost():
-    stream = BotaStream(ramp)
+    stream = bota_stream(ramp)
     stream.receive(500 * MS, b"C")
     data = text_of(stream, 3 * S)
     assert find_acknowledgements(data) == []
-    assert BotaParser().feed(data)
+    assert parsed(data)
 
 
 def test_configuration_mode_stops_the_stream_behind_the_last_frame():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.due(10 * MS)
     stream.receive(10 * MS + 100_000, b"C")
     data = text_of(stream, S)
-    assert len(BotaParser().feed(data)) == 1
+    assert len(parsed(data)) == 1
     assert data.endswith(b"r,0,C,0")
     assert stream.next_event_ns() is None
 
@@ -149,7 +154,7 @@ def test_filter_command_sets_the_rate():
 
 @pytest.mark.parametrize("command", [b"c,0,1,0,4", b"f,64,0,0,0", b"R"])
 def test_configuring_while_running_is_refused(command):
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.receive(50 * MS, command)
     answers = find_acknowledgements(text_of(stream, 100 * MS))
     assert answers == [Acknowledgement(chr(command[0]), 1)]
@@ -172,7 +177,7 @@ def test_refused_letters_are_answered_with_a_code():
 
 
 def test_deaf_device_goes_on_streaming():
-    stream = BotaStream(
+    stream = bota_stream(
         ramp, options=BotaOptions(is_running=True, sinc=64, is_deaf=True)
     )
     stream.receive(0, b"C")
@@ -181,7 +186,7 @@ def test_deaf_device_goes_on_streaming():
 
 
 def test_raw_starts_show_in_the_status_until_reset():
-    stream = BotaStream(
+    stream = bota_stream(
         ramp, options=BotaOptions(is_running=True, sinc=64, raw_starts=1)
     )
     assert {f.status for f in frames_of(stream, 50 * MS)} == {BotaStatus.RAW_GAUGE}
@@ -191,17 +196,17 @@ def test_raw_starts_show_in_the_status_until_reset():
 
 
 def test_hard_reset_boots_again_with_its_clock_at_zero():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.due(S)
     stream.receive(S, b"#")
     data = text_of(stream, 3 * S)
     assert find_boot_text(data).is_complete
-    (first, *_) = BotaParser().feed(data)
+    (first, *_) = parsed(data)
     assert first.device_us == 1_000_000  # from reset to the first sample
 
 
 def test_silent_device_says_nothing_until_it_speaks():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.go_silent()
     assert stream.due(S) == []
     assert stream.next_event_ns() is None
@@ -210,21 +215,21 @@ def test_silent_device_says_nothing_until_it_speaks():
 
 
 def test_paused_device_loses_samples_but_no_time():
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.pause(50 * MS)
     assert frames_of(stream, 60 * MS)[0].device_us == 50_000
 
 
 def test_line_too_slow_skips_and_says_so():
     options = BotaOptions(is_running=True, sinc=64, baudrate=115200)
-    frames = frames_of(BotaStream(ramp, options=options), S)
+    frames = frames_of(bota_stream(ramp, options=options), S)
     assert len(frames) <= 311  # what 115200 baud can carry
     assert any(frame.status & BotaStatus.SKIPPED for frame in frames)
 
 
 @pytest.mark.parametrize("fault", list(ByteFault))
 def test_damage_hits_one_frame(fault):
-    stream = BotaStream(ramp, options=FAST)
+    stream = bota_stream(ramp, options=FAST)
     stream.due(10 * MS)  # the sample of 10 ms is on the wire
     stream.damage_next(fault, 12)
     frames = frames_of(stream, 60 * MS)

@@ -1,0 +1,116 @@
+"""Frames of a fixed size in a byte stream that may be damaged anywhere."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+F = TypeVar("F")
+
+BITS_PER_BYTE = 10  # 8N1: a start bit, eight data bits, a stop bit
+
+
+@dataclass(slots=True)
+class ScanCounters:
+    """What a scanner has met so far.
+
+    Attributes:
+        frames: good frames.
+        bad_checks: headers whose frame failed its checks; one damaged frame counts
+            once for every header in it.
+        discarded: bytes that belong to no good frame.
+        resyncs: times the stream was lost.
+    """
+
+    frames: int = 0
+    bad_checks: int = 0
+    discarded: int = 0
+    resyncs: int = 0
+
+
+class FrameScanner(Generic[F]):
+    """Finds frames by header, size and check.
+
+    After a failed check the search goes on one byte later, so that one damaged byte
+    costs one frame. Between calls it holds less than one frame.
+    """
+
+    def __init__(
+        self, header: bytes, size: int, decode: Callable[[bytes, int], F | None]
+    ) -> None:
+        """Look for `header`; `decode` reads `size` bytes from an index of the data.
+
+        It returns None where they are no frame.
+        """
+        self.counters = ScanCounters()
+        self._header = header
+        self._size = size
+        self._decode = decode
+        self._held = b""
+        self._is_lost = False
+
+    @property
+    def held(self) -> int:
+        """Bytes held until the rest of their frame comes."""
+        return len(self._held)
+
+    def feed(self, data: bytes) -> list[F]:
+        """Return the frames completed by `data`, oldest first."""
+        frames: list[F] = []
+        start = 0
+        if self._held:
+            # A frame that begins in the held bytes ends before this many more.
+            held = len(self._held)
+            seam = self._held + data[: self._size - 1]
+            reached = self._scan(seam, 0, held, frames)
+            if reached < held:
+                self._held = seam[reached:]
+                return frames
+            start = reached - held
+        self._held = data[self._scan(data, start, len(data), frames) :]
+        return frames
+
+    def _scan(self, data: bytes, start: int, stop: int, frames: list[F]) -> int:
+        """Collect the frames that begin in [start, stop); return where to go on."""
+        counters, size, decode = self.counters, self._size, self._decode
+        while start < stop:
+            begin = self._find_header(data, start, stop)
+            if begin != start:
+                self._discard(begin - start)
+                start = begin
+                continue
+            if len(data) - start < size:
+                break
+            frame = decode(data, start)
+            if frame is None:
+                counters.bad_checks += 1
+                self._discard(1)
+                start += 1
+            else:
+                frames.append(frame)
+                counters.frames += 1
+                self._is_lost = False
+                start += size
+        return start
+
+    def _find_header(self, data: bytes, start: int, stop: int) -> int:
+        """Return where a frame may begin, `stop` if nowhere before it."""
+        header = self._header
+        found = data.find(header, start, stop + len(header) - 1)
+        if found >= 0:
+            return found
+        # The last bytes may be the first of a header that goes on in the next data.
+        found = max(start, len(data) - len(header) + 1)
+        while found < stop and not header.startswith(data[found:]):
+            found += 1
+        return min(found, stop)
+
+    def _discard(self, count: int) -> None:
+        self.counters.discarded += count
+        if not self._is_lost:
+            self._is_lost = True
+            self.counters.resyncs += 1
+
+
+def wire_time_ns(size: int, baudrate: int) -> int:
+    """Return how long `size` bytes occupy the wire [ns]."""
+    return size * BITS_PER_BYTE * 1_000_000_000 // baudrate

@@ -1,0 +1,40 @@
+"""Streams of frames, some with one damaged byte."""
+
+import random
+
+
+def flip(rng: random.Random, data: bytearray) -> None:
+    data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+
+
+def drop(rng: random.Random, data: bytearray) -> None:
+    del data[rng.randrange(len(data))]
+
+
+def double(rng: random.Random, data: bytearray) -> None:
+    position = rng.randrange(len(data))
+    data.insert(position, data[position])
+
+
+def damaged_stream(make, encode, fault, seed):
+    """Return (bytes, frames, numbers of the damaged ones) of 150 frames, 30 damaged.
+
+    Damaged frames are never neighbours: the last byte of one could then stand in for
+    the lost header of the next, which is a recovery and no loss.
+    """
+    rng = random.Random(seed)
+    sent = [make(rng, number) for number in range(150)]
+    encoded = [bytearray(encode(frame)) for frame in sent]
+    hit = set(rng.sample(range(0, 149, 2), 30))
+    for number in hit:
+        fault(rng, encoded[number])
+    return b"".join(encoded), sent, hit
+
+
+def parse(scanner, data: bytes, chunk: int) -> list:
+    """Return what `scanner` finds in `data`, fed in pieces."""
+    return [
+        frame
+        for start in range(0, len(data), chunk)
+        for frame in scanner.feed(data[start : start + chunk])
+    ]

@@ -1,0 +1,157 @@
+"""Each wrist sensor on its simulated device, on a clock that is stepped by hand."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acquisition.devices import WrenchSample
+from fakes.bota_stream import BotaOptions, bota_stream
+from fakes.optoforce_stream import (
+    SENSITIVITY,
+    SERIAL_NUMBER,
+    OptoForceOptions,
+    optoforce_stream,
+)
+from fakes.robotous_stream import RobotousOptions, robotous_stream
+from fakes.sensor_errors import SensorErrors
+from fakes.sensor_stream import SensorStream
+from fakes.serial_port import FakeSerialPort
+from ft_sensor.bota_device import BotaDevice, BotaSettings
+from ft_sensor.line import Line
+from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
+from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
+from ft_sensor.serial_link import SerialLink
+from ft_sensor.serial_sensor import SerialDevice, SerialSensor
+
+MS = 1_000_000
+LOAD = (1.0, -2.0, 30.0, 0.1, 0.2, -0.3)
+
+
+class SteppedTime:
+    """A clock that jumps: to the next byte when waiting, to the end when sleeping."""
+
+    def __init__(self) -> None:
+        self.now = 10_000_000_000
+        self.world: FakeSerialPort
+
+    def now_ns(self) -> int:
+        return self.now
+
+    def utc_ns(self) -> int:
+        return self.now
+
+    def sleep_until(self, t_ns: int) -> None:
+        self.now = max(self.now, t_ns)
+
+    def wait(self, link, deadline_ns: int) -> bool:
+        while not link.is_readable():
+            event = self.world.next_event_ns()
+            if event is None or event > deadline_ns:
+                self.sleep_until(deadline_ns)
+                return link.is_readable()
+            self.sleep_until(event)
+        return True
+
+
+class ChunkedPort(FakeSerialPort):
+    """Delivers what has arrived in pieces of one size."""
+
+    chunk = 4096
+
+    def read(self, size=1, /):
+        return super().read(min(size, self.chunk))
+
+
+@dataclass(frozen=True)
+class Make:
+    """One make: its device, its driver, and what is peculiar to it."""
+
+    stream: Callable[..., SensorStream]
+    options: Callable[..., Any]
+    device: Callable[[Line], SerialDevice]
+    baudrate: int
+    rate: float
+    resolution: tuple[float, ...]
+    has_clock: bool
+    quiet_start: dict[str, Any]
+    running_start: dict[str, Any]
+
+
+MAKES = {
+    "bota": Make(
+        bota_stream,
+        BotaOptions,
+        lambda line: BotaDevice(line, BotaSettings()),
+        460800,
+        800.0,
+        (1e-6,) * 6,
+        True,
+        {},
+        {"is_running": True},
+    ),
+    "robotous": Make(
+        robotous_stream,
+        RobotousOptions,
+        lambda line: RobotousDevice(line, RobotousSettings()),
+        921600,
+        1000.0,
+        (0.02,) * 3 + (0.0005,) * 3,
+        False,
+        {},
+        {"is_running": True},
+    ),
+    "optoforce": Make(
+        optoforce_stream,
+        OptoForceOptions,
+        lambda line: OptoForceDevice(
+            line, OptoForceSettings(SENSITIVITY, SERIAL_NUMBER)
+        ),
+        1_000_000,
+        1000.0,
+        tuple(1 / value for value in SENSITIVITY),
+        True,
+        {},
+        {"is_running": True},
+    ),
+}
+
+
+class SensorBench:
+    """A sensor on a simulated device, both in one hand."""
+
+    def __init__(self, kind, load=LOAD, line_xor=0, chunk=4096, **options) -> None:
+        self.make = MAKES[kind]
+        self.clock = SteppedTime()
+        self.errors = SensorErrors(np.random.default_rng(1))
+        self.device = self.make.stream(
+            lambda t_ns: load,
+            self.errors,
+            self.make.options(**options),
+            self.clock.now_ns(),
+        )
+        self.port = ChunkedPort(self.device, self.clock, line_xor)
+        self.port.chunk = chunk
+        self.clock.world = self.port
+        self.driver = self.make.device(Line("/dev/sensor", self.make.baudrate, 0.25))
+        self.sensor = SerialSensor(SerialLink(self.port), self.clock, self.driver)
+
+    def opened(self) -> "SensorBench":
+        self.sensor.open()
+        return self
+
+    def replug(self) -> None:
+        """Open the port anew, with a new driver, as after a crash."""
+        self.port = ChunkedPort(self.device, self.clock)
+        self.clock.world = self.port
+        self.sensor = SerialSensor(SerialLink(self.port), self.clock, self.driver)
+
+    def run(self, duration_ns: int, period_ns: int = 2 * MS) -> list[WrenchSample]:
+        """Poll every `period_ns`, and until nothing is left."""
+        found: list[WrenchSample] = []
+        for _ in range(duration_ns // period_ns):
+            self.clock.sleep_until(self.clock.now_ns() + period_ns)
+            while self.port.in_waiting:
+                found += self.sensor.poll(self.clock.now_ns())
+        return found

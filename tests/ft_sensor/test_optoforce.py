@@ -1,0 +1,210 @@
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from fakes.optoforce_stream import SENSITIVITY, SERIAL_NUMBER
+from ft_sensor import optoforce
+from ft_sensor.framing import FrameScanner
+from ft_sensor.line import Line
+from ft_sensor.optoforce import OptoForceFrame, encode_configuration
+from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
+from tests.ft_sensor.damage import damaged_stream, double, drop, flip, parse
+from tests.ft_sensor.sensor_bench import MS, SensorBench
+
+NORMAL = bytes.fromhex("AA07081012340000" + "00B7FF4801A80117FEFC01C0" + "0689")
+OVERLOAD = bytes.fromhex("AA07081012350280" + "7D00FF4801A80117FEFC01C0" + "06D2")
+THREE_AXES = bytes.fromhex("AA07080A2D6A0000FFF7FFFB00070551")
+GOLDEN_CONFIGURATIONS = {
+    (1, 2, 0): "AA00320301020000E2",
+    (1, 2, 255): "AA0032030102FF01E1",
+    (1, 0, 0): "AA00320301000000E0",
+    (10, 4, 0): "AA0032030A040000ED",
+    (0, 0, 0): "AA00320300000000DF",
+}
+
+counts = st.integers(-32768, 32767)
+word = st.integers(0, 0xFFFF)
+frames = st.builds(OptoForceFrame, word, word, st.tuples(*[counts] * 6))
+
+
+def scanner():
+    return FrameScanner(optoforce.HEADER, optoforce.FRAME_SIZE, optoforce.decode_frame)
+
+
+def test_golden_frame_decodes_to_its_load():
+    frame = OptoForceFrame(0x1234, 0, (183, -184, 424, 279, -260, 448))
+    assert optoforce.decode_frame(NORMAL) == frame
+    assert optoforce.encode_frame(frame) == NORMAL
+    (reading,) = optoforce.scanner(SENSITIVITY).feed(NORMAL)
+    # Rounded to counts of 0.05, 0.47 N and 0.004 N m.
+    assert reading.wrench == pytest.approx((10.01, -9.99, 200, 1, -1, 1), abs=0.01)
+    assert (reading.ticks, reading.saturated, reading.is_trusted) == (0x1234, 0, True)
+
+
+def test_golden_overload_names_both_axes():
+    (reading,) = optoforce.scanner(SENSITIVITY).feed(OVERLOAD)
+    assert reading.saturated == 0b101
+    assert optoforce.status_words(0x0280) == ("Fx overloaded", "Fz overloaded")
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (0x2000, ("DAQ error",)),
+        (0x4000, ("DAQ communication error",)),
+        (0x0400, ("sensor not detected",)),
+        (0x1000, ("temperature error",)),
+        (0xE000, ("DAQ state 7",)),
+        (0x0800, ("sensor failure",)),
+        (0x0010, ("Tz overloaded",)),
+        (0, ()),
+    ],
+)
+def test_a_status_is_told_in_words(status, words):
+    assert optoforce.status_words(status) == words
+
+
+@pytest.mark.parametrize("status", [0x2000, 0x0400])
+def test_a_failing_sensor_is_not_trusted(status):
+    data = optoforce.encode_frame(OptoForceFrame(1, status, (1, 2, 3, 4, 5, 6)))
+    (reading,) = optoforce.scanner(SENSITIVITY).feed(data)
+    assert not reading.is_trusted
+
+
+@pytest.mark.parametrize(("wish", "golden"), GOLDEN_CONFIGURATIONS.items())
+def test_configurations_are_the_documented_bytes(wish, golden):
+    made = encode_configuration(*wish)
+    assert made.hex().upper() == golden
+    assert optoforce.decode_configuration(made) == wish
+
+
+def test_golden_answers_are_found_inside_the_stream():
+    ok = bytes.fromhex("AA0050010000FB")
+    serial = bytes.fromhex("AA001208" + "4845583030303432" + "029F")
+    assert optoforce.encode_configuration_answer(0) == ok
+    assert optoforce.encode_serial_number("HEX00042") == serial
+    data = NORMAL[5:] + serial + NORMAL + ok + NORMAL[:10]
+    assert optoforce.find_configuration_answer(data) == 0
+    assert optoforce.find_serial_number(data) == "HEX00042"
+    assert optoforce.find_configuration_answer(NORMAL) is None
+    assert bytes.fromhex("AB00120800C5") == optoforce.ASK_SERIAL
+
+
+def test_a_three_axis_frame_is_no_frame():
+    assert optoforce.decode_frame(THREE_AXES + THREE_AXES) is None
+
+
+@pytest.mark.parametrize("position", range(22))
+def test_a_frame_with_any_byte_changed_is_none(position):
+    damaged = bytearray(NORMAL)
+    damaged[position] ^= 0x10
+    assert optoforce.decode_frame(bytes(damaged)) is None
+
+
+@given(st.lists(frames, max_size=6), st.integers(1, 60))
+def test_scanner_returns_every_frame_in_any_chunking(sent, chunk):
+    found = scanner()
+    data = b"".join(map(optoforce.encode_frame, sent))
+    assert parse(found, data, chunk) == sent
+    assert found.counters.discarded == 0
+
+
+@given(st.binary(max_size=200), st.integers(1, 60))
+def test_what_is_found_does_not_depend_on_the_chunking(noise, chunk):
+    data = NORMAL + noise + optoforce.HEADER[:2] + OVERLOAD + noise + NORMAL
+    pieces, whole = scanner(), scanner()
+    assert parse(pieces, data, chunk) == parse(whole, data, len(data))
+    assert pieces.counters == whole.counters
+
+
+def test_a_number_that_does_not_fit_is_refused():
+    with pytest.raises(struct.error):
+        optoforce.encode_frame(OptoForceFrame(70000, 0, (0, 0, 0, 0, 0, 0)))
+
+
+def noisy(rng, number):
+    values = tuple(rng.randrange(-2000, 2000) for _ in range(6))
+    return OptoForceFrame(number, 0, values)
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
+@pytest.mark.parametrize("fault", [flip, drop])
+def test_one_bad_byte_costs_exactly_one_frame(fault, chunk):
+    for seed in range(10):
+        data, sent, hit = damaged_stream(noisy, optoforce.encode_frame, fault, seed)
+        kept = [frame for number, frame in enumerate(sent) if number not in hit]
+        assert parse(scanner(), data, chunk) == kept
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 44, 1 << 20])
+def test_a_doubled_byte_costs_at_most_one_frame(chunk):
+    for seed in range(10):
+        data, sent, hit = damaged_stream(noisy, optoforce.encode_frame, double, seed)
+        found = parse(scanner(), data, chunk)
+        lost = {frame.counter for frame in sent} - {frame.counter for frame in found}
+        assert lost <= hit
+        assert len(found) + len(lost) == len(sent)
+
+
+def test_lost_frames_are_counted_over_the_end_of_the_counter():
+    bench = SensorBench("optoforce", counter_start=65536 - 600).opened()
+    bench.run(100 * MS)
+    bench.device.go_silent()
+    bench.run(40 * MS)
+    bench.device.speak()
+    bench.run(500 * MS)
+    assert bench.sensor.counters.lost == pytest.approx(40, abs=1)
+    assert bench.sensor.counters.jumps == 0
+
+
+def test_another_unit_than_that_of_the_report_is_refused():
+    other = SensorBench("optoforce", serial_number="HEX00099")
+    with pytest.raises(DeviceFaultError, match="is HEX00099, the sensitivities"):
+        other.sensor.open()
+
+
+def test_a_refused_configuration_is_named():
+    with pytest.raises(DeviceFaultError, match="refused its configuration with code 3"):
+        SensorBench("optoforce", refusal=3).sensor.open()
+
+
+def test_a_failing_sensor_is_refused_at_the_start():
+    bench = SensorBench("optoforce")
+    bench.device.status = 0x0400
+    with pytest.raises(DeviceFaultError, match="reports: sensor not detected"):
+        bench.sensor.open()
+
+
+def test_firmware_of_the_older_protocol_is_named():
+    bench = SensorBench("optoforce", is_deaf=True)
+    bench.device._firmware.frame = lambda shown, status: bytes((55, 67)) + bytes(20)
+    with pytest.raises(DeviceFaultError, match="older protocol"):
+        bench.sensor.open()
+
+
+def test_a_sensor_without_serial_number_is_refused():
+    bench = SensorBench("optoforce")
+    bench.device._firmware.hear = lambda t_ns, data: (
+        []
+        if data == optoforce.ASK_SERIAL
+        else [(t_ns + MS, optoforce.encode_configuration_answer(0))]
+    )
+    with pytest.raises(LinkTimeoutError, match="serial number"):
+        bench.sensor.open()
+
+
+@pytest.mark.parametrize(
+    ("baudrate", "settings"),
+    [
+        (115200, {}),
+        (1_000_000, {"filter_hz": 100}),
+        (1_000_000, {"sensitivity": (0.0, 1, 1, 1, 1, 1)}),
+    ],
+)
+def test_settings_no_sensor_can_do_are_refused(baudrate, settings):
+    values = {"sensitivity": SENSITIVITY, "serial_number": SERIAL_NUMBER} | settings
+    with pytest.raises(SettingsError):
+        OptoForceDevice(Line("/dev/sensor", baudrate), OptoForceSettings(**values))

@@ -1,0 +1,262 @@
+"""What every serial wrist sensor has to do; the one on the bus is in test_barrett."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
+from fakes.sensor_stream import ByteFault
+from ft_sensor.reading import axis_names, largest_traction
+from tests.ft_sensor.sensor_bench import LOAD, MAKES, MS, SensorBench
+
+KINDS = tuple(MAKES)
+S = 1000 * MS
+CHUNKS = (1, 7, 44, 4096)
+
+
+@pytest.fixture(params=KINDS)
+def kind(request):
+    return request.param
+
+
+@pytest.mark.parametrize("chunk", CHUNKS)
+def test_the_load_comes_through_in_pieces_of_any_size(kind, chunk):
+    bench = SensorBench(kind, chunk=chunk).opened()
+    found = bench.run(S)
+    # One or two are on the wire at each end.
+    assert len(found) == pytest.approx(bench.make.rate, abs=3)
+    mean = np.mean([sample.wrench for sample in found], axis=0)
+    # Bias and drift: 0.33 N and 0.014 N m rms; three times that, and a count.
+    limit = np.repeat([1.0, 0.05], 3) + bench.make.resolution
+    assert (np.abs(mean - LOAD) < limit).all()
+    assert all(sample.is_valid and not sample.saturated for sample in found)
+    assert bench.sensor.counters.discarded == 0
+
+
+@pytest.mark.parametrize("start", ["quiet_start", "running_start"])
+def test_it_opens_whatever_the_device_was_doing(kind, start):
+    options = getattr(MAKES[kind], start)
+    assert len(SensorBench(kind, **options).opened().run(100 * MS)) > 70
+
+
+def test_it_opens_again_after_a_program_that_was_killed(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.replug()
+    assert len(bench.opened().run(100 * MS)) > 70
+
+
+def test_it_opens_again_after_it_was_closed(kind):
+    bench = SensorBench(kind).opened()
+    bench.sensor.close()
+    bench.sensor.close()
+    bench.clock.sleep_until(bench.clock.now_ns() + 50 * MS)
+    bench.device.due(bench.clock.now_ns())
+    assert bench.device.next_event_ns() is None  # nothing streams
+    bench.replug()
+    assert len(bench.opened().run(100 * MS)) > 70
+
+
+def test_silence_names_power_and_cable(kind):
+    bench = SensorBench(kind)
+    bench.device.go_silent()
+    with pytest.raises(LinkTimeoutError, match="Check power and cable") as error:
+        bench.sensor.open()
+    assert "port open, 0 bytes" in error.value.message
+
+
+def test_garbage_is_suspected_of_a_wrong_speed(kind):
+    bench = SensorBench(kind, line_xor=0x5B, **MAKES[kind].running_start)
+    with pytest.raises(LinkError, match="Wrong speed") as error:
+        bench.sensor.open()
+    assert "no valid frame" in error.value.message
+
+
+def test_a_deaf_sensor_did_not_answer(kind):
+    options = {**MAKES[kind].running_start, "is_deaf": True}
+    with pytest.raises(LinkTimeoutError, match="did not answer"):
+        SensorBench(kind, **options).sensor.open()
+
+
+def test_it_tells_who_it_is_and_how_fast(kind):
+    told = SensorBench(kind).opened().sensor.describe()
+    rate = MAKES[kind].rate
+    assert {"model", "serial_number", "firmware", "filter", "time"} <= set(told)
+    assert float(told["nominal_rate"].split()[0]) == rate
+    # One frame more or less in a quarter of a second.
+    assert float(told["measured_rate"].split()[0]) == pytest.approx(rate, abs=9)
+    assert len(told["ranges"].split()) == 6
+
+
+@pytest.mark.parametrize("fault", [ByteFault.FLIP, ByteFault.DROP, ByteFault.DOUBLE])
+@pytest.mark.parametrize("index", [0, 1, 9, -1])
+def test_a_damaged_byte_costs_one_frame_at_most(kind, fault, index):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    before = bench.sensor.counters
+    bench.device.damage_next(fault, index % bench.driver.timing.frame_size)
+    bench.run(100 * MS)
+    counters = bench.sensor.counters
+    lost = 100 * bench.make.rate / 1000 - (counters.frames - before.frames)
+    # A doubled byte at the edge of a frame leaves it whole.
+    assert 0 <= lost <= 1 if fault is ByteFault.DOUBLE else lost == 1
+    assert counters.lost == lost
+    assert counters.resyncs == 1
+
+
+def test_a_storm_of_bad_checks_gives_no_sample(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.is_spoilt = True
+    bench.run(3 * MS)
+    assert bench.run(50 * MS) == []
+    assert bench.sensor.counters.bad_checks > 30
+    bench.device.is_spoilt = False
+    assert len(bench.run(50 * MS)) > 35
+
+
+def test_silence_of_the_running_stream_gives_nothing_and_ends(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.go_silent()
+    assert bench.run(50 * MS) == []
+    bench.device.speak()
+    later = bench.run(50 * MS)
+    assert len(later) > 35
+    # Dated when it came, not when the silence began.
+    assert bench.clock.now_ns() - later[-1].t_ns < 3 * MS
+
+
+def test_a_pause_is_counted_as_what_it_cost(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.pause(bench.clock.now_ns() + 80 * MS)
+    bench.run(200 * MS)
+    expected = 0.08 * bench.make.rate
+    assert bench.sensor.counters.lost == pytest.approx(expected, abs=2)
+
+
+def test_numbers_that_stand_still_are_invalid(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.is_frozen = True
+    found = bench.run(1200 * MS)
+    assert found[5].is_valid
+    assert not found[-1].is_valid
+    assert bench.sensor.counters.frozen > 0
+
+
+@pytest.mark.parametrize("kind", ["bota", "optoforce"])
+def test_a_device_clock_that_stands_still_makes_samples_invalid(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.is_clock_frozen = True
+    assert not any(sample.is_valid for sample in bench.run(30 * MS)[4:])
+
+
+def test_a_device_clock_that_jumps_moves_no_date(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(1500 * MS)
+    bench.device.jump_clock(20_000_000)
+    found = bench.run(100 * MS)
+    steps = np.diff([sample.t_ns for sample in found])
+    assert steps.max() < 4 * MS
+    assert bench.clock.now_ns() - found[-1].t_ns < 4 * MS
+    counters = bench.sensor.counters
+    assert (counters.jumps, counters.lost) == (int(MAKES[kind].has_clock), 0)
+
+
+def test_a_reboot_is_a_gap_and_no_wrong_date(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(1500 * MS)
+    bench.device.reset(bench.clock.now_ns())
+    later = bench.run(3 * S)
+    assert all(before.t_ns < after.t_ns for before, after in pairwise(later))
+    # One waits for its start; the others send as they were shipped: not to be used.
+    assert not any(sample.is_valid for sample in later[1:])
+    bench.replug()
+    assert bench.opened().run(20 * MS)[-1].is_valid
+
+
+@pytest.mark.parametrize("axis", range(6))
+def test_saturation_is_told_by_axis(kind, axis):
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    bench.device.errors = None
+    bench.device.ranges = tuple(
+        abs(LOAD[k]) / 2 if k == axis else 1e9 for k in range(6)
+    )
+    last = bench.run(20 * MS)[-1]
+    if kind == "bota":  # it says that, not where; its range is far away
+        assert last.saturated == 0x3F
+    else:
+        assert last.saturated == 1 << axis
+        assert axis_names(last.saturated) == (
+            ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")[axis],
+        )
+    assert last.is_valid
+    assert bench.driver.status_words(last.status)
+
+
+def test_sample_times_are_known_although_bytes_are_collected(kind):
+    """An adapter that hands over every 16 ms what came meanwhile."""
+    bench = SensorBench(kind, clock_error_ppm=50.0).opened()
+    bench.run(6 * S, 16 * MS)
+    start = bench.clock.now_ns()
+    found = bench.run(S, 16 * MS)
+    period = 1e9 / bench.make.rate
+    ideal = found[0].t_ns + period / (1 + 50e-6) * np.arange(len(found))
+    wander = np.array([s.t_ns for s in found]) - ideal
+    assert np.abs(wander - wander.mean()).max() < 100_000
+    assert abs(found[0].t_ns - start) < 2 * period
+    assert bench.sensor.counters.is_bursty
+
+
+def test_a_prompt_stream_is_not_called_bursty(kind):
+    bench = SensorBench(kind).opened()
+    bench.run(S)
+    assert not bench.sensor.counters.is_bursty
+
+
+def test_warmth_moves_the_zero_slowly(kind):
+    bench = SensorBench(kind).opened()
+    early = np.mean([s.wrench for s in bench.run(500 * MS)], axis=0)
+    bench.device.warming = 2.0  # degrees per second since it was switched on
+    late = np.mean([s.wrench for s in bench.run(500 * MS)], axis=0)
+    assert late[2] - early[2] > 0.3  # 0.15 N per degree, drift is 0.22 N rms
+
+
+def test_unplugging_is_a_link_error_and_closing_does_not_mind(kind):
+    bench = SensorBench(kind).opened()
+    bench.port.unplug()
+    with pytest.raises(LinkError, match="Unplugged"):
+        bench.sensor.poll(bench.clock.now_ns())
+    bench.sensor.close()
+
+
+@pytest.mark.parametrize("chunk", CHUNKS)
+def test_hostile_bytes_raise_nothing_and_grow_nothing(kind, chunk):
+    rng = np.random.default_rng(3)
+    bench = SensorBench(kind).opened()
+    good = b"".join(data for _, data in bench.device.due(bench.clock.now_ns() + S))
+    noise = bytearray(good)
+    for place in rng.integers(0, len(noise), 400):
+        noise[place] = rng.integers(0, 256)
+    scanner = bench.driver.scanner()
+    for start in range(0, len(noise), chunk):
+        scanner.feed(bytes(noise[start : start + chunk]))
+        assert scanner.held < bench.driver.timing.frame_size
+    assert scanner.counters.frames > 300
+
+
+def test_the_largest_traction_is_set_by_force_or_torque():
+    ranges = (100.0, 80.0, 200.0, 4.0, 5.0, 4.0)
+    assert largest_traction(ranges, 0.1) == pytest.approx(40.0)
+    assert largest_traction(ranges, 0.01) == 80.0
+
+
+def test_a_slow_sensor_is_refused(kind):
+    bench = SensorBench(kind, clock_error_ppm=-600_000)
+    with pytest.raises(DeviceFaultError, match="at least 495"):
+        bench.sensor.open()
