@@ -3,7 +3,14 @@
 from dataclasses import dataclass
 
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import Measurement, Saying, Schedule, SensorStream, Source
+from fakes.sensor_stream import (
+    Measurement,
+    Saying,
+    Schedule,
+    SensorStream,
+    Source,
+    count_of,
+)
 from ft_sensor import optoforce
 from ft_sensor.optoforce import OptoForceFrame
 from ft_sensor.reading import Wrench
@@ -11,7 +18,6 @@ from ft_sensor.reading import Wrench
 SERIAL_NUMBER = "HEX00042"
 SENSITIVITY: Wrench = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
 _REPLY_NS = 1_000_000
-_FULL = 32767
 _INPUT = 64
 _SIZES = {0xAA: 9, 0xAB: 6}
 
@@ -93,14 +99,14 @@ class OptoForceFirmware:
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 22 bytes of a sample."""
         pairs = zip(shown.wrench, self._options.sensitivity, strict=True)
-        counts = [round(value * gain) for value, gain in pairs]
+        counts = [count_of(value * gain) for value, gain in pairs]
         overload = shown.saturated
         for axis, count in enumerate(counts):
             if abs(count) >= optoforce.FULL_COUNTS:
                 overload |= 1 << axis
         for axis in range(6):
             status |= (overload >> axis & 1) << (9 - axis)
-        fx, fy, fz, tx, ty, tz = (max(-_FULL, min(_FULL, count)) for count in counts)
+        fx, fy, fz, tx, ty, tz = counts
         counter = self._options.counter_start + shown.number
         return optoforce.encode_frame(
             OptoForceFrame(

@@ -3,13 +3,19 @@
 from dataclasses import dataclass
 
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import Measurement, Saying, Schedule, SensorStream, Source
+from fakes.sensor_stream import (
+    Measurement,
+    Saying,
+    Schedule,
+    SensorStream,
+    Source,
+    count_of,
+)
 from ft_sensor import robotous
 from ft_sensor.reading import Wrench
 from ft_sensor.robotous import MODELS, RobotousFrame
 
 _REPLY_NS = 1_000_000
-_FULL = 32767
 _OVERLOAD = 1.2  # times rated load
 _RATES = {code: rate for rate, code in robotous.RATE_CODES.items()}
 _TEXTS = {robotous.SERIAL: "RF60-0042", robotous.FIRMWARE: "V1.0.0"}
@@ -102,7 +108,7 @@ class RobotousFirmware:
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 19 bytes of a sample."""
         fx, fy, fz, tx, ty, tz = (
-            max(-_FULL, min(_FULL, round(value * gain)))
+            count_of(value * gain)
             for value, gain in zip(shown.wrench, self._gains(), strict=True)
         )
         overload = status

@@ -4,6 +4,7 @@
 with them. What is particular to a make is its `Firmware`. Told the time, never waits.
 """
 
+import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -11,12 +12,14 @@ from enum import Enum, auto
 from typing import Protocol
 
 from fakes.sensor_errors import SensorErrors
+from fakes.stream_faults import StreamFaults
 from ft_sensor.framing import wire_time_ns
-from ft_sensor.reading import Wrench
+from ft_sensor.reading import ALL_AXES, Wrench
 
 Source = Callable[[int], Sequence[float]]
 Saying = tuple[int, bytes]  # when it is said [ns], and what
 
+FULL_COUNT = 32767  # of a sensor that sends 16-bit counts
 ROOM = 25.0  # where it stands [degrees Celsius]
 _NO_RANGES: Wrench = (1e9, 1e9, 1e9, 1e9, 1e9, 1e9)
 _PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth adds
@@ -114,8 +117,7 @@ class SensorStream:
         ranges: where the gauges end [N, N m].
         status: status bits set in every frame, beside those the device sets itself.
         is_clock_frozen: the device's clock and counter stand still.
-        is_frozen: its numbers stand still, its clock goes on.
-        is_spoilt: a byte of every frame is damaged.
+        faults: what goes wrong with its numbers and its frames.
         resets_on_open: opening the port boots it.
         warming: how fast it warms up, which moves its zero [degrees Celsius per s].
     """
@@ -132,19 +134,19 @@ class SensorStream:
         self.errors = errors
         self.ranges = _NO_RANGES
         self.status = 0
-        self.is_clock_frozen = self.is_frozen = self.is_spoilt = False
+        self.is_clock_frozen = False
+        self.faults = StreamFaults()
         self.resets_on_open = False
         self.warming = 0.0
         self._firmware = firmware
         self._source = source
         self._pending: deque[Saying] = deque()
         self._wire_free_ns = self._paused_until_ns = start_ns
-        self._is_silent = self._is_skipping = False
+        self._is_silent = self._is_skipping = self._is_saturated = False
         self._fault: tuple[ByteFault, int] | None = None
         self._on_since_ns = firmware.on_since_ns
         self._clock_start_us = self._device_us = clock_start_us
         self._number = 0
-        self._wrench: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._schedule: Schedule | None = None
         if firmware.schedule is None:
             self.reset(start_ns)
@@ -203,16 +205,21 @@ class SensorStream:
         """Damage byte `index` of the next frame on the wire."""
         self._fault = (fault, index)
 
-    def jump_clock(self, by_us: int) -> None:
-        """Let the device's clock, and a counter of milliseconds, be `by_us` ahead."""
-        self._clock_start_us += by_us
-        self._number += by_us // 1000
+    def jump_clock(self, step_us: int) -> None:
+        """Let the device's clock, and a counter of milliseconds, go `step_us` ahead."""
+        self._clock_start_us += step_us
+        self._number += step_us // 1000
+
+    def saturate(self) -> None:
+        """Report every axis as beyond its range, until `recover`."""
+        self._is_saturated = True
 
     def recover(self) -> None:
-        """End every fault that a device can be freed of."""
+        """End every fault but what is lost for good: a pulled cable, a reboot."""
         self.speak()
         self.status = 0
-        self.is_clock_frozen = self.is_frozen = self.is_spoilt = False
+        self.is_clock_frozen = self._is_saturated = False
+        self.faults.mend()
         self.ranges = _NO_RANGES
         self.warming = 0.0
 
@@ -266,26 +273,23 @@ class SensorStream:
         if self._fault is not None:
             data = damage(data, *self._fault)
             self._fault = None
-        elif self.is_spoilt:
-            data = damage(data, ByteFault.FLIP, len(data) // 2)
-        self._send(t_ns, data)
+        self._send(t_ns, self.faults.carry(data))
 
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = self.warming * (t_ns - self._on_since_ns) * 1e-9
         if warmth:
             pairs = zip(wrench, _PER_DEGREE, strict=True)
             wrench = [value + warmth * gain for value, gain in pairs]
-        saturated = 0
+        saturated = ALL_AXES if self._is_saturated else 0
         if self.ranges is not _NO_RANGES:
-            wrench, saturated = _clipped(wrench, self.ranges)
-        if not self.is_frozen:
-            fx, fy, fz, tx, ty, tz = wrench
-            self._wrench = (fx, fy, fz, tx, ty, tz)
+            wrench, beyond = _clipped(wrench, self.ranges)
+            saturated |= beyond
+        fx, fy, fz, tx, ty, tz = wrench
         if not self.is_clock_frozen:
             passed_ns = round((t_ns - self._on_since_ns) * self._firmware.clock_rate)
             self._device_us = self._clock_start_us + passed_ns // 1000
         return Measurement(
-            self._wrench,
+            self.faults.show((fx, fy, fz, tx, ty, tz)),
             saturated,
             self._device_us,
             self._number,
@@ -311,3 +315,10 @@ def _clipped(wrench: Sequence[float], ranges: Wrench) -> tuple[list[float], int]
             saturated |= 1 << axis
         shown.append(min(max(value, -most), most))
     return shown, saturated
+
+
+def count_of(value: float) -> int:
+    """Return `value` as a 16-bit count; what is no number reads full scale."""
+    if not math.isfinite(value):
+        return FULL_COUNT
+    return max(-FULL_COUNT, min(FULL_COUNT, round(value)))

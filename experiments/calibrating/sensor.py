@@ -89,7 +89,7 @@ class SensorGuide:
         records: Record = self._rig.board.wrenches.last(WRENCH_SLOTS)
         since = self._rig.clock.now_ns() - int(AVERAGE * 1e9)
         records = records[records["t_ns"].astype(np.int64) >= since]
-        bad = int(np.count_nonzero(~records["is_valid"] | records["is_saturated"]))
+        bad = int(np.count_nonzero(~records["is_valid"] | records["saturated"]))
         if len(records) < _FEWEST or bad:
             raise PreflightError(
                 f"{len(records)} readings in {AVERAGE:g} s (at least {_FEWEST}), "

@@ -108,11 +108,11 @@ def test_a_damaged_byte_costs_one_frame_at_most(kind, fault, index):
 def test_a_storm_of_bad_checks_gives_no_sample(kind):
     bench = SensorBench(kind).opened()
     bench.run(20 * MS)
-    bench.device.is_spoilt = True
+    bench.device.faults.is_garbled = True
     bench.run(3 * MS)
     assert bench.run(50 * MS) == []
     assert bench.sensor.counters.bad_checks > 30
-    bench.device.is_spoilt = False
+    bench.device.faults.mend()
     assert len(bench.run(50 * MS)) > 35
 
 
@@ -140,7 +140,7 @@ def test_a_pause_is_counted_as_what_it_cost(kind):
 def test_numbers_that_stand_still_are_invalid(kind):
     bench = SensorBench(kind).opened()
     bench.run(20 * MS)
-    bench.device.is_frozen = True
+    bench.device.faults.freeze()
     found = bench.run(1200 * MS)
     assert found[5].is_valid
     assert not found[-1].is_valid
