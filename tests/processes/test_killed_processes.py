@@ -17,6 +17,8 @@ pytestmark = pytest.mark.wall_clock
 SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
 REACTION = 0.6  # s
 LOSS = 0.5  # s of the running trial
+TRIES = 3
+LONGEST_CYCLE_NS = 20_000_000  # beyond it the machine stood still, and with it the arm
 VICTIMS = ("recorder", "console", "sensor reader", "control")
 
 
@@ -58,11 +60,28 @@ def test_twenty_kills_of_each_cost_half_a_second_at_most(tmp_path, victim, after
 
 
 def seconds_lost(tmp_path, victim, after):
-    """Kill a process of a trial, see the arm stop; return how much of it is gone."""
-    with session(tmp_path / "data") as seen:
-        seen.wait_for_trial()
+    """Kill a process of a trial, see the arm stop; return how much of it is gone.
+
+    On a machine that stalls, the guard may have ended the trial before: that is no
+    loss, and no test of it. The session is begun anew then.
+    """
+    for number in range(TRIES):
+        lost = seconds_lost_once(tmp_path / f"data{number}", victim, after)
+        if lost is not None:
+            return lost
+    pytest.fail(f"the machine ended {TRIES} trials before the kill")
+
+
+def seconds_lost_once(data, victim, after):
+    """Return what is gone [s]; None if the trial had ended before the kill."""
+    with session(data) as seen:
+        if not seen.wait_for_trial():
+            return None
         wait(after)
-        killed_ns = seen.kill(victim)
+        newest_ns = seen.newest_cycle_ns()
+        if seen.has_trial_ended():
+            return None
+        killed_ns = min(seen.kill(victim), newest_ns + LONGEST_CYCLE_NS)
         assert until(lambda: is_safe(seen), REACTION) is not None, seen.output()
         assert until(lambda: not is_running(seen.process.pid), 30)
         if victim != "console":

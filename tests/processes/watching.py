@@ -26,6 +26,7 @@ NAMES = {
     "sensor reader": "traction-reader",
     "fake rig": "traction-fake",
 }
+STALLED = ("late cycles", "No reply from the arm", "F/T sample")
 START = "import sys; from experiments.cli import main; sys.exit(main())"
 
 
@@ -76,11 +77,18 @@ class Session:
         self.board = None
 
     def wait_for_trial(self):
-        """Return when a trial is being recorded."""
-        assert until(self._is_recording, 40), self.output()
+        """Return when a trial is being recorded; False if the machine is too slow."""
+        if not until(self._is_recording, 40):
+            assert self.has_stalled(), self.output()
+            return False
         children = children_of(self.process.pid)
         self.pids = {name: children[short] for name, short in NAMES.items()}
         self.board = Board(SharedMemory(self._open_board()))
+        return True
+
+    def has_stalled(self):
+        """Return whether the arm was stopped because the machine stood still."""
+        return any(word in self.output() for word in STALLED)
 
     def journal(self):
         paths = list(self.data.glob("sessions/*/events.jsonl"))
@@ -106,6 +114,14 @@ class Session:
 
     def output(self):
         return (self.data / "out.txt").read_text()
+
+    def newest_cycle_ns(self):
+        """Return when the newest cycle on the board was measured [monotonic ns]."""
+        return int(self.board.cycles.last(1)["host_ns"][0])
+
+    def has_trial_ended(self):
+        """Return whether something was written after the trial's start."""
+        return self.journal()[-1]["event"] != "trial-started"
 
     def kill(self, name):
         """Kill the process `name`; return when [monotonic ns]."""
