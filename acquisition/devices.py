@@ -130,6 +130,10 @@ class WrenchSensor(Protocol):
         """Return model, serial number, firmware and rate for the recording."""
         ...
 
+    def stream_facts(self) -> dict[str, str]:
+        """Return what became of its samples since it was opened, as text."""
+        ...
+
     def close(self) -> None:
         """Stop the stream and give the port back."""
         ...

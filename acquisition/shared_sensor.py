@@ -25,6 +25,10 @@ class SharedSensor:
         """Return nothing: the process that has the port knows."""
         return {}
 
+    def stream_facts(self) -> dict[str, str]:
+        """Return nothing: the process that has the port knows."""
+        return {}
+
     def close(self) -> None:
         """Do nothing: the process that has the port closes it."""
 

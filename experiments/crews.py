@@ -58,6 +58,10 @@ class Crew(Protocol):
         """Open the wrist sensor; return what it says about itself."""
         ...
 
+    def sensor_facts(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text."""
+        ...
+
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
         ...
@@ -115,6 +119,10 @@ class InlineCrew:
         """Open the wrist sensor; return what it says about itself."""
         self._sensor = self._open_sensor()
         return self._sensor.describe()
+
+    def sensor_facts(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text."""
+        return self._sensor.stream_facts() if self._sensor is not None else {}
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
@@ -237,6 +245,13 @@ class ProcessCrew:
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""
         return (self._reader or self._control).ask("open")
+
+    def sensor_facts(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text.
+
+        Nothing for a sensor on the arm's bus, whose process has a loop to run.
+        """
+        return self._reader.ask("stream") if self._reader is not None else {}
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""

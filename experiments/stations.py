@@ -31,6 +31,7 @@ from experiments.parts import (
     open_bus_sensor,
 )
 from experiments.settings import RigSettings, TerrainRow
+from ft_sensor.keeper import SensorKeeper, stream_facts
 from ft_sensor.serial_link import open_port
 from ft_sensor.serial_sensor import SerialSensor
 from wam.arm import WamArm
@@ -176,7 +177,8 @@ class ReaderStation:
     def __init__(self, station: Station) -> None:
         self._station = station
         self._clock = SystemClock()
-        self._sensor: SerialSensor | None = None
+        self._keeper = SensorKeeper(self._connect, self._clock)
+        self._is_open = False
         self._grants = request(Wish(READER_PRIORITY, station.settings.get("core")))
 
     def serve(self) -> None:
@@ -184,35 +186,43 @@ class ReaderStation:
         channel = self._station.channel
         handlers: dict[str, Callable[[Any], Any]] = {
             "open": lambda _: self._open(),
+            "stream": lambda _: self._stream(),
             "grants": lambda _: [grant.as_dict() for grant in self._grants],
         }
         try:
             while True:
-                if self._sensor is None or channel.is_readable():
+                if not self._is_open or channel.is_readable():
                     channel.answer(handlers)
                 else:
-                    self._read(self._sensor)
+                    self._read()
         except ChannelClosedError:
-            if self._sensor is not None:
-                self._sensor.close()
+            self._keeper.close()
 
     def _open(self) -> dict[str, str]:
+        facts = self._keeper.open()
+        self._is_open = True
+        return facts
+
+    def _connect(self) -> SerialSensor:
         settings = self._station.settings
         rig = RigSettings.model_validate(settings["rig"])
         port = open_port(settings["port"], rig.ft_sensor.baudrate).port
         is_simulated = bool(settings["is_simulated"])
-        sensor = build_sensor(rig, port, self._clock, is_simulated=is_simulated)
-        sensor.open()
-        self._sensor = sensor
-        return sensor.describe()
+        return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
 
-    def _read(self, sensor: SerialSensor) -> None:
-        """Publish what arrives within 20 ms; a port that has gone leaves stale ones."""
+    def _stream(self) -> dict[str, str]:
+        """Return what became of the stream, as text."""
+        return stream_facts(self._keeper)
+
+    def _read(self) -> None:
+        """Publish what arrives within 20 ms; what is lost is looked for."""
         clock, board = self._clock, self._station.board
-        clock.wait(sensor, clock.now_ns() + READ_NS)
-        try:
-            publish(sensor.poll(clock.now_ns()), board.wrenches)
-        except TractionError:
-            sensor.close()
-            self._sensor = None
+        deadline_ns = clock.now_ns() + READ_NS
+        if self._keeper.sensor is None:
+            clock.sleep_until(deadline_ns)
+        else:
+            # A port that has gone is readable, and says so when it is read.
+            with contextlib.suppress(TractionError):
+                clock.wait(self._keeper.sensor, deadline_ns)
+        publish(self._keeper.poll(clock.now_ns()), board.wrenches)
         board.beats.beat(Role.READER, clock.now_ns())

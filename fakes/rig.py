@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -88,10 +89,25 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
     )
 
 
+class Cable(Protocol):
+    """What joins a serial sensor and whoever reads it."""
+
+    def unplug(self) -> None:
+        """Pull it out."""
+        ...
+
+    def plug_in(self) -> None:
+        """Put it in again."""
+        ...
+
+
 class FakeRig:
     """Simulated devices joined by one plant; a World for the stepped clock.
 
     The wrist sensor is on a serial port, or on the bus where `network` has one.
+
+    Attributes:
+        cable: of the serial sensor, while its port is open; None before.
     """
 
     def __init__(
@@ -122,10 +138,11 @@ class FakeRig:
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
         self._port: FakeSerialPort | None = None
+        self.cable: Cable | None = None
 
     def open_port(self) -> FakeSerialPort:
         """Return the sensor's serial port, opened now."""
-        self._port = FakeSerialPort(self.stream, self._clock)
+        self.cable = self._port = FakeSerialPort(self.stream, self._clock)
         return self._port
 
     def advance(self, t_ns: int) -> None:

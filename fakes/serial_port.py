@@ -67,6 +67,9 @@ class FakeSerialPort:
         """Pull the cable: every use of the port fails from now on."""
         self._is_unplugged = True
 
+    def plug_in(self) -> None:
+        """Put it in again; a port that was open when it was pulled stays useless."""
+
     @property
     def in_waiting(self) -> int:
         """Number of bytes that have arrived by now."""

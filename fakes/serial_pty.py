@@ -3,6 +3,7 @@
 import contextlib
 import os
 import tty
+from pathlib import Path
 
 from fakes.serial_port import ByteStream
 
@@ -13,19 +14,47 @@ class SerialPty:
     """The device's end of a pseudo-terminal.
 
     Attributes:
-        path: of the end that a driver opens, e.g. /dev/pts/3.
+        path: of the end that a driver opens: `link`, or e.g. /dev/pts/3.
         overrun: bytes lost because nobody read.
     """
 
-    def __init__(self, stream: ByteStream, t_ns: int) -> None:
-        """Plug the device in at `t_ns`; it may be talking already."""
+    def __init__(self, stream: ByteStream, t_ns: int, link: Path | None = None) -> None:
+        """Plug the device in at `t_ns`; it may be talking already.
+
+        `link`: a name that stays when the device is pulled and plugged in again.
+
+        Raises:
+            OSError: the name is taken.
+        """
+        self.overrun = 0
+        self._stream = stream
+        self._link = link
+        self._device = self._line = -1
+        self.plug_in(t_ns)
+        self.path = str(link) if link is not None else os.ttyname(self._line)
+
+    @property
+    def is_plugged_in(self) -> bool:
+        """Whether there is something at the end of the path."""
+        return self._device >= 0
+
+    def plug_in(self, t_ns: int) -> None:
+        """Put the cable in, unless it is."""
+        if self.is_plugged_in:
+            return
         self._device, self._line = os.openpty()
         tty.setraw(self._line)
         os.set_blocking(self._device, False)
-        self.path = os.ttyname(self._line)
-        self.overrun = 0
-        self._stream = stream
-        stream.port_opened(t_ns)
+        if self._link is not None:
+            self._link.symlink_to(os.ttyname(self._line))
+        self._stream.due(t_ns)  # what it said to nobody is gone
+        self._stream.port_opened(t_ns)
+
+    def unplug(self) -> None:
+        """Pull the cable: whoever has the port open finds it gone."""
+        if self._link is not None and self.is_plugged_in:
+            self._link.unlink(missing_ok=True)
+        self.close()
 
     def fileno(self) -> int:
         """Return the descriptor that is readable when the driver says something."""
@@ -38,7 +67,7 @@ class SerialPty:
         for _, data in self._stream.due(t_ns):
             try:
                 sent = os.write(self._device, data)
-            except BlockingIOError:
+            except OSError:  # full, or nobody there
                 sent = 0
             self.overrun += len(data) - sent
 

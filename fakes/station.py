@@ -54,6 +54,22 @@ class WorldClock(SystemClock):
         return self.world_ns
 
 
+class PtyCable:
+    """Implements `fakes.rig.Cable` over a pseudo-terminal."""
+
+    def __init__(self, pty: SerialPty, clock: WorldClock) -> None:
+        self._pty = pty
+        self._clock = clock
+
+    def unplug(self) -> None:
+        """Pull the cable."""
+        self._pty.unplug()
+
+    def plug_in(self) -> None:
+        """Put it in again."""
+        self._pty.plug_in(self._clock.now_ns())
+
+
 class RigServer:
     """Serves one simulated rig to the processes of a session."""
 
@@ -69,7 +85,9 @@ class RigServer:
         self._wired = WiredNetwork(rig.network, is_far=True)
         self._channel = channel
         self._hub = SocketHub(folder / "can")
-        self._pty = SerialPty(self._rig.stream, self._clock.now_ns())
+        now_ns = self._clock.now_ns()
+        self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
+        rig.cable = PtyCable(self._pty, clock)
         self._handlers = rehearsal_handlers(rehearsal)
         self._handlers["hello"] = lambda _: {
             "can": {
@@ -97,7 +115,8 @@ class RigServer:
 
     def _step(self, asked: int | None) -> bool:
         """Wait for what comes next; return whether descriptor `asked` is readable."""
-        watched = [self._hub.fileno(), self._pty.fileno()]
+        watched = [self._hub.fileno()]
+        watched += [self._pty.fileno()] if self._pty.is_plugged_in else []
         if asked is not None:
             watched.append(asked)
         ready = select.select(watched, [], [], self._patience())[0]

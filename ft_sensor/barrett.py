@@ -1,6 +1,6 @@
 """Barrett's wrist sensor: node 8 of the arm's bus, asked along with the positions."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 from acquisition.clock import Clock
 from acquisition.devices import WrenchSample
@@ -128,6 +128,10 @@ class BarrettSensor:
             "measured_rate": f"{found.answered} of {_QUESTIONS} questions answered",
             "time": "question handed over + 191 us; filter delay unknown",
         }
+
+    def stream_facts(self) -> dict[str, str]:
+        """Return what became of its answers, as text."""
+        return {name: str(value) for name, value in asdict(self.counters).items()}
 
     def close(self) -> None:
         """Forget what was heard; the bus is the arm's."""

@@ -1,7 +1,7 @@
 """A serial wrist sensor as the loop sees it: opened, polled, closed."""
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, Clock
@@ -79,9 +79,7 @@ class SensorCounters:
 
     def facts(self) -> dict[str, str]:
         """Return the counts as text for the recording."""
-        return {
-            f"ft_{name}": str(getattr(self, name)) for name in self.__dataclass_fields__
-        }
+        return {name: str(value) for name, value in asdict(self).items()}
 
 
 class SerialSensor:
@@ -167,6 +165,10 @@ class SerialSensor:
             "nominal_rate": f"{NS_PER_S / device.timing.period_ns:.1f} Hz",
             "measured_rate": f"{self._rate:.1f} Hz",
         }
+
+    def stream_facts(self) -> dict[str, str]:
+        """Return what became of the stream since it was opened, as text."""
+        return self.counters.facts()
 
     def close(self) -> None:
         """Stop the stream and give the port back; never raises."""

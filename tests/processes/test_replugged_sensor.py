@@ -1,0 +1,45 @@
+"""A serial sensor in a process of its own is pulled out, and put in again."""
+
+import pytest
+
+from experiments.rigs import FakeOptions, build_rig
+from experiments.settings import load_settings
+from tests.processes.watching import until
+
+pytestmark = pytest.mark.wall_clock
+ROW = "S0"
+FRESH_NS = 50_000_000
+FOUND_AGAIN = 25.0  # s; boot text, ritual, rate check, on a machine with other work
+
+
+@pytest.fixture
+def rig():
+    settings = load_settings(None)
+    rig = build_rig(settings, settings.row(ROW), FakeOptions(is_fast=False, seed=1))
+    yield rig
+    rig.crew.close()
+
+
+def is_fresh(rig):
+    newest = rig.board.wrenches.last(1)
+    if not len(newest):
+        return False
+    age_ns = rig.clock.now_ns() - int(newest["t_ns"][0])
+    return bool(newest["is_valid"][0]) and age_ns < FRESH_NS
+
+
+def test_a_sensor_is_read_again_after_it_was_unplugged(rig):
+    rig.crew.start_arm()
+    facts = rig.crew.open_sensor()
+    assert until(lambda: is_fresh(rig), 2)
+    rig.rehearsal.inject("ft-unplugged")
+    assert until(lambda: not is_fresh(rig), 2)
+    assert until(lambda: "Unplugged" in trouble(rig), 3), trouble(rig)
+    rig.rehearsal.mend()
+    assert until(lambda: is_fresh(rig), FOUND_AGAIN), trouble(rig)
+    assert rig.crew.sensor_facts()["reopened"] == "1"
+    assert rig.crew.open_sensor()["model"] == facts["model"]
+
+
+def trouble(rig):
+    return rig.crew.sensor_facts()["trouble"]
