@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
+from acquisition.errors import SettingsError
 from experiments.crews import Crew, InlineCrew
 from experiments.parts import (
     LoopParts,
@@ -25,6 +26,9 @@ from wam.model import ArmModel
 from wam.tool import tool_facts, tool_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fakes.sensor_server import SensorLine, SensorServer
     from fakes.serve import PuckServer
 
 
@@ -138,8 +142,39 @@ def stepped(
     return clock, crew, Rehearsal(simulation, PACES[facts["pace"]])
 
 
+def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
+    """Return a serial sensor of `kind` at `path`, as rig.toml has it if it fits."""
+    from fakes.sensor_kinds import SensorChoice
+    from fakes.sensor_server import SensorLine
+
+    section = settings.rig.ft_sensor
+    facts: dict[str, Any] = {"kind": kind}
+    if section.kind == kind:
+        facts = sensor_facts(section)
+    return SensorLine(path, SensorChoice(**facts))
+
+
+def build_sensor_server(settings: Settings, line: tuple[Path, str]) -> SensorServer:
+    """Return a serial sensor alone, below which a foot hangs.
+
+    `line`: the path it is served at, and its kind.
+
+    Raises:
+        SettingsError: the path is in use or cannot be one.
+    """
+    from fakes.sensor_server import SensorServer, hanging_load
+
+    tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
+    served = _sensor_line(settings, *line)
+    return SensorServer(served, hanging_load(tool), SystemClock())
+
+
 def build_server(
-    settings: Settings, interface: str, channel: str, *, is_idle_first: bool
+    settings: Settings,
+    bus: tuple[str, str],
+    line: tuple[Path, str] | None,
+    *,
+    is_idle: bool,
 ) -> PuckServer:
     """Return a simulated arm that serves its pucks to other programs.
 
@@ -147,19 +182,23 @@ def build_server(
 
     Args:
         settings: all settings; the first terrain of the matrix names the foot.
-        interface: "traction-fake" or an interface of python-can.
-        channel: path of the socket, or the interface's channel.
-        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
+        bus: "traction-fake" or an interface of python-can, and its channel.
+        line: path and kind of a serial sensor; None = the sensor is on the bus.
+        is_idle: it begins powered, idle, pucks asleep; otherwise in E-STOP.
 
     Raises:
         SettingsError: the socket's path is in use or cannot be one.
         LinkError: the bus cannot be opened.
     """
-    from fakes.serve import build_home_server, open_can_port
+    from fakes.serve import Home, build_home_server, open_can_port
 
     row = settings.matrix.terrains[0]
-    port = open_can_port(interface, channel, settings.rig.can.bitrate)
+    port = open_can_port(*bus, settings.rig.can.bitrate)
     tool = build_tool(settings.rig, row.foot)
-    return build_home_server(
-        port, tool, terrain_frame(row), SystemClock(), is_idle_first=is_idle_first
-    )
+    served = _sensor_line(settings, *line) if line is not None else None
+    found = Home(tool, terrain_frame(row), served, is_idle)
+    try:
+        return build_home_server(port, found, SystemClock())
+    except SettingsError:
+        port.close()
+        raise

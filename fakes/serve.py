@@ -1,7 +1,7 @@
 """Serves a puck network to other programs, on the wall clock, in one thread."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -19,6 +19,7 @@ from fakes.pucks import PuckNetwork
 from fakes.randomness import trial_generator
 from fakes.safety_module import PendantAction
 from fakes.sensor_errors import SensorErrors
+from fakes.sensor_server import SensorLine, SensorServer
 from fakes.wire import WiredNetwork
 from ft_sensor.payload import TerrainFrame
 from wam.constants import load_constants
@@ -107,6 +108,7 @@ class PuckServer:
 
     Attributes:
         network: the pucks.
+        sensor: a serial wrist sensor that is served beside them; None = none.
     """
 
     def __init__(
@@ -118,11 +120,14 @@ class PuckServer:
         self._port = port
         self._clock = clock
         self._seen_ns = self._world_ns = clock.now_ns()
+        self.sensor: SensorServer | None = None
 
     @property
     def name(self) -> str:
         """The bus as INTERFACE:CHANNEL."""
-        return self._port.name
+        if self.sensor is None:
+            return self._port.name
+        return f"{self._port.name}, {self.sensor.name}"
 
     @property
     def state(self) -> str:
@@ -133,12 +138,13 @@ class PuckServer:
     def losses(self) -> str:
         """What was not carried, in words; empty if all was."""
         port = self._port
-        if not (port.ignored or port.lost):
-            return ""
-        return (
-            f"{port.ignored} packets were no classic data frames and were ignored; "
-            f"{port.lost} frames were lost because nobody took them in time."
-        )
+        words = [self.sensor.losses] if self.sensor and self.sensor.losses else []
+        if port.ignored or port.lost:
+            words.append(
+                f"{port.ignored} packets were no classic data frames and were ignored; "
+                f"{port.lost} frames were lost because nobody took them in time."
+            )
+        return " ".join(words)
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant now."""
@@ -166,10 +172,14 @@ class PuckServer:
                 tap(can_id, data)
         # Nobody may have looked at the arm for long; catching up would delay answers.
         self._motors.advance(self._world_ns)
+        if self.sensor is not None:
+            self.sensor.step()
 
     def close(self) -> None:
-        """Leave the bus."""
+        """Leave the bus, pull the sensor's cable."""
         self._port.close()
+        if self.sensor is not None:
+            self.sensor.close()
 
     def _deadline_ns(self) -> int:
         event_ns = self._wired.next_event_ns()
@@ -195,14 +205,30 @@ def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
     return CanPort(interface, channel, bitrate)
 
 
-def build_home_server(
-    port: Port, tool: Tool, frame: TerrainFrame, clock: Clock, *, is_idle_first: bool
-) -> PuckServer:
+@dataclass(frozen=True, slots=True)
+class Home:
+    """An arm at its home position, and how it is found.
+
+    Attributes:
+        tool: what it carries.
+        frame: where the container stands.
+        line: of a serial sensor; None = the sensor is on the bus.
+        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
+    """
+
+    tool: Tool
+    frame: TerrainFrame
+    line: SensorLine | None
+    is_idle_first: bool
+
+
+def build_home_server(port: Port, found: Home, clock: Clock) -> PuckServer:
     """Return a server of an arm that stands at its home position, not zeroed.
 
-    It has a force/torque sensor on its bus.
+    It has a force/torque sensor on its bus or on a serial line.
 
-    `is_idle_first`: powered, safety module idle, pucks asleep; otherwise in E-STOP.
+    Raises:
+        SettingsError: the serial line's path is in use or cannot be one.
     """
     constants = load_constants()
     home = constants.home.copy()
@@ -212,19 +238,22 @@ def build_home_server(
         q_lower=np.minimum(constants.q_lower, home),
         q_upper=np.maximum(constants.q_upper, home),
     )
-    plant = ArmPlant(constants, tool, frame, home)
+    plant = ArmPlant(constants, found.tool, found.frame, home)
     now_ns = clock.now_ns()
     plant.t_ns = now_ns // CYCLE_NS * CYCLE_NS
     motors = Supported(plant)
     rng = trial_generator(_SEED, "home", 0)
     errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
     options = NetworkOptions(
-        safety_mode=SafetyMode.IDLE if is_idle_first else SafetyMode.E_STOP,
+        safety_mode=SafetyMode.IDLE if found.is_idle_first else SafetyMode.E_STOP,
         are_asleep=True,
-        has_sensor=True,
+        has_sensor=found.line is None,
         is_zeroed=False,
         mt=constants.mt,
     )
     load = Load(plant.sensor_load, errors)
     network = PuckNetwork(motors, options, now_ns, load)
-    return PuckServer(network, motors, port, clock)
+    server = PuckServer(network, motors, port, clock)
+    if found.line is not None:
+        server.sensor = SensorServer(found.line, plant.sensor_load, clock)
+    return server

@@ -1,4 +1,4 @@
-"""traction fake: serve the simulated arm to other programs."""
+"""traction fake: serve the simulated arm and wrist sensor to other programs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.console import Console
     from experiments.pendant import Press, Pressable, TimedPress
+    from experiments.settings import Settings
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
+  traction fake --serial /tmp/sensor --sensor optoforce
   traction fake --can socketcan:vcan0 --script presses.txt"""
 
 
@@ -19,9 +22,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `fake`."""
     parser.add_argument(
         "--can",
-        required=True,
         metavar="INTERFACE:CHANNEL",
-        help="where: traction-fake:PATH, or any bus of python-can",
+        help="where the arm is: traction-fake:PATH, or any bus of python-can",
+    )
+    parser.add_argument(
+        "--serial",
+        type=Path,
+        metavar="PATH",
+        help="serve a serial wrist sensor at this new path; alone, or on the arm",
+    )
+    parser.add_argument(
+        "--sensor",
+        choices=("bota", "robotous", "optoforce"),
+        default="bota",
+        help="which one (default: bota)",
     )
     parser.add_argument(
         "--idle-first",
@@ -50,17 +64,18 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings import load_settings
     from experiments.simulated import build_server
 
-    interface, channel = _split(args.can)
+    bus = _split(args.can) if args.can else None
     script = _read_script(args.script)
     settings = load_settings(args.config)
     console = Console(color=not args.no_color)
     clock, stop = SystemClock(), StopFlag()
+    line = (args.serial, args.sensor) if args.serial else None
+    if bus is None:
+        return _serve_sensor(settings, line, console)
     with (
         signals_ask(stop),
         open_bus_log(args.can_log, clock, "fake0", console) as log,
-        closing(
-            build_server(settings, interface, channel, is_idle_first=args.idle_first)
-        ) as server,
+        closing(build_server(settings, bus, line, is_idle=args.idle_first)) as server,
     ):
         console.say(f"ready: {server.name}, safety module in {server.state}")
         pendant = Pendant(script, Lines(_stdin()), clock.now_ns())
@@ -72,6 +87,30 @@ def run(args: argparse.Namespace) -> int:
             is_on = _press(server, pendant.due(clock.now_ns()))
             for line in pendant.take_unknown():
                 console.problem(f"{line[:60]!r} is none of {', '.join(PRESSES)}.")
+        if server.losses:
+            console.problem(server.losses)
+    return 0
+
+
+def _serve_sensor(
+    settings: Settings, line: tuple[Path, str] | None, console: Console
+) -> int:
+    """Serve a sensor without an arm until told to stop."""
+    from acquisition.errors import SettingsError
+    from experiments.company import StopFlag, signals_ask
+    from experiments.simulated import build_sensor_server
+
+    if line is None:
+        raise SettingsError(
+            "There is nothing to serve.",
+            hint="Name --can INTERFACE:CHANNEL, --serial PATH, or both.",
+        )
+    stop = StopFlag()
+    with signals_ask(stop), closing(build_sensor_server(settings, line)) as server:
+        console.say(f"ready: {server.name}")
+        while not stop.count:
+            server.wait()
+            server.step()
         if server.losses:
             console.problem(server.losses)
     return 0

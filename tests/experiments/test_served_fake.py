@@ -7,8 +7,13 @@ import sys
 import can
 import pytest
 
+from acquisition.clock import SystemClock
 from fakes.can_socket import SocketBus, open_socket
+from ft_sensor.line import Line
+from ft_sensor.serial_link import SerialLink, open_port
+from ft_sensor.serial_sensor import SerialSensor
 from tests.experiments.program import run_short, traction
+from tests.ft_sensor.sensor_bench import MAKES
 
 ABSENT = "23 never came"  # of 31 ids asked for, seven pucks and the module are there
 PATIENCE = 30.0  # s, for a machine that stalls; met at once on one that does not
@@ -172,3 +177,41 @@ def test_a_log_that_is_not_there_is_a_usage_error(tmp_path):
     done = traction("replay", "--can", tmp_path / "none")
     assert done.code == 2
     assert "cannot be read" in done.err
+
+
+@pytest.mark.parametrize("kind", ["bota", "robotous", "optoforce"])
+def test_a_sensor_is_served_to_a_driver_in_another_process(tmp_path, kind):
+    path = tmp_path / "sensor"
+    command = [sys.executable, "-m", "experiments", "fake", "--serial", str(path)]
+    process = subprocess.Popen(
+        [*command, "--sensor", kind], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout.readline() == f"ready: {kind} sensor on {path}\n"
+        clock = SystemClock()
+        make = MAKES[kind]
+        link = SerialLink(open_port(str(path), make.baudrate).port)
+        driver = make.device(Line(str(path), make.baudrate, 0.5))
+        sensor = SerialSensor(link, clock, driver)
+        sensor.open()
+        clock.sleep_until(clock.now_ns() + 100_000_000)
+        newest = sensor.poll(clock.now_ns())[-1]
+        # the shipped foot of 0.45 kg hangs there; bias and noise 0.4 N rms
+        assert newest.wrench[2] == pytest.approx(4.4, abs=2.0)
+        sensor.close()
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(PATIENCE) == 0
+    finally:
+        process.kill()
+        process.communicate()
+    assert not path.is_symlink()
+
+
+def test_nothing_to_serve_and_a_taken_path_are_named(tmp_path):
+    assert "nothing to serve" in traction("fake").err
+    taken = tmp_path / "sensor"
+    taken.write_text("")
+    done = traction("fake", "--serial", taken)
+    assert done.code == 2
+    assert "cannot be served" in done.err
+    assert taken.read_text() == ""

@@ -9,7 +9,7 @@ from acquisition.errors import LinkError
 from fakes.can_port import CanPort
 from fakes.network_options import NetworkOptions
 from fakes.pucks import PuckNetwork
-from fakes.serve import PuckServer, Supported, build_home_server
+from fakes.serve import Home, PuckServer, Supported, build_home_server
 from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
 from tests.fakes.stepped import Motors, SteppedClock
 
@@ -164,7 +164,7 @@ def test_an_arm_without_power_is_carried():
     ("is_idle_first", "state"), [(True, "idle"), (False, "e-stop")]
 )
 def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
-    server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=is_idle_first)
+    server = build_home_server(hosts, Home(TOOL, FRAME, None, is_idle_first), clock)
     assert server.state == state
     hosts.coming += [(1, b"\x05"), (8, b"\x05"), (10, b"\x2a")]
     let_pass(server, clock, MS)
@@ -174,7 +174,7 @@ def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
 
 
 def test_the_served_arm_stands_at_home(hosts, clock):
-    server = build_home_server(hosts, TOOL, FRAME, clock, is_idle_first=True)
+    server = build_home_server(hosts, Home(TOOL, FRAME, None, True), clock)
     hosts.coming += [(node, b"\x85\0\x02\0\0\0") for node in range(1, 8)]
     let_pass(server, clock, 800 * MS)  # longer than a puck takes to boot
     hosts.coming.append((4, b"\x42"))  # MECH

@@ -260,3 +260,28 @@ def test_a_slow_sensor_is_refused(kind):
     bench = SensorBench(kind, clock_error_ppm=-600_000)
     with pytest.raises(DeviceFaultError, match="at least 495"):
         bench.sensor.open()
+
+
+def damaged_seconds(kind, seconds):
+    """Return a bench whose stream had one damaged byte in each of `seconds`."""
+    bench = SensorBench(kind).opened()
+    bench.run(20 * MS)
+    rng = np.random.default_rng(5)
+    faults = [ByteFault.FLIP, ByteFault.DROP]
+    for second in range(seconds):
+        place = int(rng.integers(bench.driver.timing.frame_size))
+        bench.device.damage_next(faults[second % 2], place)
+        bench.run(S, 10 * MS)
+    return bench
+
+
+def test_a_damaged_byte_a_second_costs_the_damaged_frames_only(kind):
+    counters = damaged_seconds(kind, 12).sensor.counters
+    assert counters.lost == counters.resyncs == 12
+
+
+@pytest.mark.long
+def test_ten_minutes_of_damaged_bytes_cost_the_damaged_frames_only(kind):
+    counters = damaged_seconds(kind, 600).sensor.counters
+    assert counters.lost == counters.resyncs == 600
+    assert counters.frames == pytest.approx(600 * MAKES[kind].rate - 600, abs=35)

@@ -1,0 +1,90 @@
+"""What one frame of a serial wrist sensor costs, from bytes to a dated sample.
+
+    python benchmarks/parsing.py [--frames 20000]
+
+Each sensor's stream is fed in pieces as they come while the loop runs (3 ms), and at
+once; the dating is that of the product. The last column is how many times the stream's
+own rate one core keeps up with.
+"""
+
+import argparse
+import math
+import statistics
+
+from acquisition.clock import SystemClock
+from fakes.sensor_kinds import SERIAL_KINDS, SensorChoice, make_stream
+from ft_sensor.bota_device import BotaDevice, BotaSettings
+from ft_sensor.dating import FrameDating
+from ft_sensor.line import Line
+from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
+from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
+from ft_sensor.serial_sensor import SerialDevice
+
+GOAL_US = 20.0
+PIECE_NS = 3_000_000
+ROUNDS = 9
+CLOCK = SystemClock()
+SENSITIVITY = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
+
+
+def devices() -> dict[str, SerialDevice]:
+    """Return the driver of each kind."""
+    return {
+        "bota": BotaDevice(Line("none", 460800), BotaSettings()),
+        "robotous": RobotousDevice(Line("none", 921600), RobotousSettings()),
+        "optoforce": OptoForceDevice(
+            Line("none", 1_000_000), OptoForceSettings(SENSITIVITY, "HEX00042")
+        ),
+    }
+
+
+def pieces(kind: str, frames: int, device: SerialDevice) -> list[tuple[int, bytes]]:
+    """Return (arrival [ns], bytes) of a stream, every 3 ms what has come."""
+
+    def load(t_ns: int) -> tuple[float, ...]:
+        return tuple(3.0 * math.sin(t_ns * 1e-8 + axis) for axis in range(6))
+
+    stream = make_stream(SensorChoice(kind), load, None, 0)
+    end_ns = round(frames * device.timing.period_ns)
+    return [
+        (t_ns, b"".join(data for _, data in stream.due(t_ns)))
+        for t_ns in range(PIECE_NS, end_ns, PIECE_NS)
+    ]
+
+
+def cost_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
+    """Return the time of one frame from bytes to a dated sample [us]."""
+    scanner, dating = device.scanner(), FrameDating(device.timing)
+    count = 0
+    begun_ns = CLOCK.now_ns()
+    for t_ns, data in stream:
+        count += len(dating.date(scanner.feed(data), t_ns))
+    return (CLOCK.now_ns() - begun_ns) / count / 1000
+
+
+def scan_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
+    """Return the time of one frame from bytes to numbers, all bytes at once [us]."""
+    data = b"".join(data for _, data in stream)
+    scanner = device.scanner()
+    begun_ns = CLOCK.now_ns()
+    count = len(scanner.feed(data))
+    return (CLOCK.now_ns() - begun_ns) / count / 1000
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--frames", type=int, default=20_000)
+    frames = parser.parse_args().frames
+    print("sensor      scan us  with date us  goal us  x rate")
+    for kind in SERIAL_KINDS:
+        device = devices()[kind]
+        stream = pieces(kind, frames, device)
+        scan = statistics.median(scan_us(device, stream) for _ in range(ROUNDS))
+        whole = statistics.median(cost_us(device, stream) for _ in range(ROUNDS))
+        times = device.timing.period_ns / 1000 / whole
+        print(f"{kind:10} {scan:8.2f} {whole:13.2f} {GOAL_US:8.0f} {times:7.0f}")
+
+
+if __name__ == "__main__":
+    main()
