@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
-  traction fake --serial /tmp/sensor --sensor optoforce
-  traction fake --can socketcan:vcan0 --script presses.txt"""
+  traction fake --serial /tmp/sensor --sensor optoforce"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

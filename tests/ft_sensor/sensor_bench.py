@@ -8,6 +8,8 @@ import numpy as np
 
 from acquisition.devices import WrenchSample
 from fakes.bota_stream import BotaOptions, bota_stream
+from fakes.ft_puck import Load
+from fakes.network_options import NetworkOptions
 from fakes.optoforce_stream import (
     SENSITIVITY,
     SERIAL_NUMBER,
@@ -18,12 +20,16 @@ from fakes.robotous_stream import RobotousOptions, robotous_stream
 from fakes.sensor_errors import SensorErrors
 from fakes.sensor_stream import SensorStream
 from fakes.serial_port import FakeSerialPort
+from ft_sensor.barrett import BarrettSensor
 from ft_sensor.bota_device import BotaDevice, BotaSettings
 from ft_sensor.line import Line
 from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
 from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
 from ft_sensor.serial_link import SerialLink
 from ft_sensor.serial_sensor import SerialDevice, SerialSensor
+from tests.fakes.stepped import Rig
+from wam.arm import WamArm
+from wam.frames import SENSOR_NODE
 
 MS = 1_000_000
 LOAD = (1.0, -2.0, 30.0, 0.1, 0.2, -0.3)
@@ -147,6 +153,9 @@ class SensorBench:
         self.clock.world = self.port
         self.sensor = SerialSensor(SerialLink(self.port), self.clock, self.driver)
 
+    def silence(self) -> None:
+        self.device.go_silent()
+
     def run(self, duration_ns: int, period_ns: int = 2 * MS) -> list[WrenchSample]:
         """Poll every `period_ns`, and until nothing is left."""
         found: list[WrenchSample] = []
@@ -154,4 +163,34 @@ class SensorBench:
             self.clock.sleep_until(self.clock.now_ns() + period_ns)
             while self.port.in_waiting:
                 found += self.sensor.poll(self.clock.now_ns())
+        return found
+
+
+class BusBench:
+    """The sensor on the arm's bus, asked along with the positions of every cycle."""
+
+    def __init__(self, load=LOAD) -> None:
+        self.load = load
+        self.rig = Rig(NetworkOptions(has_sensor=True), load=Load(lambda _: self.load))
+        self.clock = self.rig.clock
+        self.sensor = BarrettSensor(self.rig.link, self.clock)
+        self.arm = WamArm(self.rig.link, self.clock)
+
+    def opened(self) -> "BusBench":
+        self.arm.start()
+        self.sensor.open()
+        self.arm.accompany(self.sensor)
+        return self
+
+    def silence(self) -> None:
+        self.rig.network.silence(SENSOR_NODE)
+
+    def run(self, duration_ns: int, period_ns: int = 2 * MS) -> list[WrenchSample]:
+        """Read, poll and send every `period_ns`."""
+        found: list[WrenchSample] = []
+        for _ in range(duration_ns // period_ns):
+            reading = self.arm.read(self.clock.now_ns())
+            found += self.sensor.poll(reading.host_ns)
+            self.arm.send(np.zeros(7), np.zeros(7))
+            self.clock.sleep_until(reading.host_ns + period_ns)
         return found

@@ -1,4 +1,4 @@
-"""What every serial wrist sensor has to do; the one on the bus is in test_barrett."""
+"""What every wrist sensor has to do, and what those on a serial line."""
 
 from itertools import pairwise
 
@@ -8,7 +8,7 @@ import pytest
 from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
 from fakes.sensor_stream import ByteFault
 from ft_sensor.reading import axis_names, largest_traction
-from tests.ft_sensor.sensor_bench import LOAD, MAKES, MS, SensorBench
+from tests.ft_sensor.sensor_bench import LOAD, MAKES, MS, BusBench, SensorBench
 
 KINDS = tuple(MAKES)
 S = 1000 * MS
@@ -18,6 +18,50 @@ CHUNKS = (1, 7, 44, 4096)
 @pytest.fixture(params=KINDS)
 def kind(request):
     return request.param
+
+
+@pytest.fixture(params=(*KINDS, "barrett"))
+def any_bench(request):
+    """Each of the four sensors, opened."""
+    is_on_bus = request.param == "barrett"
+    bench = BusBench() if is_on_bus else SensorBench(request.param)
+    return bench.opened()
+
+
+def test_every_sensor_shows_its_load_in_newtons_and_newton_metres(any_bench):
+    mean = np.mean([sample.wrench for sample in any_bench.run(300 * MS)], axis=0)
+    # Bias and drift at three sigma, and half a count of the coarsest sensor.
+    assert (np.abs(mean - LOAD) < np.repeat([1.3, 0.06], 3)).all()
+
+
+def test_every_sensor_vouches_for_a_sample_and_dates_it_before_now(any_bench):
+    found = any_bench.run(100 * MS)
+    newest = found[-1]
+    assert newest.is_valid
+    assert not newest.saturated
+    assert 0 < any_bench.clock.now_ns() - newest.t_ns < 5 * MS
+    assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
+
+
+def test_every_sensor_that_is_silent_gives_nothing(any_bench):
+    any_bench.run(20 * MS)
+    any_bench.silence()
+    any_bench.run(6 * MS)
+    assert any_bench.run(40 * MS) == []
+
+
+def test_every_sensor_tells_who_it_is_and_what_became_of_its_samples(any_bench):
+    any_bench.run(20 * MS)
+    told = any_bench.sensor.describe()
+    assert {"model", "serial_number", "firmware", "measured_rate", "time"} <= set(told)
+    assert min(map(float, told["ranges"].split())) > 0
+    facts = any_bench.sensor.stream_facts()
+    assert any(int(count) > 0 for count in facts.values())
+
+
+def test_every_sensor_can_be_closed_twice(any_bench):
+    any_bench.sensor.close()
+    any_bench.sensor.close()
 
 
 @pytest.mark.parametrize("chunk", CHUNKS)
