@@ -1,1 +1,1 @@
-"""From trial files to models, figures and the report."""
+"""From trial files to models, figures and the report. For notebooks: `analysis.api`."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition.errors import TractionError
 from analysis.metrics import Score, mean_absolute_error, score
-from analysis.models import BEYOND, FITTERS, TITLES, FitOptions, FittedModel
+from analysis.models import TITLES, FitOptions, FittedModel, fit_model
 from analysis.prepare import PreparedTrial
 from analysis.rows import Rows, Training
 from analysis.series import Indices
@@ -109,9 +109,8 @@ def run_fold(task: FoldTask) -> FoldResult:
     models: dict[str, ModelFold] = {}
     notes: list[str] = []
     for name in task.options.models:
-        fit = FITTERS[name] if name in FITTERS else BEYOND[name]
         try:
-            model = fit(training, task.options)
+            model = fit_model(name, training, task.options)
         except TractionError as error:
             notes.append(
                 f"{task.terrain}, fold {task.fold + 1}, {TITLES[name]}: {error.message}"

@@ -12,6 +12,7 @@ from analysis.figures import (
     Axes,
     Figure,
     new_figure,
+    panel_grid,
     titled,
 )
 from analysis.models import GP_SE, TUSTIN
@@ -76,20 +77,15 @@ def _draw_panels(
 ) -> Figure | None:
     if not chosen:
         return None
-    columns = min(4, len(chosen))
-    rows = -(-len(chosen) // columns)
-    figure = new_figure(2.1 * rows + 0.7)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for ax, panel in zip(grid.flat, chosen, strict=False):
+    figure, axes = panel_grid(len(chosen), 2.1)
+    for ax, panel in zip(axes, chosen, strict=True):
         draw(ax, panel)
         ax.set_title(titled(panel.terrain), loc="left")
-    for ax in grid.flat[len(chosen) :]:
-        ax.set_visible(False)
-    grid[0, 0].set_ylim(*force_range(chosen))
-    grid[0, 0].set_xlim(0.0, max(float(panel.v.max()) for panel in chosen))
+    axes[0].set_ylim(*force_range(chosen))
+    axes[0].set_xlim(0.0, max(float(panel.v.max()) for panel in chosen))
     figure.supxlabel(SPEED_LABEL, fontsize=8)
     figure.supylabel(FORCE_LABEL, fontsize=8)
-    handles, labels = grid[0, 0].get_legend_handles_labels()
+    handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper center", ncols=len(labels), markerscale=3
     )
@@ -108,7 +104,6 @@ def _draw_curves(ax: Axes, panel: Panel) -> None:
             color=colour,
             alpha=0.35,
             mew=0,
-            rasterized=True,
         )
     for k, (name, colour, style) in enumerate(LOAD_LINES):
         label = f"{name} $F_n$"
@@ -126,7 +121,6 @@ def _draw_band(ax: Axes, panel: Panel) -> None:
         color="#808080",
         alpha=0.3,
         mew=0,
-        rasterized=True,
         label="samples",
     )
     ax.fill_between(

@@ -12,6 +12,7 @@ from analysis.figures import (
     name_ticks,
     new_figure,
     plain,
+    shade_table,
     terrain_colours,
 )
 from analysis.models import FITTERS, TITLES
@@ -132,11 +133,11 @@ def _draw_map(
             for errors in cross.values()
         ]
     )
-    ax.imshow(table, cmap="YlOrBr", vmin=0.0, vmax=top, aspect="auto")
+    shade_table(ax, table.tolist(), top)
     for (i, j), value in np.ndenumerate(table):
         ax.text(
-            j,
-            i,
+            j + 0.5,
+            i + 0.5,
             "-" if np.isnan(value) else f"{value:.2f}",
             ha="center",
             va="center",
@@ -144,9 +145,8 @@ def _draw_map(
             color="white" if value > 0.65 * top else "black",
             fontweight="bold" if list(cross)[i] == tested[j] else "normal",
         )
-    name_ticks(ax, tested)
-    ax.set_yticks(range(len(cross)), [plain(name) for name in cross])
-    ax.grid(visible=False)
+    name_ticks(ax, tested, 0.5)
+    ax.set_yticks(np.arange(len(cross)) + 0.5, [plain(name) for name in cross])
 
 
 def _has_models(study: Study) -> bool:

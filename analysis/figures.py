@@ -7,30 +7,57 @@ shared between them and no screen is needed.
 
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from analysis.scenes import BIG, FLAT, SMALL, terrain_class
 
-__all__ = ["WIDTH", "Axes", "Figure", "Picture", "new_figure", "render", "styled"]
+__all__ = [
+    "ONE_COLUMN",
+    "WIDTH",
+    "Axes",
+    "Figure",
+    "LogNorm",
+    "Picture",
+    "new_figure",
+    "panel_grid",
+    "render",
+    "shade_table",
+    "styled",
+]
 
-WIDTH = 7.2  # inches, a page of paper
+WIDTH = 7.16  # inches, both columns of a paper's page
+ONE_COLUMN = 3.45  # inches
 FORCE_LABEL = "traction $F_t$ [N]"
 SPEED_LABEL = "slip velocity $v_t$ [m/s]"
+LOAD_LABEL = "normal force $F_n$ [N]"
 ERROR_LABEL = "mean absolute error [N]"
 LOAD_LINES = (
     ("low", "#0072B2", "-"),
     ("median", "#D55E00", "--"),
     ("high", "#009E73", "-."),
 )
-MODEL_COLOURS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9")
+MODEL_COLOURS = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#D55E00",
+    "#000000",
+)
 MODEL_HATCHES = ("", "///", "...", "xxx", "---")
+MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 _DPI = 160
 _CLASS_COLOURS = {
@@ -77,9 +104,42 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(height: float) -> Figure:
-    """Return an empty figure as wide as a page, `height` inches high."""
-    return Figure(figsize=(WIDTH, height), layout="constrained")
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure, `height` inches high, as wide as both columns."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panel_grid(
+    count: int, height: float, most_columns: int = 4
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `count` panels that share their axes, row by row.
+
+    Args:
+        count: number of panels.
+        height: of one row [inches].
+        most_columns: panels side by side.
+    """
+    columns = min(most_columns, count)
+    rows = -(-count // columns)
+    figure = new_figure(height * rows + 0.7)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    axes = list(grid.flat)
+    for spare in axes[count:]:
+        spare.set_visible(False)
+        # the panel above it is the lowest of its column
+        axes[axes.index(spare) - columns].xaxis.set_tick_params(labelbottom=True)
+    return figure, axes[:count]
+
+
+def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
+    """Draw a table of numbers as shaded cells, the first row above.
+
+    Cells that are not a number stay white. Unlike an image, cells stay vectors.
+    """
+    values = np.ma.masked_invalid(np.asarray(table, dtype=np.float64))
+    ax.pcolormesh(values, cmap="YlOrBr", vmin=0.0, vmax=top or 1.0, edgecolors="none")
+    ax.invert_yaxis()
+    ax.grid(visible=False)
 
 
 def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
@@ -94,17 +154,18 @@ def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
             rotation=20,
             fontsize=44,
             color="#808080",
-            alpha=0.22,
-            fontweight="bold",
+            alpha=0.25,  # not bold: another font would have to be embedded
             zorder=100,
         )
     png, pdf = io.BytesIO(), io.BytesIO()
     with warnings.catch_warnings():
         # a terrain may be named in a script the font does not have
         warnings.filterwarnings("ignore", message="Glyph")
-        figure.savefig(png, format="png", dpi=_DPI, metadata={"Software": None})
+        # canvases of their own draw once; savefig would draw twice for each format
+        figure.set_dpi(_DPI)
+        FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})
         figure.set_layout_engine("none")  # the layout is found; do not search again
-        figure.savefig(pdf, format="pdf", dpi=300, metadata={"CreationDate": None})
+        FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
     return Picture(key, png.getvalue(), pdf.getvalue())
 
 
@@ -132,12 +193,12 @@ def plain(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def name_ticks(ax: Axes, terrains: list[str]) -> None:
+def name_ticks(ax: Axes, terrains: list[str], shift: float = 0.0) -> None:
     """Put the names of terrains under the axis, slanted if they are long."""
     longest = max(map(len, terrains))
     is_long = longest > 6 and len(terrains) > 3
     ax.set_xticks(
-        range(len(terrains)),
+        np.arange(len(terrains)) + shift,
         [plain(terrain) for terrain in terrains],
         rotation=30 if is_long else 0,
         ha="right" if is_long else "center",

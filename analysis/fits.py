@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from itertools import combinations
 from typing import Any
@@ -51,11 +51,16 @@ def to_fits(study: Study) -> dict[str, Any]:
         "notes": list(study.notes),
         "warnings": list(study.warnings),
     }
-    return _plain(fits)
+    return to_plain(fits)
 
 
-def to_csv(study: Study) -> str:
-    """Return one line per terrain, model, fold and quantity, with its unit."""
+def to_csv(study: Study, further: Iterable[Sequence[Any]] = ()) -> str:
+    """Return one line per terrain, model, fold and quantity, with its unit.
+
+    Args:
+        study: the study.
+        further: more lines of the same six columns; an empty cell is "all".
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["terrain", "model", "fold", "quantity", "value", "unit"])
@@ -70,6 +75,10 @@ def to_csv(study: Study) -> str:
                     [_safe(name), model, fold.fold + 1, key, repr(value), units[key]]
                     for key, value in values.items()
                 )
+    writer.writerows(
+        [_safe(str(cell)) for cell in row[:4]] + [repr(row[4]), row[5]]
+        for row in further
+    )
     return text.getvalue()
 
 
@@ -118,22 +127,16 @@ def _terrain(result: TerrainResult, models: Sequence[str]) -> dict[str, Any]:
         },
         "constant_mae": result.constant_mae,
         **{
-            key: {model: mean_of(_scores(result, model, key)) for model in models}
+            key: {model: mean_of(result.scores(model, key)) for model in models}
             for key in Score._fields
             if key != "mae"
         },
         "standard_errors": {
-            key: {
-                model: standard_error(_scores(result, model, key)) for model in models
-            }
+            key: {model: standard_error(result.scores(model, key)) for model in models}
             for key in Score._fields
         },
         "paired": _paired(result, models),
     }
-
-
-def _scores(result: TerrainResult, model: str, key: str) -> list[float | None]:
-    return result.per_trial(model, lambda fold: getattr(fold.score, key))
 
 
 def _whole_fit(fit: TustinFit) -> dict[str, Any]:
@@ -152,11 +155,7 @@ def _paired(result: TerrainResult, models: Sequence[str]) -> list[dict[str, Any]
         {"models": [first, second], "measure": key, **outcome._asdict()}
         for first, second in combinations(models, 2)
         for key in ("mae", "nlpd")
-        if (
-            outcome := compare(
-                _scores(result, first, key), _scores(result, second, key)
-            )
-        )
+        if (outcome := compare(result.scores(first, key), result.scores(second, key)))
         is not None
     ]
 
@@ -172,12 +171,12 @@ def _processes(result: TerrainResult, model: str) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401
+def to_plain(value: Any) -> Any:  # noqa: ANN401
     """Return `value` with tuples as lists and numbers that are not finite as None."""
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): to_plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [to_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

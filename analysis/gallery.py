@@ -1,33 +1,24 @@
 """The figures of a report: drawn, named as in the paper, and said in a sentence."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
+from analysis import captions, captions_beyond
+from analysis.confusion_figures import draw_confusion
 from analysis.curve_figures import draw_excerpts, draw_gp, draw_tustin
 from analysis.error_figures import draw_cross_bars, draw_cross_map, draw_errors
-from analysis.figures import Figure, Picture, render, styled
-from analysis.models import FITTERS, GP_SE, TITLES, TUSTIN
-from analysis.scenes import FLAT, Excerpt, Panel, excerpts, panels, terrain_class
+from analysis.figures import Figure, render, styled
+from analysis.findings import Findings
+from analysis.jobs import run_tasks
+from analysis.rig_figures import draw_rig, draw_timing
+from analysis.sections import Exhibit, Section
 from analysis.study import Study
+from analysis.surface_figures import draw_coverage, draw_mean, draw_variance
+from analysis.trial_figures import draw_stick_slip, draw_trends, draw_trials
+from analysis.uncertainty_figures import draw_calibration, draw_noise, draw_residuals
 
-
-@dataclass(frozen=True, slots=True)
-class Exhibit:
-    """A figure of the report.
-
-    Attributes:
-        title: its name, after the paper's figure.
-        alt: what the picture shows, for those who cannot see it.
-        caption: what is seen in it.
-        picture: its files.
-    """
-
-    title: str
-    alt: str
-    caption: str
-    picture: Picture
+Draw = Callable[[Findings], Figure | None]
+Say = Callable[[Findings], str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,188 +26,226 @@ class _Recipe:
     key: str
     title: str
     alt: str
-    draw: Callable[[Study], Figure | None]
-    say: Callable[[Study], str]
+    draw: Draw
+    say: Say
+    section: Section = Section.BEYOND
 
 
-def exhibits(study: Study) -> list[Exhibit]:
-    """Return every figure that the study has the numbers for, in the paper's order."""
-    shown = []
+def exhibits(found: Findings, n_jobs: int = 1) -> list[Exhibit]:
+    """Return every figure that there are numbers for, in the order of the page.
+
+    Args:
+        found: what is shown.
+        n_jobs: processes that draw; they share no figure, so pictures are the same.
+    """
+    lots = [Lot(found, k, n_jobs) for k in range(n_jobs)]
+    drawn: dict[str, Exhibit] = {}
+    for lot in run_tasks(draw_lot, lots, n_jobs):
+        drawn |= {exhibit.picture.key: exhibit for exhibit in lot}
+    return [drawn[recipe.key] for recipe in _RECIPES if recipe.key in drawn]
+
+
+@dataclass(frozen=True, slots=True)
+class Lot:
+    """The figures that one process draws.
+
+    Attributes:
+        found: what is shown.
+        first: number of its first figure.
+        step: from one of its figures to the next.
+    """
+
+    found: Findings
+    first: int
+    step: int
+
+
+def draw_lot(lot: Lot) -> list[Exhibit]:
+    """Return the figures of a lot that there are numbers for."""
     with styled():
-        for recipe in _RECIPES:
-            figure = recipe.draw(study)
-            if figure is not None:
-                picture = render(recipe.key, figure, study.simulated)
-                caption = recipe.say(study)
-                shown.append(Exhibit(recipe.title, recipe.alt, caption, picture))
-    return shown
+        shown = [_draw(recipe, lot.found) for recipe in _RECIPES[lot.first :: lot.step]]
+    return [exhibit for exhibit in shown if exhibit is not None]
 
 
-def _say_excerpts(study: Study) -> str:
-    parts = [_say_excerpt(excerpt) for excerpt in excerpts(study)]
-    return "Smoothed record at the full rate. " + " ".join(parts)
+def _draw(recipe: _Recipe, found: Findings) -> Exhibit | None:
+    figure = recipe.draw(found)
+    if figure is None:
+        return None
+    picture = render(recipe.key, figure, found.study.simulated)
+    text = recipe.say(found)
+    return Exhibit(recipe.section, recipe.title, recipe.alt, text, picture)
 
 
-def _say_excerpt(excerpt: Excerpt) -> str:
-    where = f"{excerpt.terrain}, trial {excerpt.trial}"
-    slips = [slip for slip, _, _ in excerpt.slips]
-    if not slips:
-        low, middle, high = np.quantile(excerpt.F_t, (0.05, 0.5, 0.95))
-        return (
-            f"{where}: no slip; F_t near {middle:.1f} N, nine tenths of it between "
-            f"{low:.1f} and {high:.1f} N."
-        )
-    peak = np.median([slip.peak for slip in slips])
-    floor = np.median([slip.floor for slip in slips])
-    bounced = sum(slip.has_bounce for slip in slips)
-    return (
-        f"{where}: {_count(len(slips), 'slip')}, F_t falling from {peak:.1f} N before "
-        f"to {floor:.1f} N during one (medians); the foot is thrown back after "
-        f"{bounced}."
+def _paper(
+    key: str,
+    title: str,
+    alt: str,
+    draw: Callable[[Study], Figure | None],
+    say: Callable[[Study], str],
+) -> _Recipe:
+    return _Recipe(
+        key,
+        title,
+        alt,
+        lambda found: draw(found.study),
+        lambda found: say(found.study),
+        Section.PAPER,
     )
 
 
-def _say_tustin(study: Study) -> str:
-    said = [_say_curve(panel) for panel in _one_per_class(panels(study, TUSTIN))]
-    fold = "each terrain's first fold, one coherent fit and not the medians of Table I"
-    return f"Curves of {fold}. At the median load {'; '.join(said)}."
-
-
-def _say_curve(panel: Panel) -> str:
-    start, end = panel.means[1][[0, -1]]
-    return (
-        f"F_t goes from {start:.1f} N at {panel.v[0]:.3f} m/s to {end:.1f} N at "
-        f"{panel.v[-1]:.3f} m/s on {panel.terrain}"
+def _confusion(level: str, key: str, title: str) -> _Recipe:
+    return _Recipe(
+        key,
+        title,
+        "Confusion matrices for windows of 0.5, 1 and 2 s: rows are the true kinds, "
+        "columns the answers, numbers are percent of the row; above by log density, "
+        "below by the smallest error.",
+        draw_confusion(level),
+        lambda found: captions_beyond.say_confusion(level, found),
     )
-
-
-def _say_gp(study: Study) -> str:
-    said = [
-        f"{2 * float(np.median(panel.sds[1])):.2f} N on {panel.terrain}"
-        for panel in _one_per_class(panels(study, GP_SE))
-    ]
-    return (
-        "First fold of each terrain. The band of two standard deviations, noise "
-        f"included, reaches {', '.join(said)} to either side of the mean."
-    )
-
-
-def _say_errors(study: Study) -> str:
-    errors = {
-        (name, model): mae
-        for name, result in study.terrains.items()
-        for model in FITTERS
-        if (mae := result.mae(model)) is not None
-    }
-    if not errors:
-        return "No model could be fitted; the dashed lines are the constant's errors."
-    low, high = min(errors, key=errors.__getitem__), max(errors, key=errors.__getitem__)
-    text = (
-        f"Smallest error {errors[low]:.2f} N ({TITLES[low[1]]} on {low[0]}), largest "
-        f"{errors[high]:.2f} N ({TITLES[high[1]]} on {high[0]}). Whiskers are standard "
-        "errors over the trials left out."
-    )
-    gaps = [
-        abs(errors[name, TUSTIN] / errors[name, GP_SE] - 1.0)
-        for name in study.terrains
-        if {(name, TUSTIN), (name, GP_SE)} <= errors.keys() and errors[name, GP_SE] > 0
-    ]
-    if gaps:
-        text += f" Tustin and GP differ by at most {max(gaps):.0%} on any terrain."
-    return text
-
-
-def _say_cross(study: Study) -> str:
-    said = [
-        f"{TITLES[model]}: {_say_ratios(study, model)}"
-        for model in FITTERS
-        if study.cross(model)
-    ]
-    return "Error of a foreign model over that of the terrain's own. " + " ".join(said)
-
-
-def _say_ratios(study: Study, model: str) -> str:
-    cross = study.cross(model)
-    groups: dict[str, list[float]] = {}
-    for source, errors in cross.items():
-        for tested, error in errors.items():
-            own = study.terrains[tested].mae(model)
-            if source != tested and error is not None and own:
-                groups.setdefault(_relation(source, tested), []).append(error / own)
-    parts = [
-        f"{name} {min(ratios):.1f} to {max(ratios):.1f}"
-        for name, ratios in groups.items()
-    ]
-    return "; ".join(parts) + "." if parts else "no pair to compare."
-
-
-def _relation(source: str, tested: str) -> str:
-    kinds = [terrain_class(name) for name in (source, tested)]
-    if any(kind == name for kind, name in zip(kinds, (source, tested), strict=True)):
-        return "one terrain's model on another"
-    grounds = ["plates" if kind == FLAT else "stones" for kind in kinds]
-    other = "other " if grounds[0] == grounds[1] else ""
-    return f"models of {grounds[0]} on {other}{grounds[1]}"
-
-
-def _one_per_class(chosen: Sequence[Panel]) -> list[Panel]:
-    first: dict[str, Panel] = {}
-    for panel in chosen:
-        first.setdefault(terrain_class(panel.terrain), panel)
-    return list(first.values())
-
-
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
 
 
 _RECIPES = (
-    _Recipe(
+    _paper(
         "fig4_excerpts",
         "Fig. 4 Traction force and velocity over time",
         "Traction force above and velocity below over a few seconds of one trial per "
         "class of terrain; slips are shaded.",
         draw_excerpts,
-        _say_excerpts,
+        captions.say_excerpts,
     ),
-    _Recipe(
+    _paper(
         "fig5_tustin",
         "Fig. 5 Tustin models",
         "Samples of traction force over slip velocity with the Tustin curve at low, "
         "median and high normal force, one panel per terrain.",
         draw_tustin,
-        _say_tustin,
+        captions.say_tustin,
     ),
-    _Recipe(
+    _paper(
         "fig6_gp",
         "Fig. 6 Gaussian process models",
         "Samples of traction force over slip velocity with the mean of the Gaussian "
         "process and a band of two standard deviations, one panel per terrain.",
         draw_gp,
-        _say_gp,
+        captions.say_gp,
     ),
     _Recipe(
+        "fig7_gp_mean",
+        "Fig. 7 Mean of the Gaussian process over velocity and load",
+        "Filled contours of predicted traction force over slip velocity and normal "
+        "force, one panel per terrain, with the samples as dots.",
+        draw_mean,
+        captions_beyond.say_mean,
+        Section.PAPER,
+    ),
+    _Recipe(
+        "fig8_gp_variance",
+        "Fig. 8 Variance of the Gaussian process over velocity and load",
+        "Filled contours of predictive variance over slip velocity and normal force, "
+        "one panel per terrain; plates are far below stones.",
+        draw_variance,
+        captions_beyond.say_variance,
+        Section.PAPER,
+    ),
+    _paper(
         "fig9_errors",
         "Fig. 9 Prediction error of each model on its own terrain",
         "Bars of mean absolute error for every terrain and model, with the error of a "
         "constant as a dashed line.",
         draw_errors,
-        _say_errors,
+        captions.say_errors,
     ),
-    _Recipe(
+    _paper(
         "fig10_cross_bars",
         "Fig. 10 Every model on every terrain",
         "Grouped bars of mean absolute error: groups are the terrains tested on, bars "
         "the terrains of the models.",
         draw_cross_bars,
-        _say_cross,
+        captions.say_cross,
     ),
-    _Recipe(
+    _paper(
         "fig10_cross_map",
         "Fig. 10 as a map",
         "Heat maps of mean absolute error: rows are the terrains of the models, "
         "columns the terrains tested on.",
         draw_cross_map,
-        lambda _study: "The numbers of the bars above; a terrain's own model in bold.",
+        lambda _: "The numbers of the bars above; a terrain's own model in bold.",
+    ),
+    _Recipe(
+        "calibration",
+        "Calibration: do the bands hold what they promise?",
+        "Share of held-out samples inside the 50, 90 and 95 percent band for every "
+        "terrain and model, with the promised share as a dashed line.",
+        draw_calibration,
+        captions_beyond.say_calibration,
+    ),
+    _Recipe(
+        "noise",
+        "Noise that depends on the inputs",
+        "Gain in log predictive density by chosen noise for every terrain with its "
+        "standard error, and the number of folds per choice.",
+        draw_noise,
+        captions_beyond.say_noise,
+    ),
+    _confusion("terrain", "confusion_terrains", "Telling terrains apart: each terrain"),
+    _confusion("stones", "confusion_stones", "Telling terrains apart: size of stones"),
+    _confusion("surface", "confusion_surface", "Telling terrains apart: flat or rocky"),
+    _Recipe(
+        "coverage",
+        "Coverage of velocity and load",
+        "Number of kept samples in cells of slip velocity and normal force, one panel "
+        "per terrain, logarithmic colours.",
+        draw_coverage,
+        captions_beyond.say_coverage,
+    ),
+    _Recipe(
+        "trials",
+        "All trials side by side",
+        "Small curves of traction force over the way of each trial, one row per "
+        "terrain.",
+        draw_trials,
+        captions_beyond.say_trials,
+    ),
+    _Recipe(
+        "trends",
+        "From the first trial to the last",
+        "Mean traction of every trial in order, with a straight line per terrain.",
+        draw_trends,
+        captions_beyond.say_trends,
+    ),
+    _Recipe(
+        "residuals",
+        "What the models leave unexplained",
+        "Quantiles of measured minus predicted force over slip velocity for Tustin and "
+        "Gaussian process, one panel per terrain.",
+        draw_residuals,
+        captions_beyond.say_residuals,
+    ),
+    _Recipe(
+        "stick_slip",
+        "Sticking and slipping: force over displacement",
+        "Traction force over the displacement of the sole for one trial per class of "
+        "terrain; slips are shaded.",
+        draw_stick_slip,
+        captions_beyond.say_stick_slip,
+    ),
+    _Recipe(
+        "timing",
+        "Period of the loop and age of the force samples",
+        "Histograms over all cycles, logarithmic counts: left the period, right how "
+        "much later the joints are than the force sample.",
+        draw_timing,
+        captions_beyond.say_timing,
+        Section.HEALTH,
+    ),
+    _Recipe(
+        "rig",
+        "Tare, joint 7, temperatures and load, trial by trial",
+        "Four panels with one dot per trial: change of tare to the next trial, motion "
+        "of the locked joint, warmest puck or motor, load above what was set.",
+        draw_rig,
+        captions_beyond.say_rig,
+        Section.HEALTH,
     ),
 )

@@ -16,6 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.confusion import Confusion, confusion_of
+from analysis.jobs import run_tasks
 from analysis.metrics import Prediction
 from analysis.models import GP_SE
 from analysis.prepare import PreparedTrial
@@ -158,26 +160,6 @@ def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> Scores:
 
 
 @dataclass(frozen=True, slots=True)
-class Confusion:
-    """How often a window of one kind was taken for which.
-
-    Attributes:
-        names: kinds, m of them.
-        counts: windows, rows the truth, columns the answer, shape (m, m).
-    """
-
-    names: tuple[str, ...]
-    counts: np.ndarray
-
-    @property
-    def accuracy(self) -> float:
-        """Mean over the kinds of the share that was recognised."""
-        totals = self.counts.sum(axis=1)
-        present = totals > 0
-        return float((self.counts.diagonal()[present] / totals[present]).mean())
-
-
-@dataclass(frozen=True, slots=True)
 class Identification:
     """How well the terrains of a study can be told apart.
 
@@ -194,6 +176,15 @@ class Identification:
     by_density: Mapping[int, Mapping[str, Confusion]]
     by_error: Mapping[int, Mapping[str, Confusion]]
     limits: Mapping[int, Mapping[str, float]]
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Sizes that at least one trial has a window of."""
+        return tuple(
+            size
+            for size, levels in self.by_density.items()
+            if levels["terrain"].counts.any()
+        )
 
 
 def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
@@ -217,10 +208,10 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
         ]
         density[size], error[size] = {}, {}
         for level, kind in LEVELS.items():
-            density[size][level] = _confusion(
+            density[size][level] = confusion_of(
                 [(kind(t), s.likeliest_kind(r, kind)) for t, s, r in windows]
             )
-            error[size][level] = _confusion(
+            error[size][level] = confusion_of(
                 [(kind(t), kind(s.least_error(r))) for t, s, r in windows]
             )
         limits[size] = {name: own_limit(scored[name], name, size) for name in names}
@@ -269,20 +260,27 @@ def _score_folds(
             if model in fold.models:
                 found = experts.setdefault(fold.fold, {})
                 found[name] = Expert(fold.models[model].model.predict, rho[name])
+    tasks = [
+        ScoreTask(trial, experts[k])
+        for name, result in study.terrains.items()
+        for k, trial in enumerate(result.trials)
+        if name in experts.get(k, {}) and len(experts[k]) > 1 and trial.kept
+    ]
     scored: dict[str, list[Scores]] = {}
-    for name, result in study.terrains.items():
-        for k, trial in enumerate(result.trials):
-            known = experts.get(k, {})
-            if name in known and len(known) > 1 and trial.kept:
-                scored.setdefault(name, []).append(score_trial(trial, known))
+    done = run_tasks(run_score, tasks, study.options.n_jobs)
+    for task, scores in zip(tasks, done, strict=True):
+        scored.setdefault(task.trial.terrain, []).append(scores)
     return scored
 
 
-def _confusion(pairs: Sequence[tuple[str, str]]) -> Confusion:
-    names = tuple(
-        dict.fromkeys(name for pair in zip(*pairs, strict=True) for name in pair)
-    )
-    counts = np.zeros((len(names), len(names)), np.int64)
-    for truth, answer in pairs:
-        counts[names.index(truth), names.index(answer)] += 1
-    return Confusion(names, counts)
+@dataclass(frozen=True, slots=True)
+class ScoreTask:
+    """A trial and the experts that score it."""
+
+    trial: PreparedTrial
+    experts: Mapping[str, Expert]
+
+
+def run_score(task: ScoreTask) -> Scores:
+    """Return how the trial fits what every expert expects."""
+    return score_trial(task.trial, task.experts)

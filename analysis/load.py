@@ -6,6 +6,7 @@ the file carries, so a better calibration can be applied years later.
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +18,12 @@ from analysis.prepare import foot_velocity
 from analysis.series import TractionSeries
 from ft_sensor.calibration_file import payload_from_toml, terrain_from_toml
 from ft_sensor.payload import Payload, TerrainFrame, traction
-from wam.constants import Body, load_constants
+from wam.constants import ArmConstants, Body, load_constants
 from wam.model import ArmModel
 from wam.tool import Tool
 
 Array = NDArray[np.float64]
+Frame = Literal["terrain", "sole"]
 _LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
 _LONGEST_NUMBER = 20  # digits of 64 bits
 
@@ -37,12 +39,15 @@ class RecordedTrial:
         cycles: records of traction_msgs/Cycle, shape (n,).
         t: time since the first cycle [s], shape (n,).
         sole: centre of the sole in the base frame [m], shape (n, 3).
+        rotation: foot to base, z out of the arm, shape (n, 3, 3).
         velocity: its velocity in the base frame [m/s], shape (n, 3); NaN beside gaps.
         force: of the ground on the foot in the base frame [N], shape (n, 3).
         traction: v_t [m/s], F_t [N], F_n [N] in the terrain frame, shape (n, 3).
         lateral: force along y_T [N], shape (n,).
         frame: where the container stood.
         payload: calibration and tare that were applied.
+        constants: the arm model that was applied.
+        sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
     """
 
     path: Path
@@ -51,12 +56,15 @@ class RecordedTrial:
     cycles: Record
     t: Array
     sole: Array
+    rotation: Array
     velocity: Array
     force: Array
     traction: Array
     lateral: Array
     frame: TerrainFrame
     payload: Payload
+    constants: ArmConstants
+    sole_point: Array
 
     @property
     def name(self) -> str:
@@ -79,16 +87,26 @@ class RecordedTrial:
         """Distance of the sole from the far end along x_T [m], shape (n,)."""
         return self.frame.displacement(self.sole)
 
-    def series(self) -> TractionSeries:
-        """Return the trial as the models want it."""
-        return TractionSeries(
-            self.terrain,
-            self.name,
-            self.t,
-            self.traction[:, 0],
-            self.traction[:, 2],
-            self.traction[:, 1],
-        )
+    def series(self, frame: Frame = "terrain") -> TractionSeries:
+        """Return the trial as the models want it.
+
+        Args:
+            frame: "terrain" projects on the plane of the container, "sole" on the sole
+                as it was tilted in each cycle: the normal is against joint 7's axis,
+                slip is along what x_T leaves in the sole.
+        """
+        v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
+        return TractionSeries(self.terrain, self.name, self.t, v_t, F_n, F_t)
+
+    def _on_sole(self) -> Array:
+        """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""
+        normal = -self.rotation[:, :, 2]
+        x_T = self.frame.axes()[0]
+        along = x_T - (normal @ x_T)[:, None] * normal
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        v_t = np.einsum("ni,ni->n", self.velocity, along)
+        F_t = -np.einsum("ni,ni->n", self.force, along)
+        return np.column_stack([v_t, F_t, np.einsum("ni,ni->n", self.force, normal)])
 
 
 def load_trial(path: Path) -> RecordedTrial:
@@ -127,12 +145,15 @@ def load_trial(path: Path) -> RecordedTrial:
         cycles=cycles,
         t=t,
         sole=path_of_sole.position,
+        rotation=path_of_sole.rotation,
         velocity=velocity,
         force=force,
         traction=traction(axes, velocity, force),
         lateral=force @ axes[1],
         frame=frame,
         payload=payload,
+        constants=constants,
+        sole_point=np.asarray(sole_point, dtype=np.float64),
     )
     try:
         trial.series()

@@ -242,3 +242,17 @@ BEYOND: Mapping[str, Fitter] = {
     GP_SE_NOISE: _fit_with_chosen_noise,
     GP_SE_ALL: _fit_all_samples,
 }
+
+
+def fit_model(name: str, training: Training, options: FitOptions) -> FittedModel:
+    """Return the model `name` fitted to the training rows.
+
+    Raises:
+        SettingsError: no such model, or rows that it cannot be fitted to.
+    """
+    fit = FITTERS.get(name) or BEYOND.get(name)
+    if fit is None:
+        raise SettingsError(
+            f"There is no model {name!r}.", hint=f"The models are {', '.join(TITLES)}."
+        )
+    return fit(training, options)

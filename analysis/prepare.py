@@ -113,6 +113,7 @@ class PreparedTrial:
         travel: distance along the slip direction [m].
         is_countable: enough kept samples and, where the container is known, travel.
         dropped_rows: rows that were not finite in the record.
+        repeated_rows: rows of the record that were there twice.
     """
 
     terrain: str
@@ -126,6 +127,7 @@ class PreparedTrial:
     travel: float
     is_countable: bool
     dropped_rows: int
+    repeated_rows: int
 
     @property
     def kept(self) -> int:
@@ -193,6 +195,7 @@ def prepare(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
         travel=travel,
         is_countable=_is_countable(indices.size, travel, options.container_travel),
         dropped_rows=series.dropped_rows,
+        repeated_rows=series.repeated_rows,
     )
 
 

@@ -5,27 +5,39 @@ The one door to jinja2.
 
 import base64
 import json
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.files import write_atomic
-from analysis.fits import to_csv, to_fits
-from analysis.gallery import Exhibit, exhibits
+from analysis.findings import Findings, find, findings_rows, plain_findings
+from analysis.fits import to_csv, to_fits, to_plain
+from analysis.gallery import exhibits
+from analysis.jobs import available_cores
+from analysis.report_beyond import beyond_tables
 from analysis.report_content import (
-    ReportTable,
     choices,
-    quality,
+    parameters,
     summary,
     table_one,
     velocity_shares,
     verdicts,
 )
+from analysis.rig_content import rig_tables
+from analysis.rig_health import RigTrial
+from analysis.sections import Exhibit, ReportTable, Section
 from analysis.study import Study
 
 __all__ = ["ReportContext", "ReportTable", "write_report"]
+
+_MOST_DRAWING = 4  # processes
+_MANY_TERRAINS = 4  # from which on they pay
+_NO_RIG = (
+    "The tables do not tell how the rig behaved: its health and its limits are unknown."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +50,10 @@ class ReportContext:
         is_simulated: the trials were simulated; marks the page.
         is_foreign: the tables come from elsewhere, not from this rig.
         generated_utc: when the report was made, as text.
-        tables: further sections.
+        tables: further tables, each for its section.
         warnings: further warnings, shown first.
+        rig: health of the rig by trial.
+        facts: further plain values for fits.json, by name.
     """
 
     title: str
@@ -49,6 +63,8 @@ class ReportContext:
     generated_utc: str
     tables: Sequence[ReportTable] = field(default=())
     warnings: Sequence[str] = field(default=())
+    rig: Sequence[RigTrial] = field(default=())
+    facts: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -56,6 +72,23 @@ class ReportContext:
         if self.is_simulated:
             return "SIMULATED"
         return "FOREIGN" if self.is_foreign else "LIVE"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One section of the page with everything in it.
+
+    Attributes:
+        section: which one.
+        sentences: what it says first.
+        tables: its tables, before the figures.
+        exhibits: its figures.
+    """
+
+    section: Section
+    sentences: Sequence[str]
+    tables: Sequence[ReportTable]
+    exhibits: Sequence[Exhibit]
 
 
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
@@ -67,20 +100,40 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    fits = json.dumps(to_fits(study), allow_nan=False, indent=1)
+    found = find(study, context.rig)
+    fits = json.dumps(all_numbers(found, context), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
-    write_atomic(out_dir / "fits.csv", to_csv(study).encode())
-    shown = exhibits(study)
+    table = to_csv(study, findings_rows(found))
+    write_atomic(out_dir / "fits.csv", table.encode())
+    shown = exhibits(found, _processes(study))
     for exhibit in shown:
         picture = exhibit.picture
         write_atomic(out_dir / "figures" / f"{picture.key}.png", picture.png)
         write_atomic(out_dir / "figures" / f"{picture.key}.pdf", picture.pdf)
     page = out_dir / "report" / "index.html"
-    write_atomic(page, render_page(study, shown, context).encode())
+    write_atomic(page, render_page(found, shown, context).encode())
     return page
 
 
-def render_page(study: Study, shown: Sequence[Exhibit], context: ReportContext) -> str:
+def _processes(study: Study) -> int:
+    """Return how many processes draw; few panels cost less than starting one."""
+    if len(study.terrains) < _MANY_TERRAINS:
+        return 1
+    return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)
+
+
+def all_numbers(found: Findings, context: ReportContext) -> dict[str, Any]:
+    """Return everything that the report shows as plain values, for fits.json."""
+    tables = [
+        asdict(table) | {"section": table.section.value} for table in context.tables
+    ]
+    further = {"findings": plain_findings(found), "tables": tables, **context.facts}
+    return to_fits(found.study) | to_plain(further)
+
+
+def render_page(
+    found: Findings, shown: Sequence[Exhibit], context: ReportContext
+) -> str:
     """Return the page as HTML; every text is escaped, every picture embedded."""
     environment = Environment(
         loader=PackageLoader("analysis"),
@@ -90,18 +143,38 @@ def render_page(study: Study, shown: Sequence[Exhibit], context: ReportContext) 
         lstrip_blocks=True,
     )
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
+    environment.filters["unbroken"] = lambda text: text.replace(" ± ", "\u00a0±\u00a0")
+    study = found.study
     return environment.get_template("report.html.j2").render(
         context=context,
-        summary=summary(study),
-        verdicts=verdicts(study),
-        table_one=table_one(study),
-        exhibits=shown,
-        tables=[
-            quality(study),
-            velocity_shares(study),
-            choices(study, is_foreign=context.is_foreign),
-            *context.tables,
-        ],
+        parts=parts(found, shown, context),
         warnings=[*context.warnings, *study.warnings],
-        notes=study.notes,
+        notes=[*study.notes, *([] if context.rig else [_NO_RIG])],
     )
+
+
+def parts(
+    found: Findings, shown: Sequence[Exhibit], context: ReportContext
+) -> list[Part]:
+    """Return the sections that have something to show, in the order of the page."""
+    study = found.study
+    tables = [
+        summary(study),
+        parameters(study),
+        table_one(study),
+        *beyond_tables(found),
+        velocity_shares(study),
+        *rig_tables(found),
+        choices(study, is_foreign=context.is_foreign),
+        *context.tables,
+    ]
+    every = [
+        Part(
+            section,
+            verdicts(study) if section is Section.SUMMARY else (),
+            [table for table in tables if table.section is section],
+            [exhibit for exhibit in shown if exhibit.section is section],
+        )
+        for section in Section
+    ]
+    return [part for part in every if part.tables or part.exhibits]

@@ -1,10 +1,10 @@
 """What the report says in words and tables, before any markup."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from analysis.fits import flag_counts, tustin_medians
 from analysis.models import FITTERS, TITLES, TUSTIN
+from analysis.sections import ReportTable, Section
 from analysis.study import LIFTED_WARNING, Study, TerrainResult
 from analysis.tustin import (
     MINIMUM_ROWS,
@@ -27,27 +27,10 @@ PAPER = {
 _SYMBOLS = {"mu": "μ", "F_s": "F_s", "v_s": "v_s", "delta_s": "δ_s", "b": "b"}
 
 
-@dataclass(frozen=True, slots=True)
-class ReportTable:
-    """A table of the report.
-
-    Attributes:
-        name: its heading.
-        header: names of the columns, with units.
-        rows: cells as text, each row as long as the header.
-        note: a remark below it; empty for none.
-    """
-
-    name: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    note: str = ""
-
-
 def summary(study: Study) -> ReportTable:
     """Return one line per terrain: how much was recorded, how well it is predicted."""
     return ReportTable(
-        name="Summary",
+        name="Samples and errors",
         header=(
             "terrain",
             "trials",
@@ -62,6 +45,35 @@ def summary(study: Study) -> ReportTable:
         "over trials ± its standard error. Constant: always the median F_t of the "
         "other trials. F_n ≤ 0: share of the kept samples with the foot off the "
         f"ground or the tare wrong; above {LIFTED_WARNING:.0%} is a warning.",
+        section=Section.SUMMARY,
+    )
+
+
+def parameters(study: Study) -> ReportTable:
+    """Return the Tustin fit of all trials of each terrain with its intervals."""
+    rows = []
+    for name, result in study.terrains.items():
+        whole = result.whole
+        if whole.fit is None:
+            rows.append([name, *["–"] * len(UNITS), "no fit"])
+            continue
+        cells = []
+        for key in UNITS:
+            cell = f"{getattr(whole.fit.parameters, key):.3g}"
+            if key in whole.intervals:
+                low, high = whole.intervals[key]
+                cell += f" ({low:.3g} to {high:.3g})"
+            cells.append(cell)
+        rows.append([name, *cells, "; ".join(whole.fit.flags) or "none"])
+    units = [f"{_SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
+    return ReportTable(
+        name="Tustin parameters of all trials, with 95% intervals",
+        header=("terrain", *units, "flags"),
+        rows=rows,
+        note="Intervals from whole trials drawn with replacement: samples of one trial "
+        "repeat each other. A wide interval means that the curve is known, not the "
+        "parameter.",
+        section=Section.SUMMARY,
     )
 
 
@@ -97,41 +109,7 @@ def table_one(study: Study) -> ReportTable:
         rows=rows,
         note="Medians over the folds, parameter by parameter, so a row is not one "
         "coherent fit; all predictions come from the coherent fits. " + _flag_legend(),
-    )
-
-
-def quality(study: Study) -> ReportTable:
-    """Return how honest the predicted uncertainties were."""
-    rows = []
-    for name, result in study.terrains.items():
-        for model in FITTERS:
-            scores = [fold.score for fold in result.models(model)]
-            if scores:
-                means = [
-                    sum(column) / len(scores) for column in zip(*scores, strict=True)
-                ]
-                _, rmse, coverage, variance, *_ = means
-                rows.append(
-                    [
-                        name,
-                        TITLES[model],
-                        f"{rmse:.3f}",
-                        f"{coverage:.1%}",
-                        f"{variance:.3g}",
-                    ]
-                )
-    return ReportTable(
-        name="Predicted uncertainty",
-        header=(
-            "terrain",
-            "model",
-            "RMSE [N]",
-            "inside the 95% band",
-            "variance [N²]",
-        ),
-        rows=rows,
-        note="Means over the folds. The variance is that of a measurement, noise "
-        "included; a band that holds much less than 95% is too narrow.",
+        section=Section.PAPER,
     )
 
 
@@ -152,6 +130,7 @@ def velocity_shares(study: Study) -> ReportTable:
         rows=rows,
         note="Means over trials. Only the window is fitted and tested; the last column "
         "is its share of the samples that move.",
+        section=Section.BEYOND,
     )
 
 
@@ -173,6 +152,11 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
             f"squared exponential, one length per input, at most {fit.gp_points} "
             f"samples chosen at random (seed {fit.seed}), marginal likelihood, three "
             "starts",
+        ],
+        [
+            "noise of the GP",
+            "constant in the five models of Fig. 9; beside them chosen per fold among "
+            "constant, log-linear and Student's t, by trials left out of the training",
         ],
         ["across terrains", "the model of fold k tested on trial k, wrapping round"],
         ["recorded rate", _rates(study)],

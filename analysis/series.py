@@ -19,8 +19,9 @@ _COLUMNS = ("t", "v_t", "F_n", "F_t")
 class TractionSeries:
     """One trial at the recorded rate, neither smoothed nor windowed.
 
-    Rows with a value that is not finite are dropped at construction and counted; the
-    arrays are then read-only copies, all of one shape (n,).
+    Rows with a value that is not finite, and rows that repeat the one before in all
+    columns, are dropped at construction and counted; the arrays are then read-only
+    copies, all of one shape (n,).
 
     Attributes:
         terrain: name of the terrain, e.g. "S10".
@@ -30,6 +31,7 @@ class TractionSeries:
         F_n: normal force [N], > 0 in compression.
         F_t: traction force [N], > 0 in slip.
         dropped_rows: number of rows that were not finite.
+        repeated_rows: number of rows that were there twice.
 
     Raises:
         SettingsError: the arrays differ in length, too few rows are finite, time does
@@ -43,25 +45,31 @@ class TractionSeries:
     F_n: Array
     F_t: Array
     dropped_rows: int = field(init=False)
+    repeated_rows: int = field(init=False)
 
     def __post_init__(self) -> None:
         _check_name(self.terrain, self.name)
         columns = [np.asarray(getattr(self, key), dtype=np.float64) for key in _COLUMNS]
         _check_shapes(columns, self.name)
-        is_finite = np.logical_and.reduce([np.isfinite(column) for column in columns])
-        if np.count_nonzero(is_finite) < MINIMUM_SAMPLES:
+        table = np.column_stack(columns)
+        is_finite = np.isfinite(table).all(axis=1)
+        finite = table[is_finite]
+        is_new = np.ones(len(finite), dtype=bool)
+        is_new[1:] = (finite[1:] != finite[:-1]).any(axis=1)
+        if np.count_nonzero(is_new) < MINIMUM_SAMPLES:
             raise SettingsError(
-                f"{self.name}: {np.count_nonzero(is_finite)} finite rows of "
+                f"{self.name}: {np.count_nonzero(is_new)} finite rows of "
                 f"{is_finite.size}, at least {MINIMUM_SAMPLES} are needed.",
                 hint="Check that the file is complete.",
             )
-        for key, column in zip(_COLUMNS, columns, strict=True):
-            kept = column[is_finite]
+        for key, column in zip(_COLUMNS, finite[is_new].T, strict=True):
+            kept = np.ascontiguousarray(column)
             kept.setflags(write=False)
             object.__setattr__(self, key, kept)
-        object.__setattr__(
-            self, "dropped_rows", int(is_finite.size - np.count_nonzero(is_finite))
-        )
+        dropped = int(is_finite.size - np.count_nonzero(is_finite))
+        object.__setattr__(self, "dropped_rows", dropped)
+        repeated = int(is_new.size - np.count_nonzero(is_new))
+        object.__setattr__(self, "repeated_rows", repeated)
         _check_time(self.t, self.name)
 
     @property

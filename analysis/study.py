@@ -64,9 +64,13 @@ class TerrainResult:
                 values[fold.fold] = measure(fold.models[model])
         return values
 
+    def scores(self, model: str, key: str) -> list[float | None]:
+        """Return the measure `key` of a model on every trial, None where missing."""
+        return self.per_trial(model, lambda fold: getattr(fold.score, key))
+
     def maes(self, model: str) -> list[float | None]:
         """Return the mean absolute error [N] on every trial, left out in turn."""
-        return self.per_trial(model, lambda fold: fold.score.mae)
+        return self.scores(model, "mae")
 
     def mae(self, model: str) -> float | None:
         """Return the mean over folds of the mean absolute error [N]."""
@@ -138,7 +142,7 @@ def run_study(
         trials: recorded trials by terrain.
         options: every choice.
         simulated: the trials were simulated; marks every product.
-        progress: called with (folds done, folds in all).
+        progress: called with (fits done, fits in all): folds, then whole terrains.
         store: results of earlier runs, so that an interrupted study resumes.
 
     Raises:
@@ -151,9 +155,13 @@ def run_study(
         for terrain, recorded in trials.items()
     }
     tasks, notes = plan_folds(prepared, options.fit)
-    workers = Workers(options.n_jobs, options.scheduler)
-    folds = run_tasks(run_fold, tasks, workers, progress, store)
-    wholes = run_tasks(fit_terrain, _wholes(prepared, options), workers, store=store)
+    workers, whole_tasks = (
+        Workers(options.n_jobs, options.scheduler),
+        _wholes(prepared, options),
+    )
+    first, second = _in_turn(progress, len(tasks), len(whole_tasks))
+    folds = run_tasks(run_fold, tasks, workers, first, store)
+    wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
     notes += [note for fold in folds for note in fold.notes]
     results = {
         terrain: TerrainResult(
@@ -171,6 +179,19 @@ def run_study(
         for warning in _warnings(result, options.prepare.container_travel is not None)
     )
     return Study(simulated, options, results, tuple(notes), warnings)
+
+
+def _in_turn(
+    progress: Progress | None, first: int, second: int
+) -> tuple[Progress | None, Progress | None]:
+    """Return one progress as that of two runs of tasks, one after the other."""
+    if progress is None:
+        return None, None
+    total = first + second
+    return (
+        lambda done, _: progress(done, total),
+        lambda done, _: progress(first + done, total),
+    )
 
 
 def _wholes(
@@ -212,6 +233,9 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     dropped = sum(trial.dropped_rows for trial in result.trials)
     if dropped:
         warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
+    repeated = sum(trial.repeated_rows for trial in result.trials)
+    if repeated:
+        warnings.append(f"{result.terrain}: {repeated} rows were there twice; dropped.")
     constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
     if constant:
         warnings.append(

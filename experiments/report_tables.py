@@ -1,64 +1,34 @@
-"""What a report says of sessions and rig, beyond the models."""
+"""What a report says of sessions, settings and provenance, beyond the models."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import cast
 
-import numpy as np
-
-from analysis.identify import LEVELS, WINDOWS, identify_study
 from analysis.load import RecordedTrial
-from analysis.report import ReportTable
-from analysis.study import Study
-from experiments.store import SessionFolder
-from experiments.truth import truth_errors
+from analysis.sections import ReportTable, Section
+from experiments.store import SessionFolder, read_json
 
-_KEPT_PER_SECOND = 100
+_ROW = (
+    ("incline_deg", "incline [°]"),
+    ("stone_size", "stones"),
+    ("tread", "tread"),
+    ("effective_mass_kg", "virtual mass [kg]"),
+    ("foot_mass_kg", "foot [kg]"),
+    ("gravity_model", "gravity"),
+)
 
 
 def report_tables(
-    sessions: Sequence[SessionFolder], trials: dict[str, list[RecordedTrial]]
+    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[RecordedTrial]]
 ) -> list[ReportTable]:
-    """Return sessions, rejected trials, rig health, truth and provenance."""
+    """Return sessions, rejected trials, preflight, settings, provenance and files."""
     every = [trial for group in trials.values() for trial in group]
-    tables = [_session_table(sessions), _rejected_table(sessions), _health(every)]
-    truth = _truth_table(every)
-    return [*tables, *([truth] if truth else []), _provenance(every)]
-
-
-def identification_tables(study: Study) -> list[ReportTable]:
-    """Return how well windows of motion tell the terrains apart; none for one."""
-    found = identify_study(study)
-    if found is None:
-        return []
-    shares = [
-        (
-            f"{size / _KEPT_PER_SECOND:g} s",
-            *(f"{found.by_density[size][level].accuracy:.2f}" for level in LEVELS),
-            *(f"{found.by_error[size][level].accuracy:.2f}" for level in LEVELS),
-        )
-        for size in WINDOWS
-    ]
-    confusion = found.by_density[100]["terrain"]
-    counts = [
-        (name, *map(str, row))
-        for name, row in zip(confusion.names, confusion.counts.tolist(), strict=True)
-    ]
     return [
-        ReportTable(
-            "Telling terrains apart",
-            (
-                "window",
-                *(f"by density: {level}" for level in LEVELS),
-                *(f"by error: {level}" for level in LEVELS),
-            ),
-            shares,
-            note="Share of windows recognised by models that never saw the trial, mean "
-            "over kinds. By error: the model with the smallest mean absolute error.",
-        ),
-        ReportTable(
-            "Windows of 1 s: from (rows), taken for (columns)",
-            ("", *confusion.names),
-            counts,
-        ),
+        _session_table(sessions),
+        _rejected_table(sessions),
+        _preflight_table(sessions),
+        _matrix_table(trials),
+        _provenance(every),
+        _files(sessions),
     ]
 
 
@@ -68,13 +38,17 @@ def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
             s.id,
             s.terrain,
             s.path.name[:10],
-            str(len(s.kept_trials())),
+            "SIMULATED" if s.is_simulated else "LIVE",
+            str(len(list(s.trials.glob("T??.mcap")))),
             str(len(s.rejected_sidecars())),
         )
         for s in sessions
     ]
     return ReportTable(
-        "Sessions", ("session", "terrain", "date", "kept", "rejected"), rows
+        "Sessions",
+        ("session", "terrain", "date", "kind", "kept", "rejected"),
+        rows,
+        section=Section.SUMMARY,
     )
 
 
@@ -92,69 +66,49 @@ def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
         for facts in s.rejected_sidecars()
     ]
     return ReportTable(
-        "Rejected and interrupted trials",
+        "Acceptance: rejected and interrupted trials",
         ("session", "trial", "status", "reason", "who", "when (UTC)"),
         rows,
         note="" if rows else "None: every recorded trial was kept.",
+        section=Section.HEALTH,
     )
 
 
-def _health(trials: Sequence[RecordedTrial]) -> ReportTable:
-    rows: list[tuple[str, ...]] = []
-    for trial in trials:
-        gaps = np.diff(trial.t) * 1e3
-        q7 = trial.cycles["position"][:, 6]
-        age = (trial.cycles["host_ns"] - trial.cycles["ft_ns"]).astype(float) * 1e-6
-        moving = np.abs(trial.traction[:, 0]) > 0.005
-        ratio = np.abs(trial.lateral[moving]).mean() if moving.any() else np.nan
-        rows.append(
-            (
-                f"{trial.terrain} {trial.name}",
-                f"{np.median(gaps):.3f}",
-                f"{gaps.max():.2f}",
-                trial.metadata["result"]["cycles_missed"],
-                f"{np.median(age):.2f}",
-                f"{np.abs(q7 - q7[0]).max() * 1e3:.1f}",
-                f"{ratio:.2f}",
-            )
-        )
+def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+    said: dict[tuple[str, ...], list[str]] = {}
+    for session in sessions:
+        checks = read_json(session.path / "preflight.json").get("checks", [])
+        for check in cast("list[object]", checks) if isinstance(checks, list) else []:
+            if isinstance(check, dict):
+                facts = cast("dict[str, object]", check)
+                found = tuple(str(facts.get(k, "")) for k in ("name", "mark", "text"))
+                said.setdefault(found, []).append(session.id)
     return ReportTable(
-        "Rig health",
+        "Checks before the sessions",
+        ("check", "", "found", "sessions"),
+        [(*found, ", ".join(ids)) for found, ids in sorted(said.items())],
+        section=Section.HEALTH,
+    )
+
+
+def _matrix_table(trials: Mapping[str, Sequence[RecordedTrial]]) -> ReportTable:
+    rows = [
         (
-            "trial",
-            "period, median (ms)",
-            "longest gap (ms)",
-            "missed",
-            "F/T age, median (ms)",
-            "joint 7 (mrad)",
-            "mean |F_y| while moving (N)",
-        ),
-        rows,
-    )
-
-
-def _truth_table(trials: Sequence[RecordedTrial]) -> ReportTable | None:
-    """Return measured against true for simulated trials with a truth file."""
-    rows: list[tuple[str, ...]] = []
-    for trial in trials:
-        error = truth_errors(trial)
-        if error is None:
-            continue
-        rows.append(
-            (
-                f"{trial.terrain} {trial.name}",
-                f"{error.v_t * 1e3:.2f}",
-                f"{error.F_t:.2f}",
-                f"{error.F_n:.2f}",
-            )
+            name,
+            *(
+                " | ".join(
+                    sorted({trial.metadata["trial"].get(key, "?") for trial in group})
+                )
+                for key, _ in _ROW
+            ),
+            " | ".join(sorted({f"{trial.frame.travel:g}" for trial in group})),
         )
-    if not rows:
-        return None
+        for name, group in trials.items()
+    ]
     return ReportTable(
-        "Measured against true",
-        ("trial", "v_t, rms (mm/s)", "F_t, mean |error| (N)", "F_n, mean |error| (N)"),
+        "Settings of the terrains",
+        ("terrain", *(head for _, head in _ROW), "travel [m]"),
         rows,
-        note="Simulated trials only; after the same smoothing on both.",
     )
 
 
@@ -162,7 +116,30 @@ def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
     facts: dict[str, set[str]] = {}
     for trial in trials:
         for key, value in trial.metadata["provenance"].items():
-            if not key.startswith("sha256:"):
-                facts.setdefault(key, set()).add(value)
-    rows = [(key, " | ".join(sorted(values))) for key, values in facts.items()]
-    return ReportTable("Provenance", ("what", "value"), rows)
+            facts.setdefault(key, set()).add(value)
+    rows = [(key, _few(values)) for key, values in facts.items()]
+    return ReportTable(
+        "Provenance",
+        ("what", "value"),
+        rows,
+        note="As recorded in the trials: code, packages, machine, firmware, and the "
+        "checksums of the settings that every trial file contains.",
+    )
+
+
+def _few(values: set[str]) -> str:
+    """Return the values in order; many, as of checksums per trial, are counted."""
+    if len(values) <= 3:
+        return " | ".join(sorted(values))
+    return f"{len(values)} different values, in the trial files"
+
+
+def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
+    rows: list[tuple[str, str, str]] = []
+    for session in sessions:
+        for path in sorted(session.trials.glob("T*.json")):
+            facts = read_json(path)
+            name = f"{session.path.name}/trials/{path.stem}.mcap"
+            digest, size = (str(facts.get(key, "?")) for key in ("sha256", "size"))
+            rows.append((name, size, digest))
+    return ReportTable("Trial files", ("file", "bytes", "SHA-256"), rows)

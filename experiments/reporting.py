@@ -1,6 +1,7 @@
 """From sessions to a report: which trials, what is said about them."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -8,14 +9,19 @@ from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
 from analysis.identify import identify_study
 from analysis.load import RecordedTrial, load_trial
-from analysis.models import GP_SE, FitOptions
+from analysis.models import FITTERS, GP_SE, GP_SE_NOISE, FitOptions
 from analysis.prepare import PrepareOptions
 from analysis.report import ReportContext, write_report
 from analysis.results import ResultStore
+from analysis.rig_health import rig_health
 from analysis.study import Study, StudyOptions, run_study
 from analysis.terrain_export import database_of
+from analysis.what_if import Choice, plain_choice, side_by_side
 from experiments.console import Console
-from experiments.report_tables import identification_tables, report_tables
+from experiments.messages import CATALOGUE
+from experiments.progress import ProgressLine
+from experiments.report_tables import report_tables
+from experiments.report_truth import truth_tables
 from experiments.store import (
     SessionFolder,
     find_session,
@@ -25,6 +31,7 @@ from experiments.store import (
 )
 
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
+REPORTED = (*FITTERS, GP_SE_NOISE)  # the models of a report: Fig. 9, and chosen noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +42,13 @@ class Order:
         terrains: names in the matrix's order.
         seed: seed of the points of the Gaussian processes.
         scheduler: address of a Dask scheduler to fit on; None for this machine.
+        choices: what the study is repeated under.
     """
 
     terrains: Sequence[str]
     seed: int
     scheduler: str | None = None
+    choices: Sequence[Choice] = ()
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -71,9 +80,9 @@ def choose_sessions(
         )
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
+        message, facts = CATALOGUE["mixed"], {"session": simulated[0].id}
         raise SessionError(
-            f"{simulated[0].id} is simulated. Reports do not mix: name sessions of one "
-            "kind."
+            message.what.format_map(facts), hint=message.do.format_map(facts)
         )
     return sessions
 
@@ -146,9 +155,35 @@ def study_sessions(
         scheduler=order.scheduler,
     )
     series = {name: [t.series() for t in group] for name, group in trials.items()}
-    store = ResultStore(data / FOLDS)
-    study = run_study(series, options, simulated=is_simulated, store=store)
+    with fitting(console) as progress:
+        study = run_study(
+            series, options, is_simulated, progress, ResultStore(data / FOLDS)
+        )
     return Studied(study, trials, problems)
+
+
+@contextmanager
+def fitting(console: Console) -> Generator[ProgressLine]:
+    """Show the progress of the fits inside the block."""
+    progress = ProgressLine(console, SystemClock(), "fits")
+    try:
+        yield progress
+    finally:
+        progress.end()
+
+
+def repeated(done: Studied, choice: Choice, data: Path, console: Console) -> Study:
+    """Return the study once more under a choice."""
+    console.say(f"What if {choice.text}: fitting ...")
+    series = {
+        name: [t.series(choice.frame) for t in group]
+        for name, group in done.trials.items()
+    }
+    options = choice.options(done.study.options)
+    with fitting(console) as progress:
+        return run_study(
+            series, options, done.study.simulated, progress, ResultStore(data / FOLDS)
+        )
 
 
 def export_terrains(
@@ -188,9 +223,10 @@ def report_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    fit = FitOptions(seed=order.seed)
+    fit = FitOptions(seed=order.seed, models=REPORTED)
     done = study_sessions(sessions, data, order, console, fit)
     study, trials = done.study, done.trials
+    others = [(c, repeated(done, c, data, console)) for c in order.choices]
     count = sum(len(group) for group in trials.values())
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
@@ -199,7 +235,13 @@ def report_sessions(
         is_simulated=study.simulated,
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
-        tables=[*identification_tables(study), *report_tables(sessions, trials)],
+        tables=[
+            *(side_by_side(choice, study, other) for choice, other in others),
+            *truth_tables(study, trials),
+            *report_tables(sessions, trials),
+        ],
+        facts={"what_if": [plain_choice(c, study, other) for c, other in others]},
         warnings=done.problems,
+        rig=rig_health([trial for group in trials.values() for trial in group]),
     )
     return write_report(study, out, context)

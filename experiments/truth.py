@@ -1,6 +1,7 @@
 """What was measured beside what was true, in simulated trials."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from analysis.prepare import moving_average
 
 _FEWEST = 50  # cycles, or a truth file is none of this trial
 _WIDTH = 11  # of the moving average, as the models see the trial
+_PREFIX = "true:"  # of the parameters in a truth file
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,11 +24,13 @@ class TruthErrors:
         v_t: root mean square [m/s].
         F_t: mean absolute [N].
         F_n: mean absolute [N].
+        parameters: of the simulated ground that were in force [SI], by name.
     """
 
     v_t: float
     F_t: float
     F_n: float
+    parameters: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
 def truth_errors(trial: RecordedTrial) -> TruthErrors | None:
@@ -35,7 +39,8 @@ def truth_errors(trial: RecordedTrial) -> TruthErrors | None:
     if not path.exists():
         return None
     try:
-        truth = TrialReader(path).truth().data
+        reader = TrialReader(path)
+        truth = reader.truth().data
     except TrialFileError:
         return None
     if not len(truth):
@@ -51,7 +56,20 @@ def truth_errors(trial: RecordedTrial) -> TruthErrors | None:
         v_t=float(np.sqrt(np.nanmean(error[:, 0] ** 2))),
         F_t=float(np.nanmean(np.abs(error[:, 1]))),
         F_n=float(np.nanmean(np.abs(error[:, 2]))),
+        parameters=_parameters(reader.metadata.get("trial", {})),
     )
+
+
+def _parameters(facts: Mapping[str, str]) -> dict[str, float]:
+    """Return the true parameters among the facts of a trial; no number, no entry."""
+    found: dict[str, float] = {}
+    for key, text in facts.items():
+        if key.startswith(_PREFIX):
+            try:
+                found[key.removeprefix(_PREFIX)] = float(text)
+            except ValueError:
+                continue
+    return found
 
 
 def _smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -34,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from analysis.study import StudyOptions, run_study
     from analysis.tables import load_tables, parse_columns
     from experiments.console import Console
+    from experiments.reporting import REPORTED, fitting
     from experiments.store import iso_utc
 
     console = Console(color=not args.no_color)
@@ -41,8 +42,10 @@ def run(args: argparse.Namespace) -> int:
     trials = load_tables(args.files, columns, args.terrain)
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-    options = StudyOptions(prepare=PrepareOptions(), fit=FitOptions(seed=args.seed))
-    study = run_study(trials, options, simulated=False)
+    fit = FitOptions(seed=args.seed, models=REPORTED)
+    options = StudyOptions(prepare=PrepareOptions(), fit=fit)
+    with fitting(console) as progress:
+        study = run_study(trials, options, simulated=False, progress=progress)
     context = ReportContext(
         title="Traction of foreign tables",
         subtitle=f"{count} trials from {len(args.files)} files",

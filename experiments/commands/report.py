@@ -7,7 +7,8 @@ from experiments.arguments import add_seed
 
 EXAMPLES = """\
   traction report S012                      one session, into its own folder
-  traction report --all                     the study of all sessions"""
+  traction report --all                     the study of all sessions
+  traction report --all --what-if frame=sole --what-if smoothing=25"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,20 +22,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="fit on the Dask cluster there, e.g. tcp://192.168.1.5:8786",
     )
+    parser.add_argument(
+        "--what-if",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="repeat the study under another choice and show both: smoothing=N, "
+        "window=LOW:HIGH, frame=sole, kernel=as_printed, "
+        "static_friction=proportional; more than once for several",
+    )
     add_seed(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
+    from analysis.what_if import parse_choice
     from experiments.console import Console
     from experiments.reporting import Order, choose_sessions, report_sessions
     from experiments.settings import load_settings
 
+    choices = [parse_choice(text) for text in args.what_if]
     console = Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = Order(order, args.seed, args.scheduler)
+    wanted = Order(order, args.seed, args.scheduler, choices)
     page = report_sessions(sessions, data, wanted, console)
     console.say(str(page))
     return 0

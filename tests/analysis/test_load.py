@@ -1,13 +1,16 @@
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from acquisition.errors import TrialFileError
 from acquisition.messages import CYCLE
+from acquisition.sample import Flag
 from acquisition.trial_file.recover import recover
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from analysis.load import load_trial
+from analysis.rig_health import rig_health
 from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
 from wam.constants import Body, load_constants
@@ -226,3 +229,84 @@ def test_a_truth_file_is_no_trial(tmp_path):
     path.write_bytes(path.read_bytes().replace(b"/cycle", b"/truth"))
     with pytest.raises(TrialFileError):
         load_trial(path)
+
+
+def test_the_soles_own_axes_follow_its_tilt(trial):
+    on_terrain, on_sole = trial.series(), trial.series("sole")
+    normal = -trial.rotation[:, :, 2]
+    assert on_sole.F_n == pytest.approx(normal @ FORCE)
+    along = np.hypot(on_sole.F_n, on_sole.F_t)
+    # both frames share the plane of x_T and the normal but for the tilt across it
+    assert along == pytest.approx(np.hypot(on_terrain.F_n, on_terrain.F_t), rel=0.05)
+    assert np.abs(on_sole.F_t - on_terrain.F_t).max() > 0.01
+
+
+def test_a_level_sole_has_the_terrains_axes(trial):
+    axes = trial.frame.axes()
+    level = np.column_stack([axes[0], -axes[1], -axes[2]])
+    flat = replace(trial, rotation=np.broadcast_to(level, trial.rotation.shape))
+    expected, found = trial.series(), flat.series("sole")
+    assert found.v_t == pytest.approx(expected.v_t, abs=1e-12)
+    assert found.F_t == pytest.approx(expected.F_t, abs=1e-12)
+    assert found.F_n == pytest.approx(expected.F_n, abs=1e-12)
+
+
+def as_left(trial, name="T01", **columns):
+    """Return the trial with other facts and columns, as the rig may have left it."""
+    cycles = trial.cycles.copy()
+    cycles["arm_ns"], cycles["ft_ns"] = cycles["host_ns"], cycles["host_ns"]
+    for key, values in columns.items():
+        cycles[key] = values
+    facts = {"pucks:temperature_degc": "30 31 ? 33", "pucks:motor_temperature_degc": ""}
+    metadata = trial.metadata | {
+        "trial": {"session": "S001", "trial": name, "effective_mass_kg": "0.3"},
+        "provenance": facts,
+    }
+    return replace(trial, cycles=cycles, metadata=metadata)
+
+
+def test_health_tells_age_temperature_and_saturation(trial):
+    host, flags = trial.cycles["host_ns"], np.zeros(trial.t.size, np.uint32)
+    flags[:25] = int(Flag.FT_SATURATED)
+    columns = {"arm_ns": host + 500_000, "ft_ns": host - 1_000_000, "flags": flags}
+    (health,) = rig_health([as_left(trial, **columns)])
+    assert health.skew == pytest.approx((1.5, 1.5, 1.5))
+    assert health.skews.sum() == trial.t.size
+    assert health.puck_degc == (30.0, 31.0, 33.0)
+    assert health.motor_degc == ()
+    assert health.saturated == pytest.approx(0.25)
+    assert health.period == pytest.approx(2.0)
+    assert health.tare == pytest.approx(tuple(trial.payload.bias[:3]))
+
+
+def test_the_load_is_held_against_what_was_set(trial):
+    (health,) = rig_health([as_left(trial)])
+    set_load = 0.3 * 9.81 * np.cos(FRAME.incline)
+    assert health.load_bias == pytest.approx(
+        np.median(trial.traction[:, 2]) - set_load, abs=1e-9
+    )
+
+
+def test_drag_is_the_power_that_friction_takes(trial):
+    one = np.zeros((trial.t.size, 7))
+    one[:, 1] = 0.1
+    (health,) = rig_health([as_left(trial, velocity=one)])
+    power = 0.1 * CONSTANTS.coulomb[1]
+    expected = np.median(power / np.abs(trial.traction[:, 0]))
+    assert health.drag == pytest.approx(expected)
+
+
+def test_a_tare_is_bracketed_by_the_next_of_its_session(trial):
+    after = replace(as_left(trial, "T02"), payload=PAYLOAD.tared(BIAS + 0.3, np.eye(3)))
+    first, second = rig_health([as_left(trial), after])
+    shift = after.payload.bias[:3] - trial.payload.bias[:3]
+    assert first.tare_bracket == pytest.approx(np.linalg.norm(shift))
+    assert second.tare_bracket is None
+
+
+def test_the_largest_traction_follows_from_the_sensors_ranges(trial):
+    told = as_left(trial)
+    told.metadata["provenance"]["ft_sensor:ranges"] = "500 400 1200 15 12 12"
+    # 12 N m over 0.112 m of foot is what gives way first
+    assert rig_health([told])[0].measurable_F_t == pytest.approx(12 / 0.112)
+    assert rig_health([as_left(trial)])[0].measurable_F_t is None

@@ -18,6 +18,17 @@ def test_rows_that_are_not_finite_are_dropped_and_counted():
     assert 0.3 not in series.t.round(6)
 
 
+def test_rows_that_are_there_twice_are_dropped_and_counted():
+    doubled = [np.repeat(column, 2) for column in columns()]
+    series = TractionSeries("S0", "a.csv", *doubled)
+    assert series.repeated_rows == 10
+    assert series.t.tolist() == columns()[0].tolist()
+
+
+def test_a_value_that_stays_is_no_row_twice():
+    assert TractionSeries("S0", "a.csv", *columns()).repeated_rows == 0
+
+
 def test_arrays_of_a_trial_cannot_be_changed():
     series = TractionSeries("S0", "a.csv", *columns())
     with pytest.raises(ValueError, match="read-only"):
@@ -35,6 +46,7 @@ def test_the_callers_arrays_stay_theirs():
 def test_time_that_does_not_increase_is_refused_with_row_and_file(step):
     t, *rest = columns()
     t[4] = t[3] + step
+    rest[0][4] = 2.0  # another value: not the same row again
     with pytest.raises(SettingsError, match=r"a\.csv.*row 4"):
         TractionSeries("S0", "a.csv", t, *rest)
 

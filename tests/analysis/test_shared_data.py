@@ -8,6 +8,7 @@ import pytest
 from analysis.fits import to_fits
 from analysis.models import FITTERS, GP_SE, GP_SE_NOISE, TUSTIN, FitOptions
 from analysis.prepare import PrepareOptions
+from analysis.report_content import table_one, verdicts
 from analysis.series import TractionSeries
 from analysis.study import StudyOptions, run_study
 from analysis.tables import load_tables, parse_columns
@@ -112,6 +113,8 @@ def test_real_contour_trials_are_hardly_better_than_a_constant(contour):
     result = study.terrains["table"]
     assert len(result.trials) == 12
     assert result.mae(TUSTIN) > 0.85 * result.constant_mae
+    assert "table: no model beats a constant" in verdicts(study)[0]
+    assert "not identifiable" in " ".join(table_one(study).rows[0])
 
 
 def test_real_contour_trials_have_the_error_found_before(contour):

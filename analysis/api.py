@@ -1,0 +1,132 @@
+"""The analysis for notebooks: from a file to models, in five functions.
+
+    trial = load_trial(Path("T04.mcap"))            # a recorded trial, or
+    trials = load_tables([Path("trials.npz")])      # tables, by terrain
+    kept = [prepare(series) for series in trials["TF"]]
+    curve = fit_tustin(kept)                        # eq. 1
+    process = fit_gp(kept)                          # eqs. 4 to 7
+    folds = crossvalidate({"TF": kept})             # one whole trial left out at a time
+
+Forces are in N, velocities in m/s; v_t and F_t are positive in ordinary slip, F_n in
+compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean and standard
+deviation of a measurement. All functions are pure but for the loading ones.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from analysis.crossval import FoldResult, plan_folds, run_fold
+from analysis.jobs import run_tasks
+from analysis.load import RecordedTrial, load_trial
+from analysis.models import (
+    FITTERS,
+    GP_NN,
+    GP_NN_TUSTIN,
+    GP_SE,
+    GP_SE_NOISE,
+    GP_SE_TUSTIN,
+    TUSTIN,
+    FitOptions,
+    FittedModel,
+    TustinModel,
+    fit_model,
+    tustin_of,
+)
+from analysis.prepare import PreparedTrial, PrepareOptions
+from analysis.prepare import prepare as prepare_series
+from analysis.rows import Rows, Training
+from analysis.series import TractionSeries
+from analysis.tables import load_tables
+
+__all__ = [
+    "FITTERS",
+    "GP_NN",
+    "GP_NN_TUSTIN",
+    "GP_SE",
+    "GP_SE_NOISE",
+    "GP_SE_TUSTIN",
+    "TUSTIN",
+    "FitOptions",
+    "FittedModel",
+    "FoldResult",
+    "PrepareOptions",
+    "PreparedTrial",
+    "RecordedTrial",
+    "TractionSeries",
+    "crossvalidate",
+    "fit_gp",
+    "fit_tustin",
+    "load_tables",
+    "load_trial",
+    "prepare",
+]
+
+
+def prepare(
+    trial: RecordedTrial | TractionSeries, options: PrepareOptions | None = None
+) -> PreparedTrial:
+    """Return the kept samples of a trial: smoothed, thinned, inside the window.
+
+    Args:
+        trial: from `load_trial`, or one of `load_tables`.
+        options: width of the average, thinning and window; the paper's by default.
+    """
+    series = trial.series() if isinstance(trial, RecordedTrial) else trial
+    return prepare_series(series, options or PrepareOptions())
+
+
+def fit_tustin(
+    trials: Sequence[PreparedTrial], options: FitOptions | None = None
+) -> TustinModel:
+    """Return the Tustin model (eq. 1) of all kept samples of `trials`.
+
+    Raises:
+        SettingsError: fewer than 20 samples.
+    """
+    options = options or FitOptions()
+    return TustinModel(tustin_of(_training(trials, options), options))
+
+
+def fit_gp(
+    trials: Sequence[PreparedTrial],
+    model: str = GP_SE,
+    options: FitOptions | None = None,
+) -> FittedModel:
+    """Return a Gaussian process on `options.gp_points` samples chosen at random.
+
+    Args:
+        trials: prepared trials of one terrain.
+        model: "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin" or "gp_se_noise".
+        options: number and seed of the samples, and more.
+
+    Raises:
+        SettingsError: fewer than 20 samples, forces that do not vary, or no such model.
+    """
+    options = options or FitOptions()
+    return fit_model(model, _training(trials, options), options)
+
+
+def crossvalidate(
+    trials: Mapping[str, Sequence[PreparedTrial]],
+    options: FitOptions | None = None,
+    n_jobs: int | None = None,
+) -> list[FoldResult]:
+    """Return every fold: models by name with their scores on the trial left out.
+
+    Args:
+        trials: prepared trials by terrain; the models of each terrain are also tested
+            on the others.
+        options: which models, and how they are fitted.
+        n_jobs: processes; one per core by default. Does not change the results.
+    """
+    tasks, _ = plan_folds(trials, options or FitOptions())
+    return run_tasks(run_fold, tasks, n_jobs)
+
+
+def _training(trials: Sequence[PreparedTrial], options: FitOptions) -> Training:
+    rows = Rows.of(trials)
+    count = min(options.gp_points, rows.count)
+    rng = np.random.default_rng(options.seed)
+    chosen = rng.choice(rows.count, count, replace=False)
+    return Training(rows, tuple(trial.kept for trial in trials), chosen)

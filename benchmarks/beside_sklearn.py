@@ -1,0 +1,88 @@
+"""scikit-learn as an opponent: our kernels, starts and bounds in its own terms."""
+
+import warnings
+
+import numpy as np
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import (
+    RBF,
+    ConstantKernel,
+    Hyperparameter,
+    Kernel,
+    WhiteKernel,
+)
+
+from analysis.search import STARTS
+
+
+class NeuralNetwork(Kernel):
+    """The arcsine kernel of unit variance for scikit-learn, by its own interface."""
+
+    def __init__(self, lengths: object = (1.0, 1.0), beta: float = 1.0) -> None:
+        self.lengths, self.beta = lengths, beta
+
+    @property
+    def hyperparameter_lengths(self) -> Hyperparameter:
+        """Lengths, one per input."""
+        return Hyperparameter("lengths", "numeric", (np.exp(-4), np.exp(6)), 2)
+
+    @property
+    def hyperparameter_beta(self) -> Hyperparameter:
+        """Share of the bias."""
+        return Hyperparameter("beta", "numeric", (np.exp(-6), np.exp(6)))
+
+    def __call__(self, X, Y=None, eval_gradient=False):  # noqa: ANN001, ANN204
+        """Return the covariances and, if asked for, their derivatives."""
+        lengths = np.asarray(self.lengths)
+        Y = X if Y is None else Y
+        Z, Z_other = 2.0 * X / lengths**2, Y
+        N = self.beta + Z @ Z_other.T
+        A = 1.0 + self.beta + np.sum(Z * X, axis=1)
+        B = 1.0 + self.beta + np.sum(2.0 * Y * Y / lengths**2, axis=1)
+        root = np.sqrt(np.outer(A, B))
+        u = np.clip(N / root, -1.0, 1.0)
+        K = np.arcsin(u)
+        if not eval_gradient:
+            return K
+        q = 1.0 / np.sqrt(1.0 - u * u)
+        slopes = []
+        for d in range(X.shape[1]):
+            own, other = X[:, d] ** 2 / A, Y[:, d] ** 2 / B
+            part = -4.0 * np.outer(X[:, d], Y[:, d]) / root
+            slopes.append(q * (part + 2.0 * u * np.add.outer(own, other))
+                          / lengths[d] ** 2)  # fmt: skip
+        bias = self.beta * q * (1.0 / root - 0.5 * u * np.add.outer(1.0 / A, 1.0 / B))
+        return K, np.stack([bias, *slopes], axis=-1)
+
+    def diag(self, X):  # noqa: ANN001, ANN201
+        """Return the variances."""
+        p = self.beta + np.sum(2.0 * (X / np.asarray(self.lengths)) ** 2, axis=1)
+        return np.arcsin(p / (1.0 + p))
+
+    def is_stationary(self) -> bool:
+        """Return that it is not."""
+        return False
+
+
+def theirs(part: str, stretch: float, share: float, sd: float) -> Kernel:
+    """Return scikit-learn's kernel at one of our starts, with our bounds."""
+    shape: Kernel = (
+        RBF([stretch, stretch], (np.exp(-4), np.exp(6)))
+        if part == "SE fit"
+        else NeuralNetwork((stretch, stretch), 20.0 ** (-np.log(stretch) / np.log(3.0)))
+    )
+    size = ConstantKernel(sd**2, (sd**2 * np.exp(-12), sd**2 * np.exp(8)))
+    noise = (sd * share) ** 2
+    return size * shape + WhiteKernel(noise, (sd**2 * np.exp(-12), sd**2 * np.exp(4)))
+
+
+def fit_theirs(part: str, X: np.ndarray, y: np.ndarray) -> GaussianProcessRegressor:
+    """Return the likeliest of scikit-learn's models from the same three starts."""
+    reached = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a length at its bound is no error
+        for stretch, share in STARTS:
+            kernel = theirs(part, stretch, share, float(y.std()))
+            model = GaussianProcessRegressor(kernel, alpha=1e-10).fit(X, y)
+            reached.append(model)
+    return max(reached, key=lambda model: model.log_marginal_likelihood_value_)

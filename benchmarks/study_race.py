@@ -1,0 +1,133 @@
+"""Folds of a study beside scikit-learn: four Gaussian processes each, and predictions.
+
+Both get the same chosen rows, the same three starts and the same Tustin curve, and
+predict the same rows: means for the training rows and the trials of all other terrains,
+mean and spread for the trial left out. The two take turns, fold by fold; what counts is
+processor time, one thread each, so that other programs do not.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.crossval import FoldTask, choose_rows, plan_folds, run_fold
+from analysis.models import (
+    GP_NN,
+    GP_NN_TUSTIN,
+    GP_SE,
+    GP_SE_TUSTIN,
+    TUSTIN,
+    FitOptions,
+    fit_model,
+    tustin_of,
+)
+from analysis.prepare import PrepareOptions, prepare
+from analysis.rows import Rows, Training
+from analysis.tables import load_tables
+from benchmarks.beside_sklearn import fit_theirs
+
+_GOAL = 4.0
+_ROUNDS = 3  # of every fold, medians; one for a whole study
+_FITS = {
+    GP_SE: ("SE fit", False),
+    GP_NN: ("NN fit", False),
+    GP_SE_TUSTIN: ("SE fit", True),
+    GP_NN_TUSTIN: ("NN fit", True),
+}
+
+
+def race(path: Path, *, is_whole: bool) -> dict[str, Any]:
+    """Return times and likelihoods of both, one fold after the other.
+
+    Args:
+        path: trials as npz.
+        is_whole: every fold; else the first one of every terrain.
+    """
+    trials = {
+        name: [prepare(series, PrepareOptions()) for series in group]
+        for name, group in load_tables([path]).items()
+    }
+    tasks, _ = plan_folds(trials, FitOptions())
+    run_fold(tasks[0])  # whatever is loaded or set up at first
+    if not is_whole:
+        tasks = [task for task in tasks if task.fold == 0]
+    mine = its = 0.0
+    reached: list[tuple[float, float]] = []
+    for task in tasks:
+        models, likelihoods = {}, {}
+        spent: tuple[list[float], list[float]] = ([], [])
+        for _ in range(1 if is_whole else _ROUNDS):
+            seconds, models = timed(lambda task=task: run_fold(task).models)
+            spent[0].append(seconds)
+            seconds, likelihoods = timed(lambda task=task: run_theirs(task))
+            spent[1].append(seconds)
+        mine += statistics.median(spent[0])
+        its += statistics.median(spent[1])
+        reached += [
+            (models[name].model.process.lml, likelihoods[name]) for name in _FITS
+        ]
+    ours, theirs = (np.array(column) for column in zip(*reached, strict=True))
+    worse = int(np.count_nonzero(ours < theirs - 1e-3))
+    return {
+        "part": f"study, {len(reached)} fits with predictions",
+        "ours_ms": 1e3 * mine,
+        "other_ms": 1e3 * its,
+        "ratio": its / mine,
+        "goal": _GOAL,
+        "reached": float(ours.sum()),
+        "other_reached": float(theirs.sum()),
+        "notes": [
+            f"likelihood lower than scikit-learn's by more than 1e-3: {worse} of "
+            f"{len(reached)} fits; higher: {int(np.sum(ours > theirs + 1e-3))}",
+            *where_time_goes(tasks[0]),
+        ],
+    }
+
+
+def run_theirs(task: FoldTask) -> dict[str, float]:
+    """Return scikit-learn's likelihoods of one fold, after the same predictions."""
+    chosen = choose_rows(task)
+    training = Training(task.training, task.lengths, chosen)
+    curve, subset = tustin_of(training, task.options), training.subset
+    centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
+    foreign = [rows for trials in task.others.values() for rows in trials]
+    tested = (Rows.joined([task.training, *foreign]).inputs - centre) / scale
+    own = (task.own.inputs - centre) / scale
+    found = {}
+    for name, (part, is_around) in _FITS.items():
+        mean = curve.mean(subset.F_n, subset.v_t) if is_around else subset.F_t.mean()
+        model = fit_theirs(part, (subset.inputs - centre) / scale, subset.F_t - mean)
+        model.predict(tested)
+        model.predict(own, return_std=True)
+        found[name] = float(model.log_marginal_likelihood_value_)
+    return found
+
+
+def where_time_goes(task: FoldTask) -> list[str]:
+    """Return what the parts of one of our folds cost."""
+    training = Training(task.training, task.lengths, choose_rows(task))
+    spent, _ = timed(lambda: fit_model(TUSTIN, training, task.options))
+    parts = [f"Tustin of {task.training.count} rows {1e3 * spent:.0f} ms"]
+    foreign = [rows for trials in task.others.values() for rows in trials]
+    tested = Rows.joined([task.training, *foreign])
+    predicting = 0.0
+    for name in _FITS:
+        spent, model = timed(lambda name=name: fit_model(name, training, task.options))
+        starts = model.process.starts
+        count = sum(start.evaluations for start in starts)
+        parts.append(f"{name} {1e3 * spent:.0f} ms ({count} evaluations)")
+        predicting += timed(lambda m=model: m.mean(tested.F_n, tested.v_t))[0]
+        predicting += timed(lambda m=model: m.predict(task.own.F_n, task.own.v_t))[0]
+    parts.append(f"predictions of {tested.count} rows {1e3 * predicting:.0f} ms")
+    return ["one of our folds: " + ", ".join(parts)]
+
+
+def timed(function: Callable[[], Any]) -> tuple[float, Any]:
+    """Return (processor time spent [s], result)."""
+    before = time.process_time()
+    result = function()
+    return time.process_time() - before, result

@@ -1,0 +1,143 @@
+"""The report as a reader opens it: in headless Chromium, on the screen and in print."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from analysis.models import FITTERS, GP_SE_NOISE, FitOptions
+from analysis.report import ReportContext, write_report
+from analysis.study import StudyOptions, run_study
+from analysis.tables import load_tables
+
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    None,
+)
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.timeout(900),
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine"),
+]
+WIDTHS = (1200, 500)  # of a desk and of the narrowest window it opens
+_BROWSER = "not an origin"
+PROBE = """<script>
+addEventListener("load", () => {
+  const images = [...document.images];
+  document.title = "probe " + JSON.stringify({
+    figures: images.length,
+    broken: images.filter(image => !image.complete || image.naturalWidth < 300).length,
+    unsaid: images.filter(image => image.alt.length < 20).length,
+    overflow: document.documentElement.scrollWidth - innerWidth,
+    dead: [...document.querySelectorAll("nav a")].filter(
+      link => !document.querySelector(link.getAttribute("href"))).length,
+  });
+});
+</script>"""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What a browser said of a page, and what the page asked for."""
+
+    out: str
+    console: list[str]
+    asked: set[str]
+
+
+def open_page(page: Path, folder: Path, *options: str) -> Opened:
+    """Open a page headless and return what happened."""
+    log = folder / "net.json"
+    command = [
+        *(CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run"),
+        *("--disable-background-networking", "--disable-component-update"),
+        *("--disable-sync", "--disable-default-apps", "--enable-logging=stderr"),
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        *(f"--user-data-dir={folder / 'profile'}", f"--log-net-log={log}"),
+        *("--hide-scrollbars", *options, page.as_uri()),
+    ]
+    done = subprocess.run(command, capture_output=True, check=True, timeout=300)
+    said = done.stderr.decode(errors="replace").splitlines()
+    params = [
+        event.get("params", {}) for event in json.loads(log.read_text())["events"]
+    ]
+    # what the browser itself asks for has no page as its origin
+    asked = {
+        p["url"]
+        for p in params
+        if "url" in p and p.get("initiator", _BROWSER) != _BROWSER
+    }
+    return Opened(
+        done.stdout.decode(), [line for line in said if "CONSOLE" in line], asked
+    )
+
+
+def probe(page: Path, folder: Path, width: int) -> dict:
+    """Return what a script in a copy of the page finds there."""
+    copy = folder / "probe.html"
+    copy.write_text(page.read_text().replace("</body>", PROBE + "</body>"))
+    opened = open_page(copy, folder, f"--window-size={width},2000", "--dump-dom")
+    found = re.search(r"<title>probe (.*?)</title>", opened.out)
+    assert found is not None, opened.out[:500]
+    return json.loads(found.group(1).replace("&quot;", '"'))
+
+
+def assert_readable(page: Path, folder: Path, least: int) -> None:
+    """Fail unless the page shows everything, asks for nothing, and prints."""
+    for width in WIDTHS:
+        found = probe(page, folder, width)
+        assert found.pop("figures") >= least
+        assert found.pop("overflow") <= 0
+        assert set(found.values()) == {0}, found
+    picture, printed = folder / "page.png", folder / "page.pdf"
+    screen = open_page(
+        page, folder, "--window-size=1200,12000", f"--screenshot={picture}"
+    )
+    paper = open_page(
+        page, folder, "--no-pdf-header-footer", f"--print-to-pdf={printed}"
+    )
+    for opened in (screen, paper):
+        assert opened.console == []
+        assert opened.asked == set()
+    assert picture.stat().st_size > 100_000
+    pages = len(re.findall(rb"/Type\s*/Page\b", printed.read_bytes()))
+    assert pages > least // 3
+
+
+def written(study, folder: Path) -> Path:
+    context = ReportContext(
+        title="Traction study",
+        subtitle="trials on stones and plates",
+        is_simulated=study.simulated,
+        is_foreign=False,
+        generated_utc="2027-03-14T10:00:00Z",
+    )
+    return write_report(study, folder / "out", context)
+
+
+def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
+    assert_readable(written(small_study, tmp_path), tmp_path, least=16)
+
+
+def test_a_page_that_asks_or_complains_is_caught(tmp_path):
+    page = tmp_path / "asks.html"
+    page.write_text(
+        '<body><img src="http://127.0.0.1:9/a.png">'
+        '<script>console.error("alas")</script></body>'
+    )
+    opened = open_page(page, tmp_path, "--dump-dom")
+    assert opened.asked == {"http://127.0.0.1:9/a.png"}
+    assert "alas" in opened.console[0]
+
+
+@pytest.mark.long
+@pytest.mark.shared_data
+def test_the_report_of_a_whole_study_is_readable(shared_data, tmp_path):
+    trials = load_tables([shared_data / "rehearsal_trials.npz"])
+    options = StudyOptions(fit=FitOptions(models=(*FITTERS, GP_SE_NOISE)))
+    study = run_study(trials, options, simulated=True)
+    assert_readable(written(study, tmp_path), tmp_path, least=18)

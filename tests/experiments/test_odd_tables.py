@@ -1,0 +1,116 @@
+"""Tables from elsewhere that cannot be analysed as they should: what is said then."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from analysis.figures import Picture
+from tests.experiments.program import traction
+
+ROWS = 700
+
+
+def made(k, *, v=None, F_n=None):
+    """Return t, v_t, F_n, F_t of a trial under a known law, shape (n, 4)."""
+    rng = np.random.default_rng(k)
+    v = 0.08 + 0.07 * np.sin(np.arange(ROWS) * 0.009) if v is None else v
+    t = 0.002 * np.arange(v.size)
+    F_n = 4.0 + 1.5 * np.sin(1.7 * t + k) if F_n is None else F_n
+    F_t = 0.6 * F_n + 3.0 * np.exp(-np.abs(v) / 0.03) + rng.normal(0, 0.1, t.size)
+    return np.column_stack([t, v, F_n, F_t])
+
+
+def holed(k):
+    table = made(k)
+    table[100:130, 3] = np.nan
+    return table
+
+
+def odd_trials():
+    """Return every kind of odd trial under a terrain's name of its own."""
+    return {
+        "single/00": made(0),
+        "pair/00": made(1),
+        "pair/01": made(2),
+        "load/00": made(3, F_n=np.full(ROWS, 5.0)),
+        "load/01": made(4, F_n=np.full(ROWS, 5.0)),
+        "stuck/00": made(5, v=np.zeros(ROWS)),
+        "stuck/01": made(6, v=np.zeros(ROWS)),
+        "holes/00": holed(7),
+        "holes/01": holed(8),
+        "twice/00": np.repeat(made(9), 2, axis=0),
+        "twice/01": np.repeat(made(10), 2, axis=0),
+        "short/00": made(11, v=np.full(10, 0.05)),
+        "short/01": made(12, v=np.full(10, 0.05)),
+    }
+
+
+def fitted(folder):
+    """Return (what was printed, the page's text, fits.json) of all odd tables."""
+    np.savez(folder / "odd.npz", **odd_trials())
+    done = traction("fit", folder / "odd.npz", "--out", folder / "out")
+    assert done.code == 0, done.err
+    page = (folder / "out/report/index.html").read_text()
+    fits = json.loads((folder / "out/fits.json").read_text())
+    return done.out, re.sub(r"<[^>]*>", " ", page), fits
+
+
+@pytest.fixture(scope="module")
+def odd(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        # what is said is tested here; pictures cost seconds, see the long test
+        patch.setattr(
+            "analysis.gallery.render", lambda key, *_: Picture(key, b"png", b"pdf")
+        )
+        patch.setattr("analysis.jobs.available_cores", lambda: 1)
+        patch.setattr("analysis.report.available_cores", lambda: 1)
+        yield fitted(tmp_path_factory.mktemp("odd"))
+
+
+@pytest.mark.parametrize(
+    "sentence",
+    [
+        "single: 1 trial with kept samples; leaving one out needs two",
+        "load: F_n never varies",
+        "100% sticking",
+        "stuck: 0 trial with kept samples",
+        "holes: 60 rows were not finite; dropped",
+        "twice: 1400 rows were there twice; dropped",
+        "short, fold 1, Tustin: 2 samples are too few",
+        "short, fold 1, GP (SE): No Gaussian process from 2 samples",
+        "its health and its limits are unknown",
+    ],
+)
+def test_the_report_says_what_it_cannot_do(odd, sentence):
+    _, text, _ = odd
+    assert sentence in text
+
+
+@pytest.mark.parametrize("terrain", ["pair", "load", "holes", "twice"])
+def test_the_rest_is_done_all_the_same(odd, terrain):
+    _, _, fits = odd
+    # F_t spans 5 N; one short trial each is enough to see the law
+    for model in ("tustin", "gp_se"):
+        assert fits["terrains"][terrain]["mae"][model] < 1.0
+
+
+@pytest.mark.parametrize("terrain", ["single", "stuck", "short"])
+def test_what_cannot_be_fitted_has_no_number(odd, terrain):
+    _, text, fits = odd
+    assert set(fits["terrains"][terrain]["mae"].values()) == {None}
+    assert terrain in text
+
+
+def test_warnings_are_said_where_the_program_runs(odd):
+    out, _, _ = odd
+    assert "▲ twice: 1400 rows were there twice; dropped." in out
+
+
+@pytest.mark.long
+@pytest.mark.timeout(300)
+def test_every_figure_of_odd_tables_is_drawn(tmp_path):
+    fitted(tmp_path)
+    drawn = {path.stem for path in (tmp_path / "out/figures").glob("*.pdf")}
+    assert {"fig4_excerpts", "fig9_errors", "trials", "trends", "coverage"} <= drawn

@@ -1,0 +1,63 @@
+import pytest
+
+from experiments.progress import ProgressLine, progress_text, time_left
+
+
+class Said:
+    """A console without a terminal, or with one."""
+
+    def __init__(self, *, is_live=False):
+        self.is_live, self.lines, self.panels, self.ended = is_live, [], [], 0
+
+    def say(self, text):
+        self.lines.append(text)
+
+    def panel(self, lines):
+        self.panels.append(lines)
+
+    def end_panel(self):
+        self.ended += 1
+
+
+class Now:
+    """A clock that stands where it is put."""
+
+    t = 0.0
+
+    def now_ns(self):
+        return int(self.t * 1e9)
+
+
+def test_the_rest_takes_as_long_as_what_was_done():
+    assert time_left(10, 30, 5.0) == pytest.approx(15.0)
+    assert time_left(10, 0, 5.0) == 0.0
+    assert time_left(0, 30, 5.0) is None
+
+
+def test_the_line_says_how_far_and_how_long():
+    assert progress_text(40, 80, 65.4, "fits").endswith("40 of 80 fits, 1 min 5 s left")
+    assert progress_text(40, 80, 9.6, "fits").endswith("40 of 80 fits, 10 s left")
+    assert progress_text(80, 80, 0.0, "fits").endswith("80 of 80 fits")
+    assert progress_text(40, 80, None, "fits").startswith("━" * 15 + "─" * 15)
+
+
+def test_without_a_terminal_a_line_is_said_every_tenth():
+    console, clock = Said(), Now()
+    line = ProgressLine(console, clock, "fits")
+    for k in range(1, 101):
+        clock.t = 0.5 * k
+        line(k, 100)
+    assert 9 <= len(console.lines) <= 11
+    assert console.lines[-1].endswith("100 of 100 fits")
+    assert console.panels == []
+
+
+def test_results_of_an_earlier_run_do_not_count_for_the_pace():
+    console, clock = Said(is_live=True), Now()
+    line = ProgressLine(console, clock, "fits")
+    line(60, 100)
+    clock.t = 10.0
+    line(70, 100)
+    assert "30 s left" in console.panels[-1][0]
+    line.end()
+    assert console.ended == 1

@@ -1,0 +1,14 @@
+"""Choices that the program refuses before it reads a single trial."""
+
+import pytest
+
+from tests.experiments.program import traction
+
+
+@pytest.mark.parametrize("text", ["colour=red", "smoothing=4", "frame=base", "window"])
+def test_choices_that_there_are_not_are_refused_with_the_list(tmp_path, text):
+    done = traction("report", "--all", "--data", tmp_path, "--what-if", text)
+    assert done.code != 0
+    assert "--what-if" in done.err
+    assert "Traceback" not in done.err
+    assert "e.g." in done.err or "sole or terrain" in done.err
