@@ -16,6 +16,7 @@ from acquisition.devices import (
     WrenchSample,
     WrenchSensor,
 )
+from acquisition.errors import LinkError
 from acquisition.guard import Action, GuardState, Limits, Observation, Verdict, check
 from acquisition.loop import Tick
 from acquisition.sample import Sample
@@ -39,6 +40,7 @@ class ArmState(IntEnum):
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _UNKNOWN = ArmState.UNKNOWN
 _ACTIVE = SafetyMode.ACTIVE
+_E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
 
@@ -194,8 +196,14 @@ class Cycle:
         self._sink(sample.payload())
 
     def _take_wrench(self, now_ns: int) -> bool:
-        """Drain the sensor; return whether the used sample is fresh."""
-        samples = self._sensor.poll(now_ns)
+        """Drain the sensor; return whether the used sample is fresh.
+
+        A port that is gone is a sensor that is silent: its last sample grows old.
+        """
+        try:
+            samples = self._sensor.poll(now_ns)
+        except LinkError:
+            samples = []
         if samples:
             self._on_wrench(samples)
             for newest in reversed(samples):
@@ -258,6 +266,7 @@ class Cycle:
             status.ft_age_ns = tick.now_ns - self._wrench_ns
         self._was_active |= status.safety is _ACTIVE
         is_commanded = status.state not in _UNPOWERED
+        has_power = self._was_active or status.safety is _E_STOP
         seen = Observation(
             reading=reading,
             safety=status.safety,
@@ -266,7 +275,7 @@ class Cycle:
             ft_age_ns=status.ft_age_ns,
             tau=tau,
             is_recording=self.is_recording,
-            is_powered=is_commanded and self._was_active,
+            is_powered=is_commanded and has_power,
             is_late=tick.is_late,
         )
         self._guard, verdict = check(self._limits, self._guard, seen)

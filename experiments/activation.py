@@ -2,24 +2,27 @@
 
 from acquisition.cycle import ArmState
 from acquisition.devices import SafetyMode
-from acquisition.errors import PreflightError
-from experiments.messages import CATALOGUE
+from acquisition.sample import MOTOR_FRESH_SHIFT
+from experiments.messages import preflight_error, pucks_have
 from experiments.operator import Prompt
 from experiments.stage import Stage
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
+_READY_SECONDS = 0.1  # from the request for hold to its first torques
 
 
 def activate(stage: Stage) -> None:
     """Get torques ready, then wait for the pendant and for [space].
 
     Raises:
-        PreflightError: the arm was not activated within two minutes.
+        PreflightError: no torques can be made ready, or the arm was not activated
+            within two minutes.
         StopAskedError, FaultedError: as `Stage.tick`.
     """
     control, clock = stage.control, stage.rig.clock
     control.request(ArmState.HOLD)
-    control.advance(0.1)
+    control.advance(_READY_SECONDS)
+    _require_torques(stage)
     stage.company.console.say(
         "Press Shift-activate on the pendant, support the arm, then [space]."
     )
@@ -30,9 +33,22 @@ def activate(stage: Stage) -> None:
         if is_ready and control.status.safety is SafetyMode.ACTIVE:
             return
         if (clock.now_ns() - start_ns) * 1e-9 > PATIENCE:
-            message = CATALOGUE["not-active"]
-            raise PreflightError(
-                message.what.format(seconds=PATIENCE),
-                hint=message.do,
-                arm_state=message.arm,
-            )
+            raise preflight_error("not-active", seconds=PATIENCE)
+
+
+def _require_torques(stage: Stage) -> None:
+    """Refuse to ask for the pendant while the arm would be active and fall.
+
+    Hold begins with a complete reading; without one no torque would be there.
+    """
+    control = stage.control
+    loop = control.loop
+    if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
+        return  # ready, or the next tick tells why not
+    if loop.control.safety is SafetyMode.E_STOP:
+        raise preflight_error("no-power")
+    silent = ~int(control.latest()["flags"][0]) >> MOTOR_FRESH_SHIFT & 0x7F
+    detail = f"{pucks_have(silent)} not answered for {_READY_SECONDS * 1e3:.0f} ms."
+    if loop.is_bus_down:
+        detail = "The CAN interface refuses to send and receive."
+    raise preflight_error("not-ready", detail=detail)

@@ -1,16 +1,24 @@
 """What is written of a recorded trial: the sealed file, its sidecar, the flight."""
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.verify import Verified
 from acquisition.trial_file.writer import TrialHeader
+from analysis.quality import Coverage, suggest
+from experiments.review import Review
 from experiments.rigs import Rig
 from experiments.session import KEEP
 from experiments.store import read_json, write_json
 from experiments.trial import SessionFacts, TrialName, write_flight, write_truth
 
 COMPLETE = frozenset({"travel", "key", "time-limit"})
+CELLS = (4, 4)  # speeds, loads of a coverage
+MANY = 1_000_000_000  # samples, more than any trial has
 ENOUGH = 0.9  # share of the container a trial has to cross
 
 
@@ -89,7 +97,7 @@ class Archive:
         name: TrialName,
         verified: Verified,
         outcome: Outcome,
-        ratio: float | None = None,
+        review: Review | None = None,
     ) -> None:
         """Write what is known of a sealed trial beside it, without a verdict.
 
@@ -97,20 +105,39 @@ class Archive:
             name: the attempt.
             verified: what reading the file back has shown.
             outcome: how the recording ended.
-            ratio: slope of F_t over F_n; None = not known.
+            review: what the trial is worth; None = not looked at.
 
         Raises:
             TrialFileError: the disk is full or gone.
         """
-        facts = {**sidecar_of(name, verified, outcome), "ratio": ratio}
+        facts = sidecar_of(name, verified, outcome)
+        if review is not None:
+            facts |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
         write_json(self.facts.folder.trials / f"{name.kept}.json", facts)
 
     def kept_ratios(self) -> list[float]:
         """Return the quick fits of the trials kept so far, from their sidecars."""
-        found: list[float] = []
-        for path in sorted(self.facts.folder.trials.glob("T*.json")):
-            sidecar = read_json(path)
-            ratio = sidecar.get("ratio")
-            if sidecar.get("verdict") == KEEP and isinstance(ratio, float):
-                found.append(ratio)
-        return found
+        ratios = (sidecar.get("ratio") for sidecar in self._kept_sidecars())
+        return [ratio for ratio in ratios if isinstance(ratio, float)]
+
+    def suggestion(self) -> str:
+        """Return how the next push should be, so that the kept ones leave no gap."""
+        counts = np.zeros(CELLS, np.int64)
+        for sidecar in self._kept_sidecars():
+            counts += cells_of(sidecar.get("coverage"))
+        return suggest(Coverage(counts))
+
+    def _kept_sidecars(self) -> list[dict[str, Any]]:
+        paths = sorted(self.facts.folder.trials.glob("T*.json"))
+        found = [read_json(path) for path in paths]
+        return [sidecar for sidecar in found if sidecar.get("verdict") == KEEP]
+
+
+def cells_of(value: object) -> NDArray[np.int64]:
+    """Return a coverage as it stands in a sidecar, zeros where it is none."""
+    try:
+        counts = np.array(value, np.int64)
+    except (ValueError, TypeError, OverflowError):
+        counts = np.zeros(0, np.int64)
+    is_map = counts.shape == CELLS and bool((counts >= 0).all() & (counts < MANY).all())
+    return counts if is_map else np.zeros(CELLS, np.int64)

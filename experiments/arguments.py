@@ -49,8 +49,20 @@ def add_reopening(parser: ArgumentParser) -> None:
         metavar="FILE|auto",
         help="answers to the reviews, only if simulated",
     )
+    add_fault(parser)
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
+
+
+def add_fault(parser: ArgumentParser) -> None:
+    """Declare the faults that a rehearsal raises."""
+    parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="NAME[@Tn+SECONDSs]",
+        help="raise a fault, only if simulated; can be repeated",
     )
 
 

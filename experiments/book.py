@@ -1,5 +1,6 @@
 """The session's book: journal, state that follows from it, session.json."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from acquisition.clock import Clock
@@ -7,6 +8,11 @@ from acquisition.errors import SessionError
 from experiments.session import SessionState, apply, refusal, replay
 from experiments.shelf import decision_of, shelve
 from experiments.store import SessionFolder, iso_utc, read_json, write_json
+
+
+def at_once(work: Callable[[], None]) -> None:
+    """Do `work` here and now."""
+    work()
 
 
 @dataclass(slots=True)
@@ -17,11 +23,14 @@ class Book:
         folder: the session on the disk.
         clock: whose time the events carry.
         state: what the journal says.
+        aside: how the disk is written to; a slow one may not keep the console from
+            looking after the arm.
     """
 
     folder: SessionFolder
     clock: Clock
     state: SessionState = field(default_factory=SessionState)
+    aside: Callable[[Callable[[], None]], None] = at_once
 
     def note(self, event: str, **facts: object) -> None:
         """Append an event of now, apply it, and replace session.json.
@@ -37,6 +46,9 @@ class Book:
         reason = refusal(self.state, entry)
         if reason:
             raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
+        self.aside(lambda: self._write(entry, facts))
+
+    def _write(self, entry: dict[str, object], facts: dict[str, object]) -> None:
         self.folder.append_event(entry)
         self.state = apply(self.state, entry)
         decision = decision_of(entry)
@@ -63,6 +75,7 @@ class Book:
             "kept": [f"T{number:02d}" for number in self.state.kept],
             "rejected": self.state.rejected,
             "ended": self.state.ended,
+            "force_drift": list(self.state.drift) or None,
         }
         write_json(path, summary)
 

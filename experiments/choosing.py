@@ -1,6 +1,6 @@
 """What becomes of an unfinished session when another run is asked for."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
 
 from acquisition.clock import SystemClock
@@ -51,14 +51,20 @@ def choose(
     name = "mismatch" if newest.folder.terrain != terrain else name
     facts = {**newest.facts(), "asked": terrain}
     console.say(f"{WARNING} {text} {CATALOGUE[name].do.format_map(facts)}  [q]uit")
+    key = ask(keys, Prompt.CHOICE, {*_KEYS, "q"})
+    if key == "q":
+        raise SessionError(text, hint="Nothing was started.")
+    return _KEYS[key]
+
+
+def ask(keys: Keys, prompt: Prompt, wanted: Collection[str]) -> str:
+    """Wait until one of the `wanted` keys is pressed while no loop runs; return it."""
     clock = SystemClock()
     with keyboard(keys):
         while True:
-            key = keys.answer(Asked(Prompt.CHOICE, 0, 0, is_complete=False, since=0.0))
-            if key in _KEYS:
-                return _KEYS[key]
-            if key == "q":
-                raise SessionError(f"{text}", hint="Nothing was started.")
+            key = keys.answer(Asked(prompt, 0, 0, is_complete=False, since=0.0))
+            if key in wanted:
+                return key
             clock.sleep_until(clock.now_ns() + _PAUSE_NS)
 
 

@@ -4,7 +4,7 @@
 import argparse
 import importlib
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from acquisition.errors import TractionError
@@ -94,8 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"cause: {error.__cause__!r}", file=sys.stderr)  # noqa: T201
         return error.exit_code
     except KeyboardInterrupt:
-        print("Interrupted. Nothing that was recorded is lost.", file=sys.stderr)  # noqa: T201
-        return 130
+        return _tell("nothing-lost", {})
     except BrokenPipeError:
         return 0
     except Exception:
@@ -112,12 +111,15 @@ def _report_bug() -> int:
         "w", prefix="traction-bug-", suffix=".log", delete=False
     ) as log:
         log.write(traceback.format_exc())
-    print(  # noqa: T201
-        f"Bug: {sys.exc_info()[1]!r}. The arm is idle if one was connected. "
-        f"Log: {log.name}. What was recorded is safe.",
-        file=sys.stderr,
-    )
-    return 1
+    return _tell("command-bug", {"error": repr(sys.exc_info()[1]), "log": log.name})
+
+
+def _tell(name: str, facts: Mapping[str, object]) -> int:
+    """Print a message of the catalogue and return its exit code."""
+    from experiments.messages import CATALOGUE
+
+    print(CATALOGUE[name].text(facts), file=sys.stderr)  # noqa: T201
+    return CATALOGUE[name].exit_code
 
 
 def _version() -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from acquisition.clock import NS_PER_S, Clock, SystemClock
 from acquisition.guard import Verdict
 from experiments.console import Console
-from experiments.faults import FaultPlan
+from experiments.faults import Faults
 from experiments.operator import Keys, RehearsedHand
 
 TWICE_NS = 3 * NS_PER_S  # two requests closer than this mean: now
@@ -67,10 +67,10 @@ def signals_ask(stop: StopFlag) -> Generator[None]:
 
 @dataclass(slots=True)
 class Company:
-    """Who takes part beside the rig: keys, simulated hand, console, stop, fault."""
+    """Who takes part beside the rig: keys, simulated hand, console, stop, faults."""
 
     keys: Keys
     console: Console
     stop: StopFlag
     hand: RehearsedHand | None = None
-    fault: FaultPlan | None = None
+    faults: Faults | None = None

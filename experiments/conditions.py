@@ -16,6 +16,8 @@ _SENSOR = ("model", "serial_number", "firmware", "filter")
 _FREE = (
     "rig.can.",
     "rig.loop.",
+    "rig.operator.",
+    "rig.limits.residual",
     "rig.arm.mech_at_home",
     "rig.ft_sensor.port",
     "rig.limits.free_disk_gb",

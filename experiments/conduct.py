@@ -6,9 +6,11 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from experiments.arguments import data_option
+from experiments.board import next_steps
 from experiments.book import Book
 from experiments.bus_log import logging_bus
 from experiments.company import Company, StopFlag, signals_ask
+from experiments.computer_faults import Computer
 from experiments.conditions import (
     check_conditions,
     conditions_of,
@@ -16,7 +18,8 @@ from experiments.conditions import (
     write_conditions,
 )
 from experiments.console import Console
-from experiments.faults import plan_fault
+from experiments.faults import plan_faults
+from experiments.foot_check import confirm_foot, foot_before
 from experiments.lock import session_lock
 from experiments.operator import Keys, RehearsedHand
 from experiments.phases import Event
@@ -43,7 +46,7 @@ class Request:
         operator: name of the person; empty = nobody said.
         keys: who answers the prompts.
         console: where it is said.
-        fault: a fault to be raised in the simulation, as on the command line.
+        faults: to be raised in the simulation, as on the command line.
         can_log: where the bus is written to.
     """
 
@@ -55,7 +58,7 @@ class Request:
     operator: str
     keys: Keys
     console: Console
-    fault: str | None = None
+    faults: tuple[str, ...] = ()
     can_log: Path | None = None
 
     @property
@@ -91,24 +94,27 @@ def conduct(request: Request, opening: Opening) -> int:
     console, stop = request.console, StopFlag()
     rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
-        fault = plan_fault(request.fault, rig.rehearsal) if request.fault else None
+        computer = Computer(rig)
+        faults = plan_faults(request.faults, rig.rehearsal, computer)
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {request.row.name}        {kind}")
         found = _check_before(rig, opening, console)
-        page = run_preflight(rig, request.data, console)
+        before = foot_before(request.data, is_simulated=rig.is_simulated)
+        foot = confirm_foot(rig.row, before, request.keys, console)
+        console.check(foot.mark, foot.name, foot.text)
+        page = run_preflight(rig, request.data, console).after(foot)
         found += _check_sensor(page, opening, console)
         hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
-        company = Company(request.keys, console, stop, hand, fault)
+        company = Company(request.keys, console, stop, hand, faults)
         with signals_ask(stop), keyboard(request.keys), ExitStack() as stack:
-            book = opening.book or _new_book(request, rig, page, stack)
+            stack.callback(computer.undo)
+            book = opening.book or _new_book(request, rig, page, stack, computer)
+            computer.folder = book.folder
             facts = _write_facts(request, rig, page, book)
             runner = SessionRunner(Stage(rig, company), facts, book)
             code = runner.run(opening.event, **_asked(request, opening, found))
-    if company.fault is not None:
-        console.say(
-            f"▲ The fault {company.fault.name} was planned for "
-            f"T{company.fault.trial:02d} + {company.fault.seconds} s, which never came."
-        )
+    for plan in faults.plans if faults is not None else ():
+        console.say(f"▲ The fault {plan.text()} was planned, and its time never came.")
     _say_next(request, book, code)
     return code
 
@@ -127,7 +133,9 @@ def _check_sensor(page: Preflight, opening: Opening, console: Console) -> list[s
     return check_conditions(opening.book.folder, now, console, is_forced=is_forced)
 
 
-def _new_book(request: Request, rig: Rig, page: Preflight, stack: ExitStack) -> Book:
+def _new_book(
+    request: Request, rig: Rig, page: Preflight, stack: ExitStack, computer: Computer
+) -> Book:
     """Create the session's folder, take its lock, keep settings and conditions."""
     folder = create_session(
         request.data,
@@ -135,6 +143,7 @@ def _new_book(request: Request, rig: Rig, page: Preflight, stack: ExitStack) -> 
         is_simulated=rig.is_simulated,
         utc_ns=session_utc_ns(),
     )
+    computer.occupy(folder)
     stack.enter_context(session_lock(folder))
     request.console.say(f"session {folder.id}: {folder.path}")
     write_text(folder.path / "config.toml", rig.settings.rig_text)
@@ -171,8 +180,15 @@ def _asked(request: Request, opening: Opening, found: list[str]) -> dict[str, ob
 
 
 def _say_next(request: Request, book: Book, code: int) -> None:
+    """Say what comes next: the report, and the terrain that time asks for."""
     name, data = book.folder.id, data_option(request.data)
-    if code == 0 and book.state.is_complete:
-        request.console.say(f"Complete. Next: traction report {name}{data}")
-    elif code == 0:
+    if code == 0 and not book.state.is_complete:
         request.console.say(f"Done. To go on: traction resume {name}{data}")
+    if code or not book.state.is_complete:
+        return
+    request.console.say(f"Complete. Next: traction report {name}{data}")
+    request.console.say(f"It writes {book.folder.path / 'report' / 'index.html'}")
+    is_simulated = book.folder.is_simulated
+    matrix = request.settings.matrix
+    for step in next_steps(request.data, matrix, is_simulated=is_simulated):
+        request.console.say(step)

@@ -23,7 +23,8 @@ class Console:
 
     def __init__(self, *, color: bool = True) -> None:
         self.is_lost = False
-        self._color = color and sys.stdout.isatty()
+        self._is_terminal = sys.stdout.isatty()
+        self._color = color and self._is_terminal
         self.is_live = self._color and os.environ.get("TERM", "dumb") != "dumb"
         self._live: Live | None = None
         for stream in (sys.stdout, sys.stderr):
@@ -77,10 +78,10 @@ class Console:
         if live is not None:
             live.stop()
 
-    def bell(self) -> None:
+    def bell(self, times: int = 1) -> None:
         """Ring the terminal's bell, if there is a terminal."""
-        if self.is_live and not self.is_lost:
-            sys.stdout.write("\a")
+        if self._is_terminal and not self.is_lost:
+            sys.stdout.write("\a" * times)
             sys.stdout.flush()
 
     def _begin_live(self) -> "Live":

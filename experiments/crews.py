@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -40,6 +41,11 @@ class Crew(Protocol):
     @property
     def recorder(self) -> TrialRecording:
         """What writes the trials."""
+        ...
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of the process that writes them."""
         ...
 
     def start_arm(self) -> ArmInfo:
@@ -106,6 +112,11 @@ class InlineCrew:
         self._sensor: WrenchSensor | None = None
         self.recorder = Recorder(board, clock)
         self.desk = Desk(board, clock, _not_begun)
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of this process, which writes the trials too."""
+        return os.getpid()
 
     def start_arm(self) -> ArmInfo:
         """Find, wake and question the arm; raises as `WamArm.start`."""
@@ -233,6 +244,11 @@ class ProcessCrew:
             )
         self.recorder = RemoteRecorder(recorder, board)
         self.desk = Desk(board, clock, self._pass)
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of the process that writes the trials."""
+        return self._children["recorder"].pid
 
     def start_arm(self) -> ArmInfo:
         """Find, wake and question the arm; raises as `WamArm.start`."""

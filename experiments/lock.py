@@ -48,7 +48,7 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
     try:
         if not _take(descriptor):
             raise locked_error(folder)
-        _sign(descriptor)
+        sign(descriptor)
         yield
     finally:
         os.close(descriptor)
@@ -93,7 +93,8 @@ def _take(descriptor: int) -> bool:
     return False
 
 
-def _sign(descriptor: int) -> None:
+def sign(descriptor: int) -> None:
+    """Write into an open lock file whose it is and since when."""
     since = iso_utc(SystemClock().utc_ns())
     text = json.dumps({"pid": os.getpid(), "since": since}).encode()
     os.ftruncate(descriptor, 0)

@@ -1,13 +1,15 @@
 """What the preflight says of the computer and of the running force sensor."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.sample import Record
-from experiments.console import GOOD, WARNING
-from ft_sensor.reading import axis_names
+from experiments.console import BAD, GOOD, WARNING
+from ft_sensor.reading import axis_names, largest_traction
+from ft_sensor.serial_sensor import BURSTY
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
@@ -71,4 +73,33 @@ def check_wrenches(samples: Record, now_ns: int) -> Finding:
         axes = axis_names(int(np.bitwise_or.reduce(samples["saturated"])))
         text += f", {saturated} saturated ({', '.join(axes)})"
     is_fine = age < OLD_MS and noise < NOISY and not saturated
+    return Finding(GOOD if is_fine else WARNING, name, text)
+
+
+def reach_words(facts: Mapping[str, str], lever: float) -> str:
+    """Return the largest traction that a sensor with these facts can measure.
+
+    Args:
+        facts: what it says about itself; "ranges" has six numbers [N, N m].
+        lever: how far below its origin the sole is [m].
+    """
+    fx, fy, fz, tx, ty, tz = map(float, facts["ranges"].split())
+    most = largest_traction((fx, fy, fz, tx, ty, tz), lever)
+    return f"F_t up to {most:.0f} N"
+
+
+def check_stream(facts: Mapping[str, str]) -> Finding | None:
+    """Grade a serial stream by what became of it; None for a sensor on the bus."""
+    name = "F/T stream"
+    if "frames" not in facts and "trouble" not in facts:
+        return None
+    if facts.get("trouble"):
+        return Finding(BAD, name, facts["trouble"])
+    text = f"{facts['lost']} of {int(facts['frames']) + int(facts['lost'])} lost"
+    text += f", {facts['bad_checks']} damaged"
+    bursts, reads = int(facts["bursts"]), int(facts["reads"])
+    is_bursty = bursts > BURSTY * reads
+    if is_bursty:
+        text += ", comes in bursts: latency timer of the adapter to 1 ms"
+    is_fine = not is_bursty and facts["lost"] == facts["bad_checks"] == "0"
     return Finding(GOOD if is_fine else WARNING, name, text)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from acquisition.errors import SettingsError
+from experiments.messages import CATALOGUE
 from experiments.rehearsing import Rehearsing
 
 REJECT_REASONS = {
@@ -40,6 +41,8 @@ class Prompt(Enum):
     PAUSED = "paused"
     RECORDING = "recording"
     REVIEW = "review"
+    NOTE = "note"
+    FOOT = "foot"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +65,19 @@ class Asked:
 
 
 class Keys(Protocol):
-    """Answers prompts with keys: space, k, r and a digit, q."""
+    """Answers prompts with keys: space, k, r and a digit, q; and notes with a line."""
+
+    @property
+    def draft(self) -> str:
+        """What has been typed of a line so far."""
+        ...
 
     def answer(self, asked: Asked) -> str:
         """Return the keys pressed since the last call, "" for none."""
+        ...
+
+    def line(self, asked: Asked) -> str | None:
+        """Return the line that was typed, "" where it was given up, None before."""
         ...
 
 
@@ -75,10 +87,17 @@ class AutoKeys:
     It gives up where a person would: a rehearsal must come to an end.
     """
 
+    draft = ""
+
     def answer(self, asked: Asked) -> str:
         """Return a key as soon as it makes sense."""
         answer = _AUTOMATIC.get(asked.prompt)
         return answer(asked) if answer is not None else ""
+
+    def line(self, asked: Asked) -> str | None:
+        """Return nothing: it never has anything to note."""
+        del asked
+        return ""
 
 
 def _lift_key(asked: Asked) -> str:
@@ -110,53 +129,11 @@ _AUTOMATIC: dict[Prompt, Callable[[Asked], str]] = {
     Prompt.PAUSED: lambda _: " ",
     Prompt.TOUCH: _touch_key,
     Prompt.REVIEW: _review_key,
+    Prompt.FOOT: lambda _: " ",
 }
 
 
-class ScriptKeys:
-    """Answers the reviews from a file, one per line; the rest like AutoKeys.
-
-    Lines: `keep`, `redo REASON` (1-5), `quit`; `#` begins a comment. After the last
-    line everything that is complete is kept.
-
-    Raises:
-        SettingsError: the file cannot be read or a line is none of these.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._auto = AutoKeys()
-        try:
-            lines = path.read_text().splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise SettingsError(
-                f"The operator script {path} cannot be read.",
-                hint="Name a text file or auto. Nothing was started.",
-            ) from error
-        self._keys = [
-            _script_key(path, number, line.split("#")[0].split())
-            for number, line in enumerate(lines, 1)
-            if line.split("#")[0].strip()
-        ]
-
-    def answer(self, asked: Asked) -> str:
-        """Return the next line's keys at a review."""
-        if asked.prompt is Prompt.REVIEW and self._keys:
-            return self._keys.pop(0)
-        return self._auto.answer(asked)
-
-
-def _script_key(path: Path, number: int, words: list[str]) -> str:
-    if words == ["keep"]:
-        return "k"
-    if words == ["quit"]:
-        return "q"
-    if len(words) == 2 and words[0] == "redo" and words[1] in REJECT_REASONS:
-        return "r" + words[1]
-    raise SettingsError(
-        f"{path}, line {number}: {' '.join(words)!r} - expected keep, redo 1..5 or "
-        "quit.",
-        hint="Nothing was started.",
-    )
+_ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
 
 
 class RehearsedHand:
@@ -169,7 +146,7 @@ class RehearsedHand:
     def follow(self, asked: Asked) -> None:
         """Do what a person would do at this prompt; once per prompt."""
         key = (asked.prompt, asked.trial, asked.attempt)
-        if key == self._seen:
+        if key == self._seen or asked.prompt in _ASIDE:
             return
         self._seen = key
         if asked.prompt is Prompt.SUPPORT:
@@ -199,12 +176,12 @@ def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
     if script == "auto" or (script is None and is_fake and not has_person):
         return AutoKeys()
     if script is not None:
+        from experiments.scripted import ScriptKeys
+
         return ScriptKeys(Path(script))
     if stdin is None or not has_person:
-        raise SettingsError(
-            "A real session needs a person at a terminal, and there is none.",
-            hint="Run it in a terminal, or add --fake. Nothing was started.",
-        )
+        message = CATALOGUE["nobody"]
+        raise SettingsError(message.what, hint=message.do)
     from experiments.terminal import TerminalKeys
 
     return TerminalKeys(stdin.fileno())

@@ -1,14 +1,18 @@
 """Is the rig fit to run? Every check graded, with what to do beside it."""
 
-import shutil
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.devices import SafetyMode
-from acquisition.errors import LinkError, PreflightError, TractionError
+from acquisition.errors import (
+    LinkError,
+    LinkTimeoutError,
+    PreflightError,
+    TractionError,
+)
 from acquisition.timing import SLOW_EXCHANGE_NS, loop_report
 from experiments import provenance
 from experiments.console import BAD, GOOD, WARNING, Console
@@ -18,11 +22,13 @@ from experiments.machine_checks import (
     Finding,
     check_code,
     check_governor,
+    check_stream,
     check_wrenches,
+    reach_words,
 )
-from experiments.messages import CATALOGUE
+from experiments.messages import preflight_error
 from experiments.rigs import FakeOptions, Rig, build_rig
-from experiments.settings import Settings, TerrainRow
+from experiments.settings import RigSettings, Settings, TerrainRow
 from wam.health import complaints, temperature_range
 
 LOOP_TEST = 5.0  # s
@@ -47,6 +53,11 @@ class Preflight:
     checks: tuple[Check, ...]
     devices: dict[str, str]
 
+    def after(self, finding: Finding) -> "Preflight":
+        """Return the page with what was found before it."""
+        first = Check(finding.mark, finding.name, finding.text)
+        return replace(self, checks=(first, *self.checks))
+
     def as_dict(self) -> dict[str, object]:
         """Return the page for preflight.json."""
         return {"checks": [asdict(check) for check in self.checks]}
@@ -61,9 +72,7 @@ def connect_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -
     try:
         return build_rig(settings, row, fake)
     except LinkError as error:
-        raise PreflightError(
-            error.message, hint=error.hint, arm_state="not touched"
-        ) from error
+        raise _not_reached(error, settings.rig) from error
 
 
 def run_preflight(
@@ -99,6 +108,7 @@ def run_preflight(
     rig.crew.begin()
     _check_loop(rig, seconds, add)
     note(check_wrenches(wrenches.read(), rig.clock.now_ns()))
+    _check_stream(rig, note)
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
     return Preflight(tuple(checks), {**devices, **grants})
 
@@ -108,7 +118,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
         info = rig.crew.start_arm()
     except TractionError as error:
         add(BAD, "arm", str(error))
-        raise _as_preflight(error, "not touched") from error
+        raise _not_reached(error, rig.settings.rig) from error
     versions = sorted({puck.vers for puck in info.pucks})
     woken = sum(puck.was_asleep for puck in info.pucks)
     parts = [f"firmware {', '.join(map(str, versions))}"]
@@ -120,7 +130,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
     add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
     if not info.is_zeroed:
         add(BAD, "zero", "not zeroed")
-        raise _named("not-zeroed")
+        raise preflight_error("not-zeroed")
     faults = [f"{fault} fault: press Shift-idle" for fault in info.pendant.faults]
     is_calm = info.safety_mode is SafetyMode.IDLE and not faults
     name = info.safety_mode.name.lower().replace("_", "-")
@@ -134,8 +144,27 @@ def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
         raise _as_preflight(error, "idle") from error
-    add(GOOD, "F/T sensor", f"{facts['model']}, {facts['measured_rate']}")
+    name = f"{facts['model']}, {facts['measured_rate']}"
+    add(GOOD, "F/T sensor", f"{name}, {reach_words(facts, _lever(rig))}")
     return facts
+
+
+def _lever(rig: Rig) -> float:
+    """Return how far below the sensor's origin the sole is [m]."""
+    tool = rig.model.tool
+    assert tool is not None
+    return float(tool.sole[2] - tool.sensor_height)
+
+
+def _check_stream(rig: Rig, note: Callable[[Finding], None]) -> None:
+    """Grade what became of the sensor's stream while the loop was tested."""
+    facts = rig.crew.sensor_facts()
+    found = check_stream(facts)
+    if found is None:
+        return
+    note(found)
+    if found.mark == BAD:
+        raise preflight_error("ft-lost", why=facts["trouble"].rstrip("."))
 
 
 def start_devices(rig: Rig) -> None:
@@ -158,7 +187,7 @@ def _check_exchange(rig: Rig, add: Add) -> None:
     lost = EXCHANGE_CYCLES - len(times)
     if len(times) < EXCHANGE_CYCLES // 2:
         add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
-        raise _named("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
+        raise preflight_error("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
     p50, p99 = np.percentile(times, (50, 99)) / 1e6
     text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete"
     is_slow = p99 * 1e6 > SLOW_EXCHANGE_NS or lost > 1
@@ -189,15 +218,13 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
 
 def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     """Run the loop for a while, the arm idle, and grade its cadence."""
-    if rig.is_stepped:  # it keeps time by definition
-        rig.crew.desk.advance(STEPPED_TEST)
-        return
+    seconds = STEPPED_TEST if rig.is_stepped else seconds
     timings = rig.crew.desk.timings()
     rig.crew.desk.advance(seconds)
     report = loop_report(timings.read())
     if report is None:
         add(BAD, "loop", "no cycle ran")
-        raise _named("loop-dead")
+        raise preflight_error("loop-dead")
     worst = rig.settings.rig.limits.late_per_second
     text = (
         f"{report.rate:.1f} Hz · p99.9 late {report.late.p999 / 1000:.2f} ms · "
@@ -216,21 +243,25 @@ def check_disk(rig: Rig, data: Path, add: Add) -> None:
     folder = data
     while not folder.exists():
         folder = folder.parent
-    free = shutil.disk_usage(folder).free / 1e9
+    free = rig.free_bytes(folder) / 1e9
     limit = rig.settings.rig.limits.free_disk_gb
     if free < max(limit, SESSION_GB):
         add(BAD, "disk", f"{free:.1f} GB free")
-        raise _named("disk-full", free=free, need=SESSION_GB, limit=limit)
+        raise preflight_error("disk-full", free=free, need=SESSION_GB, limit=limit)
     add(GOOD, "disk", f"{free:.0f} GB free")
 
 
-def _named(name: str, **facts: object) -> PreflightError:
-    message = CATALOGUE[name]
-    return PreflightError(
-        message.what.format_map(facts),
-        hint=message.do.format_map(facts),
-        arm_state=message.arm,
-    )
+def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
+    """Return the refusal of an arm that cannot be reached, or answers wrongly.
+
+    A bus that is down is told in the catalogue's words, with the command that helps.
+    """
+    is_bus = isinstance(error, LinkError) and not isinstance(error, LinkTimeoutError)
+    can = settings.can
+    if not is_bus or can.interface != "socketcan":
+        return _as_preflight(error, "not touched")
+    facts = {"channel": can.channel, "bitrate": can.bitrate}
+    return preflight_error("can-down", detail=error.message, **facts)
 
 
 def _as_preflight(error: TractionError, arm_state: str) -> PreflightError:

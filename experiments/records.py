@@ -13,8 +13,8 @@ from experiments.console import WARNING
 from experiments.lock import session_lock
 from experiments.phases import Event
 from experiments.session import KEEP, refusal
-from experiments.shelf import find_sidecar
-from experiments.store import SessionFolder, sha256_of, write_json
+from experiments.shelf import add_remark, find_sidecar
+from experiments.store import SessionFolder, sha256_of
 from experiments.trial import TrialName
 
 LONGEST_TEXT = 2000  # characters
@@ -86,7 +86,7 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
         book.note(
             Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
         )
-        return f"Noted on {folder.id} {_add_to_sidecar(book, name, text, who)}."
+        return f"Noted on {folder.id} {add_remark(folder, name, text, who)}."
 
 
 def change_verdict(
@@ -195,17 +195,3 @@ def _check_file(book: Book, name: TrialName) -> list[str]:
     if status == "complete":
         return []
     return [f"{WARNING} {name.rejected} is {status}: {sidecar.get('stop_reason')}."]
-
-
-def _add_to_sidecar(book: Book, name: TrialName, text: str, who: str) -> str:
-    """Add the remark to the sidecar; return the name of the trial."""
-    folder = book.folder
-    is_kept = book.state.kept_attempt(name.number) == name.attempt
-    path = folder.rejected / f"{name.rejected}.json"
-    if is_kept:
-        path = folder.trials / f"{name.kept}.json"
-    sidecar = find_sidecar(folder, name)
-    remark = {"text": text, "who": who, "when": book.folder.events()[-1]["utc"]}
-    notes: list[object] = [*(sidecar.get("notes") or []), remark]
-    write_json(path, {**sidecar, "notes": notes})
-    return path.stem

@@ -15,6 +15,7 @@ from experiments.book import Book, open_book
 from experiments.conduct import Opening, Request, conduct
 from experiments.console import Console
 from experiments.lock import session_lock
+from experiments.messages import CATALOGUE
 from experiments.operator import choose_keys
 from experiments.phases import Event, Phase
 from experiments.rigs import FakeOptions
@@ -40,6 +41,7 @@ class Reopening:
         operator: name of the person; empty = the one of the session.
         script: who answers the reviews; None = whoever is there.
         can_log: where the bus is written to.
+        faults: to be raised in the simulation, as on the command line.
     """
 
     data: Path
@@ -51,6 +53,7 @@ class Reopening:
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
+    faults: tuple[str, ...] = ()
 
 
 def resume(folder: SessionFolder, how: Reopening) -> int:
@@ -64,7 +67,7 @@ def resume(folder: SessionFolder, how: Reopening) -> int:
         book = _settled(folder, how.console)
         if book.state.phase is Phase.CRASHED and book.state.is_complete:
             book.note(Event.ENDED, reason="complete")
-            how.console.say(f"{folder.id} is complete: nothing is left to record.")
+            how.console.say(CATALOGUE["complete"].text({"session": folder.id}))
             return 0
         return _reopen(book, how, Event.RESUMED, {})
 
@@ -100,7 +103,8 @@ def _settled(folder: SessionFolder, console: Console) -> Book:
     book = open_book(folder, SystemClock())
     said = settle(book)
     if said:
-        console.say(f"{folder.id} ended without closing. {said}")
+        facts = {"session": folder.id, "redone": f" {said}"}
+        console.say(CATALOGUE["put-away"].text(facts))
     return book
 
 
@@ -112,9 +116,9 @@ def _check_kind(folder: SessionFolder, how: Reopening) -> None:
             f"{folder.id} is a session with the real arm.",
             hint="Leave --fake out. Simulated and real trials do not mix.",
         )
-    if how.is_fast or how.script:
+    if how.is_fast or how.script or how.faults:
         raise SettingsError(
-            "--fast and --operator-script work only with a simulated session.",
+            "--fast, --fault and --operator-script work only with a simulated session.",
             hint="Nothing was started.",
         )
 
@@ -141,6 +145,7 @@ def _reopen(
         operator=how.operator or str(before.get("operator") or ""),
         keys=choose_keys(how.script, is_fake=folder.is_simulated),
         console=console,
+        faults=how.faults,
         can_log=how.can_log,
     )
     kept = len(book.state.kept)

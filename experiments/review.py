@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.sample import Flag
 from analysis.events import find_slips
@@ -35,6 +36,7 @@ class Review:
         fast: share of them above 0.2 m/s.
         slips: number of slips.
         ratio: slope of F_t over F_n of the kept samples; NaN without load.
+        counts: samples per speed and load, shape (4, 4), see analysis.quality.
     """
 
     worst_gap: float
@@ -46,6 +48,7 @@ class Review:
     fast: float
     slips: int
     ratio: float
+    counts: NDArray[np.int64]
 
     @property
     def known_ratio(self) -> float | None:
@@ -112,6 +115,7 @@ def review_trial(path: Path) -> Review:
     q7 = trial.cycles["position"][:, 6]
     flags = trial.cycles["flags"]
     steps = np.diff(trial.cycles["cycle"].astype(int))
+    covered = coverage([prepared])
     return Review(
         worst_gap=float(np.diff(trial.t).max()),
         missed=int((steps - 1).sum()),
@@ -119,7 +123,8 @@ def review_trial(path: Path) -> Review:
         saturated=float(((flags & Flag.FT_SATURATED) != 0).mean()),
         stale=float(((flags & Flag.FT_FRESH) == 0).mean()),
         kept=int(prepared.kept),
-        fast=coverage([prepared]).fast_share,
+        fast=covered.fast_share,
         slips=len(find_slips(prepared.smooth)),
         ratio=quick_ratio(prepared),
+        counts=covered.counts,
     )

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
@@ -24,8 +27,10 @@ from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from wam.constants import load_constants
 from wam.model import ArmModel
 
-if TYPE_CHECKING:
-    pass
+
+def free_bytes(folder: Path) -> int:
+    """Return how much room is left where `folder` is [bytes]."""
+    return shutil.disk_usage(folder).free
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,7 @@ class Rig:
         gravity_text: the gravity calibration in use; empty for none.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
+        free_bytes: tells how much room is left where a folder is.
     """
 
     clock: Clock
@@ -76,6 +82,7 @@ class Rig:
     gravity_text: str
     rehearsal: Rehearsing | None
     is_stepped: bool
+    free_bytes: Callable[[Path], int] = free_bytes
 
     @property
     def is_simulated(self) -> bool:

@@ -2,13 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.operator import REJECT_REASONS
+
 _BARS = "▁▂▃▄▅▆▇█"
 _ABSURD = 1e9  # nothing a sensor or an encoder can mean
 _NARROW, _WIDE = 10, 40  # characters of a sparkline
+READY_KEYS = "[space] record   [n]ote   [v]iew last   [p]ause   [q]uit after this"
+NOTE_KEYS = "Type the note: Enter ends it, Esc gives it up."
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,34 @@ def recording_lines(view: RecordingView, width: int) -> list[str]:
     ]
 
 
+def live_line(
+    trial: str,
+    where: tuple[float, float, float],
+    traction: tuple[float, float, float],
+    late: int,
+) -> str:
+    """Return a running trial in one line, for where nothing can be drawn.
+
+    Args:
+        trial: its name.
+        where: time since the start [s], displacement and travel [m].
+        traction: v_t, F_t, F_n [m/s, N, N].
+        late: cycles that were late.
+    """
+    seconds, displacement, travel = where
+    v_t, F_t, F_n = traction
+    return (
+        f"● REC {trial}  {seconds:4.1f} s  {displacement:.2f} of {travel:.2f} m  "
+        f"F_n {F_n:.1f} N  F_t {F_t:.1f} N  v_t {v_t:.3f} m/s  late {late}"
+    )
+
+
+def review_keys() -> str:
+    """Return the keys of the review; there is no default on purpose."""
+    reasons = "  ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
+    return f"[k]eep   [r]edo: {reasons}   [n]ote"
+
+
 @dataclass(frozen=True, slots=True)
 class ReadyView:
     """Between two trials.
@@ -89,7 +122,8 @@ class ReadyView:
         wanted: how many are to be kept.
         kept: how many are.
         rejected: how many were not.
-        elapsed: since the session began [s].
+        elapsed: since the session was opened [s].
+        left: how long the missing ones will take [s]; None = nobody knows yet.
         reset: what is to be done to the terrain before each trial.
         suggestion: of the next push; empty if there is none.
     """
@@ -101,25 +135,67 @@ class ReadyView:
     kept: int
     rejected: int
     elapsed: float
+    left: float | None
     reset: tuple[str, ...]
     suggestion: str
 
 
 def ready_lines(view: ReadyView) -> list[str]:
     """Return the screen between two trials."""
-    left = ""
-    if view.kept:
-        minutes = view.elapsed / view.kept * (view.wanted - view.kept) / 60
-        left = f" · left about {minutes:.0f} min"
+    left = "" if view.left is None else f" · left about {ceil(view.left / 60)} min"
     lines = [
         f"{view.session} {view.terrain} · trial {view.trial} of {view.wanted} · kept "
-        f"{view.kept} · rejected {view.rejected}        ARM: holding    elapsed "
-        f"{_clock(view.elapsed)}{left}"
+        f"{view.kept} · rejected {view.rejected}    ARM: floating",
+        f"Elapsed {_clock(view.elapsed)}{left}",
     ]
     if view.reset:
         lines.append("Reset: " + " ".join(f"☐ {step}" for step in view.reset))
     if view.suggestion:
         lines.append(f"Suggested next: {view.suggestion}")
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class EndView:
+    """A session that has nothing left to record.
+
+    Attributes:
+        session: its id.
+        terrain: its terrain.
+        kept: how many trials are kept.
+        wanted: how many are to be.
+        rejected: how many were not.
+        elapsed: how long this opening took [s].
+        estimate: how long it looked like taking after its first kept trial [s].
+        drift: of the force between first and last tare [N]; empty = not known.
+    """
+
+    session: str
+    terrain: str
+    kept: int
+    wanted: int
+    rejected: int
+    elapsed: float
+    estimate: float | None
+    drift: tuple[float, ...]
+
+
+def end_lines(view: EndView) -> list[str]:
+    """Return the page at the end of a session."""
+    estimate = ""
+    if view.estimate is not None:
+        estimate = f" · estimated after the first trial: {_clock(view.estimate)}"
+    lines = [
+        f"{view.session} {view.terrain} · kept {view.kept} of {view.wanted} · rejected "
+        f"{view.rejected}",
+        f"Took {_clock(view.elapsed)}{estimate}",
+    ]
+    if view.drift:
+        axes = "  ".join(
+            f"{axis} {value:+.2f}"
+            for axis, value in zip(("fx", "fy", "fz"), view.drift, strict=True)
+        )
+        lines.append(f"Force drifted between first and last tare [N]: {axes}")
     return lines
 
 

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from math import isfinite
+from typing import Any, cast
 
 from experiments.phases import TABLE, Event, Phase, Step
 
 KEEP, REJECT = "keep", "reject"
 _EVENTS = {str(event): event for event in Event}
+_AXES = 6  # of a wrench
 _Facts = Mapping[str, Any]
 
 
@@ -27,6 +29,9 @@ class SessionState:
         is_redo: it was opened to repeat one trial and for nothing else.
         openings: how often it was opened.
         ended: why it ended: "complete", "unfinished", a fault; empty while open.
+        tares: how many tares were taken since it was opened.
+        first_bias, last_bias: what the sensor showed beside the foot's weight in the
+            first and in the last of them [N, N m]; empty before.
     """
 
     phase: Phase = Phase.PLANNED
@@ -40,6 +45,20 @@ class SessionState:
     is_redo: bool = False
     openings: int = 0
     ended: str = ""
+    tares: int = 0
+    first_bias: tuple[float, ...] = ()
+    last_bias: tuple[float, ...] = ()
+
+    @property
+    def drift(self) -> tuple[float, ...]:
+        """What the force has drifted between first and last tare [N], three numbers.
+
+        Empty before there are two: the bracket is the force's uncertainty.
+        """
+        if self.tares < 2:
+            return ()
+        pairs = zip(self.first_bias[:3], self.last_bias[:3], strict=True)
+        return tuple(round(last - first, 3) for first, last in pairs)
 
     @property
     def kept(self) -> tuple[int, ...]:
@@ -115,6 +134,13 @@ def _whole(event: _Facts, key: str) -> int:
     """Return the whole number at `key`, 0 where there is none above 0."""
     value = event.get(key)
     return value if type(value) is int and value > 0 else 0
+
+
+def _numbers(value: object) -> tuple[float, ...]:
+    """Return finite numbers of a list, nothing where there is anything else in it."""
+    found = cast("list[object]", value) if isinstance(value, list) else []
+    numbers = tuple(x for x in found if type(x) is float and isfinite(x))
+    return numbers if len(numbers) == len(found) else ()
 
 
 # --- what a phase alone cannot know ------------------------------------------------
@@ -201,7 +227,8 @@ def _start(state: SessionState, event: _Facts) -> SessionState:
 def _open(state: SessionState, event: _Facts) -> SessionState:
     del event
     openings = state.openings + 1
-    return replace(state, openings=openings, ended="", redoing=None, is_redo=False)
+    state = replace(state, openings=openings, ended="", redoing=None, is_redo=False)
+    return replace(state, tares=0, first_bias=(), last_bias=())
 
 
 def _redo(state: SessionState, event: _Facts) -> SessionState:
@@ -212,6 +239,14 @@ def _redo(state: SessionState, event: _Facts) -> SessionState:
 def _end(state: SessionState, event: _Facts) -> SessionState:
     reason = str(event.get("reason") or "unfinished")
     return replace(state, ended=reason, redoing=None, is_redo=False)
+
+
+def _tare(state: SessionState, event: _Facts) -> SessionState:
+    bias = _numbers(event.get("bias"))
+    if len(bias) != _AXES:
+        return state
+    first = state.first_bias or bias
+    return replace(state, tares=state.tares + 1, first_bias=first, last_bias=bias)
 
 
 def _start_trial(state: SessionState, event: _Facts) -> SessionState:
@@ -254,6 +289,7 @@ _CHANGES: Mapping[Event, Callable[[SessionState, _Facts], SessionState]] = {
     Event.STARTED: _start,
     Event.RESUMED: _open,
     Event.REDO: _redo,
+    Event.TARED: _tare,
     Event.SET_ASIDE: _set_aside,
     Event.TRIAL_STARTED: _start_trial,
     Event.TRIAL_KEPT: _keep,

@@ -27,6 +27,7 @@ _Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
 _M = TypeVar("_M", bound=BaseModel)
+_LARGEST = 1_000_000  # bytes; a matrix has a few thousand
 _Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
 
 
@@ -100,6 +101,7 @@ class LimitSection(Section):
     ft_stop_ms: Positive = Field(examples=[20.0])
     late_per_second: Whole = Field(ge=1, le=500, examples=[10])
     tare_spread: Positive = Field(examples=[0.5])
+    residual: Positive = Field(default=1.0, examples=[1.0])
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
 
 
@@ -136,6 +138,20 @@ class LoopSection(Section):
     spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
 
 
+class OperatorSection(Section):
+    """How the program and the person at the arm tell each other something.
+
+    Attributes:
+        bell: the terminal rings at the start, when too fast, and at the end.
+        speech: the same is spoken where a speech program is installed.
+        double_tap: two presses of the foot start a trial, and keep it.
+    """
+
+    bell: bool = Field(default=True, strict=True, examples=[True])
+    speech: bool = Field(default=False, strict=True, examples=[False])
+    double_tap: bool = Field(default=False, strict=True, examples=[False])
+
+
 class RigSettings(Section):
     """Everything in rig.toml."""
 
@@ -147,6 +163,7 @@ class RigSettings(Section):
     limits: LimitSection
     gravity: GravitySection = GravitySection(model="cad")
     loop: LoopSection = LoopSection()
+    operator: OperatorSection = OperatorSection()
     safety: SafetySection = _POWER_UP
 
 
@@ -280,8 +297,12 @@ def load_settings(config: Path | None) -> Settings:
 
 def _read(path: Path) -> str:
     try:
+        # A pipe or a device would be read for ever.
+        is_plain = path.is_file() or path.is_dir() or not path.exists()
+        if not is_plain or path.stat().st_size > _LARGEST:
+            raise ValueError
         return path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is no text"
         raise SettingsError(
             f"{path} cannot be read ({reason}).",
@@ -292,7 +313,7 @@ def _read(path: Path) -> str:
 def _parse(model: type[_M], text: str, name: str) -> _M:
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
     try:
         return model.model_validate(data)

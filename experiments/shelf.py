@@ -97,6 +97,25 @@ def shelve(folder: SessionFolder, decision: Decision) -> None:
         source.unlink(missing_ok=True)
 
 
+def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> str:
+    """Add a remark, which the journal has as its last event, to an attempt's sidecar.
+
+    Returns:
+        Name of the sidecar.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    path = folder.trials / f"{name.kept}.json"
+    if not _is_of(path, name):
+        path = folder.rejected / f"{name.rejected}.json"
+    sidecar = find_sidecar(folder, name)
+    remark = {"text": text, "who": who, "when": folder.events()[-1]["utc"]}
+    notes: list[object] = [*(sidecar.get("notes") or []), remark]
+    write_json(path, {**sidecar, "notes": notes})
+    return path.stem
+
+
 def _is_of(sidecar: Path, name: TrialName) -> bool:
     return read_json(sidecar).get("attempt") == name.attempt
 

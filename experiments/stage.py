@@ -7,7 +7,9 @@ from typing import TypeVar
 
 from acquisition.cycle import ArmState
 from acquisition.desk import Desk
+from acquisition.guard import Verdict
 from experiments.company import Company, FaultedError, StopAskedError
+from experiments.faults import Moment
 from experiments.operator import Asked, Prompt
 from experiments.rigs import Rig
 from experiments.trial import TrialName
@@ -15,6 +17,7 @@ from experiments.trial import TrialName
 TICK = 0.02  # the console looks this often [s]
 REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
+_OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] means something else
 _T = TypeVar("_T")
 
 
@@ -42,7 +45,36 @@ class Stage:
         *,
         is_complete: bool = False,
     ) -> str:
-        """Let 20 ms pass; return the key pressed, raise what stops everything."""
+        """Let 20 ms pass; return the key pressed, raise what stops everything.
+
+        Raises:
+            FaultedError: the guard stopped the arm.
+            StopAskedError: a stop was asked for; at the review `StopFlag` says so.
+            TractionError: a process or the disk is in trouble.
+        """
+        asked = self._pass(prompt, name, is_complete=is_complete)
+        if self.company.stop.count and prompt is not Prompt.REVIEW:
+            raise StopAskedError
+        key = self.company.keys.answer(asked)
+        if key == "q" and prompt not in _OWN_QUIT:
+            raise StopAskedError
+        return key
+
+    def line(self, name: TrialName) -> str | None:
+        """Let 20 ms pass; return a note as it was typed, "" given up, None before.
+
+        Raises:
+            FaultedError, TractionError: as `tick`.
+        """
+        asked = self._pass(Prompt.NOTE, name)
+        if self.company.stop.count:
+            return ""
+        return self.company.keys.line(asked)
+
+    def _pass(
+        self, prompt: Prompt, name: TrialName | None, *, is_complete: bool = False
+    ) -> Asked:
+        """Let 20 ms pass and return what is asked for, which the hand follows."""
         self.control.advance(TICK)
         self._show()
         verdict = self.control.status.verdict
@@ -50,8 +82,6 @@ class Stage:
             raise FaultedError(verdict)
         if self.company.console.is_lost:
             self.company.stop.ask()
-        if self.company.stop.count and prompt is not Prompt.REVIEW:
-            raise StopAskedError
         number, attempt = (name.number, name.attempt) if name else (0, 0)
         now = self.rig.clock.now_ns()
         if self._asked != (prompt, number, attempt):
@@ -61,10 +91,7 @@ class Stage:
         asked = Asked(prompt, number, attempt, is_complete, since)
         if self.company.hand is not None:
             self.company.hand.follow(asked)
-        key = self.company.keys.answer(asked)
-        if key == "q" and prompt is not Prompt.REVIEW:
-            raise StopAskedError
-        return key
+        return asked
 
     def look(self, view: Callable[[int], list[str]] | None) -> None:
         """Show what `view(width)` returns eight times a second, None for nothing."""
@@ -80,15 +107,20 @@ class Stage:
             self._shown_ns = now_ns
             console.panel(self.view(console.width))
 
-    def raise_fault(self, name: TrialName, seconds: float) -> None:
-        """Raise the rehearsed fault when its moment in trial `name` has come."""
-        plan = self.company.fault
-        rehearsal = self.rig.rehearsal
-        if plan is None or rehearsal is None or plan.trial != name.number:
-            return
-        if seconds >= plan.seconds:
-            rehearsal.inject(plan.name)
-            self.company.fault = None
+    def raise_faults(self, moment: Moment, number: int, seconds: float) -> None:
+        """Raise rehearsed faults whose moment in trial `number` has come."""
+        if self.company.faults is not None:
+            self.company.faults.raise_due(moment, number, seconds)
+
+    def worst(self, verdict: Verdict) -> Verdict:
+        """Return `verdict`, or what the guard has said since then if that is worse.
+
+        A fault that goes on may have taken the arm away while a trial was put away.
+        """
+        self.control.advance(TICK)
+        newest = self.control.status.verdict
+        is_worse = newest is not None and newest.severity > verdict.severity
+        return newest if newest is not None and is_worse else verdict
 
     def mend(self) -> None:
         """Let a rehearsed fault go, and the guard's verdict with it."""
@@ -119,6 +151,14 @@ class Stage:
             self.control.advance(DAMP_SECONDS)
             self.control.request(ArmState.IDLE)
             self.control.advance(TICK)
+
+    def leave(self) -> None:
+        """End the session on purpose.
+
+        Raises:
+            StopAskedError: always; the way out is the one of Ctrl-C.
+        """
+        raise StopAskedError
 
     def make_safe(self) -> bool:
         """Idle the arm and let go of an open file; return whether it is confirmed."""

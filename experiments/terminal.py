@@ -1,6 +1,7 @@
 """Single keys from a terminal, which is given back as it was whatever happens."""
 
 import atexit
+import codecs
 import contextlib
 import os
 import select
@@ -12,6 +13,8 @@ from typing import Self
 from experiments.operator import REJECT_REASONS, Asked, Keys, Prompt
 
 _AT_ONCE = 256  # bytes
+LONGEST_LINE = 500  # characters of a note
+_ESCAPE, _BACKSPACE = "\x1b", "\x7f\x08"
 
 
 class Cbreak:
@@ -66,11 +69,14 @@ class TerminalKeys:
 
     Attributes:
         descriptor: of the terminal.
+        draft: what has been typed of a line so far.
     """
 
     def __init__(self, descriptor: int) -> None:
         self.descriptor = descriptor
+        self.draft = ""
         self._waiting = ""
+        self._decoder = codecs.getincrementaldecoder("utf-8")("ignore")
         self._is_end = False
         self._is_rejecting = False
         self._prompt: Prompt | None = None
@@ -80,16 +86,54 @@ class TerminalKeys:
 
         What was typed before the prompt came was not meant for it and is forgotten.
         """
-        self._read()
-        if asked.prompt is not self._prompt:
-            self._prompt = asked.prompt
-            self._waiting, self._is_rejecting = "", False
+        self._hear(asked.prompt)
         while self._waiting:
-            key, self._waiting = self._waiting[0], self._waiting[1:]
-            found = self._take(key.lower(), asked.prompt)
+            found = self._take(self._next().lower(), asked.prompt)
             if found:
                 return found
         return "q" if self._is_end else ""
+
+    def line(self, asked: Asked) -> str | None:
+        """Return the line when Enter ends it, "" when Esc gives it up, None before.
+
+        Backspace takes a character back. An arrow key, which begins like Esc, does
+        nothing.
+        """
+        self._hear(asked.prompt)
+        while self._waiting:
+            key = self._next()
+            if key in "\r\n":
+                found, self.draft = self.draft, ""
+                return found
+            if key == _ESCAPE and not self._skip_sequence():
+                self.draft = ""
+                return ""
+            if key in _BACKSPACE:
+                self.draft = self.draft[:-1]
+            elif key.isprintable() and len(self.draft) < LONGEST_LINE:
+                self.draft += key
+        return "" if self._is_end else None
+
+    def _hear(self, prompt: Prompt) -> None:
+        """Read what is there; what came before `prompt` is forgotten."""
+        self._read()
+        if prompt is not self._prompt:
+            self._prompt = prompt
+            self._waiting, self._is_rejecting = "", False
+            self.draft = ""
+
+    def _next(self) -> str:
+        key, self._waiting = self._waiting[0], self._waiting[1:]
+        return key
+
+    def _skip_sequence(self) -> bool:
+        """Pass over the rest of an arrow or function key; return whether it was one."""
+        if self._waiting[:1] not in ("[", "O"):
+            return False
+        self._next()
+        while self._waiting and not (key := self._next()).isalpha() and key != "~":
+            pass
+        return True
 
     def _read(self) -> None:
         while not self._is_end and select.select([self.descriptor], [], [], 0)[0]:
@@ -98,7 +142,7 @@ class TerminalKeys:
             except OSError:
                 data = b""
             self._is_end = not data
-            self._waiting += data.decode(errors="ignore")
+            self._waiting += self._decoder.decode(data)
 
     def _take(self, key: str, prompt: Prompt) -> str:
         if key in "\r\n":

@@ -1,7 +1,8 @@
 """One trial on its way to the disk: header, end conditions, sidecar, flight record."""
 
+from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from acquisition.clock import utc_offset_ns
@@ -23,6 +24,7 @@ from wam.urdf import urdf
 TIME_LIMIT = 30.0  # s
 AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]
 FLIGHT_SECONDS = 2.0
+PACE_SECONDS, PACE_LIMIT = 1.0, 0.2  # s, m/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +134,35 @@ class EndWatch:
         if self.crossed_at is not None and elapsed >= self.crossed_at + AFTER_TRAVEL:
             return "travel"
         return "time-limit" if elapsed >= TIME_LIMIT else ""
+
+
+@dataclass(slots=True)
+class PaceWatch:
+    """Notices a foot that is pushed too fast, not one that slips.
+
+    A slip is over after centimetres; a second at 0.2 m/s is a push that leaves no time
+    to stick, which is all that the friction models live on.
+    """
+
+    _path: deque[tuple[float, float]] = field(
+        default_factory=deque[tuple[float, float]]
+    )
+
+    def is_too_fast(self, elapsed: float, displacement: float) -> bool:
+        """Return whether the last second was too fast; then not again for a second.
+
+        Args:
+            elapsed: since the start of the trial [s], growing.
+            displacement: of the foot along the container [m].
+        """
+        path = self._path
+        path.append((elapsed, displacement))
+        while elapsed - path[0][0] > PACE_SECONDS:
+            start = path.popleft()
+            if displacement - start[1] > PACE_LIMIT * (elapsed - start[0]):
+                path.clear()
+                return True
+        return False
 
 
 def write_truth(rig: Rig, header: TrialHeader, path: Path) -> Verified | None:

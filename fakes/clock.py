@@ -24,11 +24,16 @@ class SteppedClock:
     """Implements acquisition.clock.Clock without the machine's time.
 
     Start and epoch are fixed, so two runs with the same seed have the same times.
+
+    Attributes:
+        world: what goes on while somebody waits.
+        lag_ns: so late a sleep ends, as on a computer that is busy elsewhere [ns].
     """
 
     def __init__(self) -> None:
         self._now_ns = START_NS
         self.world: World | None = None
+        self.lag_ns = 0
 
     def now_ns(self) -> int:
         """Return the simulated monotonic time [ns]."""
@@ -41,16 +46,20 @@ class SteppedClock:
     def sleep_until(self, t_ns: int) -> None:
         """Let the world go on to `t_ns`."""
         if t_ns > self._now_ns:
-            self._now_ns = t_ns
-            if self.world is not None:
-                self.world.advance(t_ns)
+            self._go_to(t_ns + self.lag_ns)
 
     def wait(self, link: Readable, deadline_ns: int) -> bool:
         """Go from event to event until `link` is readable or `deadline_ns` comes."""
         while not link.is_readable():
             event = self.world.next_event_ns() if self.world else None
             if event is None or event > deadline_ns:
-                self.sleep_until(deadline_ns)
+                if deadline_ns > self._now_ns:
+                    self._go_to(deadline_ns)
                 return link.is_readable()
-            self.sleep_until(max(event, self._now_ns + 1))
+            self._go_to(max(event, self._now_ns + 1))
         return True
+
+    def _go_to(self, t_ns: int) -> None:
+        self._now_ns = t_ns
+        if self.world is not None:
+            self.world.advance(t_ns)

@@ -60,6 +60,7 @@ class ArmPlant:
         disturbance: joint torques from outside [N m], shape (7,).
         terrain: the ground; None = the foot hangs above nothing.
         hand: the operator's.
+        finger: force of somebody who touches the foot, terrain frame [N].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
     """
@@ -99,6 +100,7 @@ class ArmPlant:
         self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
         self.hand = Hand(self._dt)
+        self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
         self._sum = _NOTHING  # of the ground's wrench over a cycle
@@ -267,7 +269,10 @@ class ArmPlant:
     def _end_cycle(self) -> None:
         self._ground = ground = [total / self._substeps for total in self._sum]
         self._sum = _NOTHING
-        self._wrist.end_cycle(self._foot_rotation, ground, self._rates[:6])
+        # The hand that holds the arm gives way to nothing that small.
+        felt = [force + more for force, more in zip(ground, self.finger, strict=False)]
+        felt += ground[3:]
+        self._wrist.end_cycle(self._foot_rotation, felt, self._rates[:6])
         if self.truth is not None:
             force = (-ground[0], ground[1], ground[2])
             foot = (*self._sole_at, *self._rates[:3])

@@ -125,6 +125,10 @@ class PuckNetwork:
         """Let a motor puck find `value` for one of its own measurements."""
         self._bank.set_property(node, name, value)
 
+    def forget_positions(self) -> None:
+        """Let nobody know where the joints are, as after power-up."""
+        self._safety.forget_positions()
+
     def strain(self, monitor: Strainable) -> None:
         """Let a monitor of the safety module find fault with what it sees."""
         self._safety.strain(monitor)

@@ -9,7 +9,9 @@ import numpy as np
 from acquisition.clock import Clock
 from acquisition.errors import SettingsError
 from acquisition.sample import Record
+from fakes.body_faults import BodyFaults
 from fakes.can_bus import FakeCanBus
+from fakes.clock import SteppedClock
 from fakes.container import Container
 from fakes.faults import mend_network, network_faults
 from fakes.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
@@ -20,6 +22,7 @@ from fakes.push import Pace
 from fakes.randomness import trial_generators
 from fakes.safety_module import PendantAction
 from fakes.sensor_errors import SensorErrors
+from fakes.sensor_faults import bus_sensor_faults, stream_faults
 from fakes.sensor_kinds import SensorChoice, make_stream
 from fakes.serial_port import FakeSerialPort
 from fakes.terrain import make_terrain
@@ -31,6 +34,7 @@ from wam.model import ArmModel
 from wam.tool import Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
+LAG_NS = 600_000  # more than a cycle may be late
 ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
 _CLOSE = 1e-9  # m and rad, where the search for the start pose ends
 _LARGEST_STEP = 0.5  # rad
@@ -133,6 +137,7 @@ class FakeRig:
         self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
+        self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
         self.stream = make_stream(
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
@@ -159,13 +164,38 @@ class FakeRig:
             times.append(self._port.next_event_ns())
         return min((t for t in times if t is not None), default=None)
 
-    def silence_sensor(self, *, is_mute: bool = True) -> None:
-        """Let the wrist sensor say nothing, or speak again."""
-        if is_mute:
-            self.stream.go_silent()
+    def faults(self) -> dict[str, Callable[[], None]]:
+        """Return what each name of a fault does to the devices."""
+        sensor = bus_sensor_faults(self.network)
+        if not self.network.options.has_sensor:
+            now_ns = self._clock.now_ns
+            sensor = stream_faults(self.stream, self._unplug, now_ns)
+        found = {**sensor, **network_faults(self.network), **self._body.by_name()}
+        if isinstance(self._clock, SteppedClock):
+            found["loop-late"] = lambda: self._let_lag(LAG_NS)
+        return found
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        self.stream.recover()
+        if self.cable is not None:
+            self.cable.plug_in()
+        self._body.mend()
+        self.network.silence(SENSOR_NODE, is_mute=False)
+        mend_network(self.network)
+        self._let_lag(0)
+
+    def _let_lag(self, lag_ns: int) -> None:
+        """Let everybody who sleeps on stepped time wake `lag_ns` too late."""
+        if isinstance(self._clock, SteppedClock):
+            self._clock.lag_ns = lag_ns
+
+    def _unplug(self) -> None:
+        """Pull the sensor's cable; a port that is not open yet will bring nothing."""
+        if self.cable is not None:
+            self.cable.unplug()
         else:
-            self.stream.speak()
-        self.network.silence(SENSOR_NODE, is_mute=is_mute)
+            self.stream.go_silent()
 
     def rake(self, trial: int) -> None:
         """Rake the bed for `trial`: everything random starts anew."""
@@ -199,11 +229,7 @@ class Rehearsal:
     def __init__(self, rig: FakeRig, pace: Pace | None = None) -> None:
         self.rig = rig
         self._pace = pace or Pace()
-        self._faults: dict[str, Callable[[], None]] = {
-            "ft-silent": rig.silence_sensor,
-            "ft-stale": rig.silence_sensor,
-            **network_faults(rig.network),
-        }
+        self._faults = rig.faults()
 
     @property
     def fault_names(self) -> tuple[str, ...]:
@@ -257,8 +283,7 @@ class Rehearsal:
 
     def mend(self) -> None:
         """End every fault that can be ended without the arm."""
-        self.rig.silence_sensor(is_mute=False)
-        mend_network(self.rig.network)
+        self.rig.mend()
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""

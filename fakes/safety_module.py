@@ -105,6 +105,11 @@ class FakeSafetyModule:
         elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
             self._enter(SafetyMode.ACTIVE)
 
+    def forget_positions(self) -> None:
+        """Know no longer where the joints are, as after power-up."""
+        self._properties["ZERO"] = 0
+        self._speeds.forget()
+
     def receive(self, request: Property) -> None:
         """Take a GET or SET sent to the module."""
         number = request.number

@@ -1,5 +1,6 @@
 """What the gauges of a wrist sensor add to the true load."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -28,6 +29,7 @@ class ErrorScale:
     drift_time: float = 3.0
 
 
+_MOST_OFFSET = 3.5  # standard deviations of one axis
 FORCE_ERRORS = ErrorScale(bias=0.24, drift=0.22, white=0.30, resolution=0.02)
 TORQUE_ERRORS = ErrorScale(bias=0.01, drift=0.01, white=0.01, resolution=0.001)
 
@@ -49,7 +51,7 @@ class SensorErrors:
         self._scales = (force,) * 3 + (torque,) * 3
         self._offset = [0.0] * 6
         self.new_trial(rng)
-        self._offset, self._bias = self._bias, [0.0] * 6
+        self._offset, self._bias = _within(self._bias, force.bias), [0.0] * 6
 
     def new_trial(self, rng: np.random.Generator) -> None:
         """Draw bias and drift from `rng`, and everything after from it too."""
@@ -98,3 +100,16 @@ class SensorErrors:
             self._step_ns = step_ns
             for drift in self._drifts:
                 drift.set_dt(step_ns * 1e-9)
+
+
+def _within(offset: list[float], scale: float) -> list[float]:
+    """Return `offset` with a force of at most 3.5 times `scale`.
+
+    One in 150 would have more; a sensor like that is sent back,
+    and the residual of a tare would refuse every trial with it.
+    """
+    size = math.hypot(*offset[:3])
+    most = _MOST_OFFSET * scale
+    if size <= most:
+        return offset
+    return [value * most / size for value in offset[:3]] + offset[3:]

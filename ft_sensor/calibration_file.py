@@ -1,8 +1,9 @@
 """Calibration and terrain as TOML: what a recording needs to be read years later."""
 
+import json
 import tomllib
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -36,14 +37,14 @@ def payload_from_toml(text: str) -> tuple[Payload, Array]:
     try:
         section = table["payload"]
         payload = Payload(
-            mass=float(section["mass"]),
+            mass=_number(section["mass"]),
             com=_array(section["com"], (3,)),
             rotation=_array(section["rotation"], (3, 3)),
-            sign=float(section["sign"]),
+            sign=_number(section["sign"]),
             bias=_array(section["bias"], (6,)),
         )
         return payload, _array(table["foot"]["sole"], (3,))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise SettingsError(f"ft_calibration.toml is incomplete: {error}.") from error
 
 
@@ -71,13 +72,13 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
     try:
         x, y, z = _array(table["far_end"], (3,)).tolist()
         frame = TerrainFrame(
-            incline=float(table["incline"]),
-            heading=float(table["heading"]),
+            incline=_number(table["incline"]),
+            heading=_number(table["heading"]),
             far_end=(x, y, z),
-            travel=float(table["travel"]),
+            travel=_number(table["travel"]),
         )
         return str(table["name"]), frame
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise SettingsError(f"terrain.toml is incomplete: {error}.") from error
 
 
@@ -85,17 +86,24 @@ def terrain_facts(text: str) -> dict[str, str]:
     """Return what else `terrain.toml` says, empty where it says nothing.
 
     Raises:
-        SettingsError: the text is no TOML.
+        SettingsError: the text is no TOML, or says it in another form.
     """
-    facts = _parse(text, "terrain.toml").get("facts", {})
+    found: object = _parse(text, "terrain.toml").get("facts", {})
+    if not isinstance(found, dict):
+        raise SettingsError("terrain.toml is incomplete: facts is no table.")
+    facts = cast("dict[str, object]", found)
     return {str(key): str(value) for key, value in facts.items()}
 
 
 def _parse(text: str, name: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise SettingsError(f"{name}: {error}.") from error
+
+
+def _number(value: object) -> float:
+    return float(_array(value, ()))
 
 
 def _array(value: object, shape: tuple[int, ...]) -> Array:
@@ -106,5 +114,5 @@ def _array(value: object, shape: tuple[int, ...]) -> Array:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{escaped}"'
+    # JSON escapes what TOML does, but for one character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

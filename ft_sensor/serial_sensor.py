@@ -15,7 +15,7 @@ from ft_sensor.serial_link import SerialLink
 from ft_sensor.serial_start import Listener
 
 BURST_NS = 5_000_000  # of a stream read at once: an adapter collects bytes
-_BURSTY = 0.1  # share of the reads
+BURSTY = 0.1  # share of the reads
 
 
 class SerialDevice(Protocol):
@@ -75,7 +75,7 @@ class SensorCounters:
     @property
     def is_bursty(self) -> bool:
         """Whether the adapter collects bytes before it delivers them."""
-        return self.bursts > _BURSTY * self.reads
+        return self.bursts > BURSTY * self.reads
 
     def facts(self) -> dict[str, str]:
         """Return the counts as text for the recording."""

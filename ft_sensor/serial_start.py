@@ -80,14 +80,20 @@ class Listener:
         """Return ten readings or more, fewer when they do not come within a second.
 
         Raises:
-            LinkTimeoutError: none came.
+            LinkTimeoutError: none came, or none that was whole.
         """
         readings: list[Reading] = []
+        before = self.heard_bytes
         self.wait_for(
             lambda: True if len(readings) >= FIRST_READINGS else None,
             _FIRST_NS,
             readings,
         )
+        if not readings and self.heard_bytes > before:
+            raise LinkTimeoutError(
+                f"No whole F/T frame in {self.heard_bytes - before} bytes.",
+                hint="Check the cable and what runs beside it.",
+            )
         if not readings:
             raise silent_error()
         return readings

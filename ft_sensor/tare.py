@@ -22,9 +22,17 @@ _AGAIN = "[space] to try again."
 
 
 class TareError(TractionError):
-    """Samples that no tare can be taken from."""
+    """Samples that no tare can be taken from.
+
+    Attributes:
+        spread: how far the force varied [N]; None where something else was wrong.
+    """
 
     exit_code = 3
+
+    def __init__(self, message: str, *, hint: str, spread: float | None = None) -> None:
+        super().__init__(message, hint=hint)
+        self.spread = spread
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +83,7 @@ def tare(
             f"Force varied {spread:.1f} N during tare "
             f"({WINDOW:g} s means, limit {spread_limit:g}).",
             hint=f"Is the foot touching? {_AGAIN}",
+            spread=spread,
         )
     return TareResult(
         t_ns=samples[-1].t_ns,

@@ -176,7 +176,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
         text = (resources.files("wam.data") / "wam7.toml").read_text()
     try:
         file = _File.model_validate(tomllib.loads(text))
-    except (tomllib.TOMLDecodeError, ValidationError) as error:
+    except (tomllib.TOMLDecodeError, ValidationError, RecursionError) as error:
         raise SettingsError(
             f"The arm model cannot be read: {error}.",
             hint="Use the model shipped with Traction as a pattern.",

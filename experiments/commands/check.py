@@ -33,8 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--explain",
-        metavar="NAME|states",
-        help="more about a message; the table of all states",
+        metavar="NAME|all|states",
+        help="more about a message; all of them; the table of all states",
     )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
@@ -74,23 +74,15 @@ def run(args: argparse.Namespace) -> int:
 
 def _explain(name: str, console: Console) -> int:
     from acquisition.errors import SettingsError
-    from experiments.messages import CATALOGUE
+    from experiments.messages import CATALOGUE, catalogue_table, explanation
     from experiments.phases import table_lines
 
-    if name == "states":
-        for line in table_lines():
-            console.say(line)
-        return 0
-    message = CATALOGUE.get(name)
-    if message is None:
+    pages = {"states": table_lines, "all": catalogue_table}
+    if name not in pages and name not in CATALOGUE:
         raise SettingsError(
             f"There is no message called {name!r}.",
-            hint=f"Known: states, {', '.join(sorted(CATALOGUE))}.",
+            hint=f"Known: states, all, {', '.join(sorted(CATALOGUE))}.",
         )
-    console.say(f"{name}: {message.what}")
-    if message.arm:
-        console.say(f"ARM: {message.arm}.")
-    console.say(message.do)
-    console.say(message.more)
-    console.say(f"exit code {message.exit_code}")
+    for line in pages[name]() if name in pages else explanation(name):
+        console.say(line)
     return 0

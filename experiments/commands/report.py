@@ -6,9 +6,8 @@ from pathlib import Path
 from experiments.arguments import add_seed
 
 EXAMPLES = """\
-  traction report S012                      one session, into its own folder
-  traction report --all                     the study of all sessions
-  traction report --all --what-if frame=sole --what-if smoothing=25"""
+  traction report S012                             one session, in its own folder
+  traction report --all --what-if smoothing=25     the study under another choice"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

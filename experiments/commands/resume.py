@@ -50,6 +50,7 @@ def reopening(args: argparse.Namespace) -> "Reopening":
         operator=args.operator,
         script=args.operator_script,
         can_log=args.can_log,
+        faults=tuple(args.fault),
     )
 
 

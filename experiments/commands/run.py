@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import FRICTION, PACES, data_option
+from experiments.arguments import FRICTION, PACES, add_fault, data_option
 
 if TYPE_CHECKING:
     from experiments.conduct import Request
@@ -43,13 +43,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=PACES[0],
         help="how the simulated person pushes (steady)",
     )
-    parser.add_argument(
-        "--fault", metavar="NAME[@Tn+SECONDSs]", help="raise a fault, with --fake"
-    )
+    add_fault(parser)
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
-        help="answers to the reviews, one per line: keep, redo 1..5, quit",
+        help="keys, one per line: keep, redo 1..5, remark TEXT, quit; before a trial "
+        "pause, note TEXT, view, last",
     )
     parser.add_argument(
         "--new", action="store_true", help="close what is unfinished first"
@@ -83,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
         operator=args.operator,
         keys=choose_keys(args.operator_script, is_fake=args.fake),
         console=Console(color=not args.no_color),
-        fault=args.fault,
+        faults=tuple(args.fault),
         can_log=args.can_log,
     )
     unfinished = _make_room(request, is_new=args.new)
@@ -130,6 +129,7 @@ def _as_reopening(args: argparse.Namespace, request: Request) -> Reopening:
         operator=request.operator,
         script=args.operator_script,
         can_log=request.can_log,
+        faults=request.faults,
     )
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.cycle import ArmState, Cycle
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
+from acquisition.errors import LinkError
 from acquisition.guard import Limits
 from acquisition.loop import PERIOD_NS, Tick
 from acquisition.messages import CYCLE
@@ -582,3 +583,30 @@ def test_the_status_shows_the_age_of_the_force(bench):
     bench.run()
     bench.run(3, force=None)
     assert bench.cycle.status.ft_age_ns == 3 * PERIOD_NS
+
+
+def test_a_sensor_whose_port_is_gone_is_a_silent_one(bench):
+    def gone(now_ns):
+        raise LinkError("The serial port of the F/T sensor failed.")
+
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.sensor.poll = gone
+    bench.run(15, force=None)  # 30 ms, the limit is 20
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "ft-stale")
+    assert len(bench.records) == 16
+
+
+@pytest.mark.parametrize(
+    ("mode", "state", "reason"),
+    [
+        (SafetyMode.IDLE, ArmState.HOLD, ""),  # it waits for the pendant
+        (SafetyMode.E_STOP, ArmState.IDLE, "estop"),
+    ],
+)
+def test_a_stop_is_told_before_the_arm_was_ever_active(bench, mode, state, reason):
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.HOLD)
+    bench.arm.mode = mode
+    bench.run()
+    assert (bench.state, bench.reason) == (state, reason)

@@ -302,3 +302,19 @@ def test_the_memory_of_late_cycles_does_not_grow():
 def test_silence_tells_how_long_and_which_motors():
     assert dict(judge(**missing(5)).facts) == {"ms": 10.0, "silent": 0b0100000}
     assert dict(judge(**missing(25)).facts) == {"ms": 50.0, "silent": 0b0100000}
+
+
+def test_facts_are_told_in_the_units_of_the_message():
+    stale = judge(ft_age_ns=26 * MS)
+    assert dict(stale.facts) == {"ms": 26.0, "limit": 20.0}
+    slipped = judge(joint7_offset=-0.061)
+    assert dict(slipped.facts) == pytest.approx({"mrad": 61.0, "limit": 50.0})
+
+
+def test_severity_counts_what_is_taken_from_the_arm():
+    assert {action: Verdict(action).severity for action in Action} == {
+        Action.NONE: 0,
+        Action.HOLD: 1,
+        Action.DAMP: 2,
+        Action.IDLE: 3,
+    }

@@ -65,8 +65,8 @@ def test_a_data_folder_that_is_a_file_is_refused(config, tmp_path, below):
 @pytest.mark.parametrize(
     ("line", "text"),
     [
-        ("keep it", "line 2: 'keep it' - expected keep, redo 1..5 or quit."),
-        ("redo 6", "line 2: 'redo 6' - expected keep, redo 1..5 or quit."),
+        ("keep it", "line 2: 'keep it' - expected keep, redo 1..5 or quit;"),
+        ("redo 6", "line 2: 'redo 6' - expected keep, redo 1..5 or quit;"),
     ],
 )
 def test_a_bad_line_of_an_operator_script_is_named(config, tmp_path, line, text):

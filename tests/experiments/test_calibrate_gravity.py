@@ -19,6 +19,8 @@ from wam.first_moments import gravity_torque
 from wam.gravity_file import gravity_from_toml
 from wam.model import ArmModel
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 
 def perturbed(constants):
     """Return an arm whose links weigh up to a quarter more or less, elsewhere."""

@@ -28,6 +28,8 @@ from wam import calibration_poses
 from wam.constants import Body
 from wam.tool import Tool
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 QUICK = ("--fake", "--fast", "--operator-script", "auto")
 MASS, COM, ANGLE = 0.62, np.array([0.014, -0.006, 0.055]), np.radians(25.0)
 

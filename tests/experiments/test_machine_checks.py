@@ -2,8 +2,14 @@ import numpy as np
 import pytest
 
 from acquisition.board import WRENCH_DTYPE
-from experiments.console import GOOD, WARNING
-from experiments.machine_checks import check_code, check_governor, check_wrenches
+from experiments.console import BAD, GOOD, WARNING
+from experiments.machine_checks import (
+    check_code,
+    check_governor,
+    check_stream,
+    check_wrenches,
+    reach_words,
+)
 
 MS = 1_000_000
 NOW_NS = 10**12
@@ -73,3 +79,32 @@ def test_saturation_is_marked():
 def test_a_sensor_that_says_nothing_is_marked(count):
     found = check_wrenches(samples(5)[:count], NOW_NS)
     assert (found.mark, found.text) == (WARNING, f"{count} while the loop was tested")
+
+
+SERIAL = {"frames": "4000", "lost": "0", "bad_checks": "0", "bursts": "3"}
+
+
+@pytest.mark.parametrize(
+    ("change", "mark", "word"),
+    [
+        ({}, GOOD, "0 of 4000 lost, 0 damaged"),
+        ({"lost": "5"}, WARNING, "5 of 4005 lost"),
+        ({"bad_checks": "2"}, WARNING, "2 damaged"),
+        ({"bursts": "900"}, WARNING, "latency timer"),
+        ({"trouble": "The port is gone."}, BAD, "The port is gone."),
+    ],
+)
+def test_a_stream_is_graded_by_what_became_of_it(change, mark, word):
+    found = check_stream({**SERIAL, "reads": "2500", **change})
+    assert found.mark == mark
+    assert word in found.text
+
+
+def test_a_sensor_on_the_bus_has_no_stream():
+    assert check_stream({"samples": "20"}) is None
+
+
+def test_the_largest_traction_is_told():
+    facts = {"ranges": "500 500 1200 15 15 12"}
+    # 15 N m at a tenth of a metre
+    assert reach_words(facts, 0.1) == "F_t up to 150 N"

@@ -9,6 +9,8 @@ import pytest
 from analysis.figures import Picture
 from tests.experiments.program import traction
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 ROWS = 700
 
 

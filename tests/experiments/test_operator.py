@@ -82,7 +82,7 @@ def test_a_person_at_a_terminal_is_asked(monkeypatch):
         ("ft-stale@T3+1.5s", FaultPlan("ft-stale", 3, 1.5)),
         ("estop@T1+2", FaultPlan("estop", 1, 2.0)),
         ("estop", FaultPlan("estop", 1, 2.0)),
-        ("ft-silent", FaultPlan("ft-silent", 0, 2.0)),
+        ("ft-silent", FaultPlan("ft-silent", 0, 0.0)),
     ],
 )
 def test_a_fault_is_planned_as_written(text, plan):

@@ -12,6 +12,8 @@ from experiments.settings import load_settings
 from experiments.store import list_sessions
 from tests.experiments.program import traction, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 
 class InThisThread:
     """An executor that does at once what it is given."""

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from experiments.screens import (
+    READY_KEYS,
     ReadyView,
     RecordingView,
     ready_lines,
@@ -37,6 +38,7 @@ def ready(**changed):
         "kept": 3,
         "rejected": 1,
         "elapsed": 760.0,
+        "left": 1773.0,
         "reset": ("rake", "level"),
         "suggestion": "slower than 0.05 m/s, pressing harder",
     }
@@ -97,13 +99,19 @@ def test_a_sparkline_has_its_width_whatever_the_numbers(values, width):
 
 
 def test_the_ready_screen_tells_where_the_session_stands():
-    top, reset, suggestion = ready_lines(ready())
+    top, clock, reset, suggestion = ready_lines(ready())
     assert top.startswith("S012 S10 · trial 4 of 10 · kept 3 · rejected 1")
-    assert top.endswith("elapsed 12:40 · left about 30 min")
+    assert top.endswith("ARM: floating")
+    assert clock == "Elapsed 12:40 · left about 30 min"
     assert reset == "Reset: ☐ rake ☐ level"
     assert suggestion == "Suggested next: slower than 0.05 m/s, pressing harder"
 
 
 def test_before_the_first_trial_nothing_is_guessed():
-    (line,) = ready_lines(ready(kept=0, reset=(), suggestion=""))
-    assert "left about" not in line
+    _, clock = ready_lines(ready(left=None, reset=(), suggestion=""))
+    assert clock == "Elapsed 12:40"
+
+
+def test_the_ready_screen_fits_eighty_columns():
+    lines = ready_lines(ready(trial=10, kept=9, rejected=99, elapsed=35999.0))
+    assert max(map(len, [*lines, READY_KEYS])) <= 80

@@ -196,3 +196,63 @@ def test_two_attempts_at_one_trial_are_never_kept_together():
     state = replay([*BEGIN, *attempt(1, "rejected"), *attempt(1, "kept"), END])
     assert refusal(state, verdict(1, 1, "keep")) == "another attempt at T01 is kept"
     assert refusal(state, verdict(1, 3, "keep")) == "there is no such attempt"
+
+
+def crashed_in_the_second_attempt():
+    second = [event("trial-started", 1), event("crash-found")]
+    return replay([*BEGIN, *attempt(1, "rejected"), *second])
+
+
+def test_a_crashed_trial_is_not_redone_before_it_was_put_away():
+    state = crashed_in_the_second_attempt()
+    assert refusal(state, event("redo-started", 1)) == "T01 has no verdict yet"
+
+
+def test_a_crashed_trial_keeps_nobody_from_judging_an_earlier_attempt():
+    state = crashed_in_the_second_attempt()
+    assert refusal(state, verdict(1, 1, "keep")) == ""
+    assert refusal(state, verdict(1, 2, "keep")) == "T01 has no verdict yet"
+
+
+# --- the bracket of the tares -------------------------------------------------------
+
+
+def tared(*force):
+    return {"event": "tared", "bias": [*force, 0.0, 0.0, 0.0], "spread": 0.1}
+
+
+def test_two_tares_bracket_the_drift_of_the_force():
+    state = replay([*BEGIN, tared(0.1, 0.2, 0.3), tared(9.0, 9.0, 9.0)])
+    assert state.drift == (8.9, 8.8, 8.7)
+    later = replay(
+        [*BEGIN, tared(0.1, 0.2, 0.3), tared(9.0, 9.0, 9.0), tared(0.0, 0.0, 0.0)]
+    )
+    assert later.drift == (-0.1, -0.2, -0.3)
+
+
+def test_one_tare_is_no_bracket():
+    assert replay([*BEGIN, tared(0.1, 0.2, 0.3)]).drift == ()
+
+
+def test_equal_tares_show_no_drift():
+    assert replay([*BEGIN, tared(0.1, 0.2, 0.3), tared(0.1, 0.2, 0.3)]).drift == (
+        (0.0, 0.0, 0.0)
+    )
+
+
+def test_every_opening_has_a_bracket_of_its_own():
+    closed = {"event": "session-ended", "reason": "unfinished"}
+    events = [*BEGIN, tared(0.1, 0.2, 0.3), tared(1.0, 1.0, 1.0), closed]
+    again = [*events, {"event": "session-resumed"}, ACTIVE]
+    assert replay(again).drift == ()
+    assert replay([*again, tared(5.0, 5.0, 5.0), tared(6.0, 6.0, 6.0)]).drift == (
+        (1.0, 1.0, 1.0)
+    )
+
+
+@pytest.mark.parametrize(
+    "bias", [None, [], [1.0] * 5, ["1"] * 6, [float("nan")] * 6, [True] * 6, "123456"]
+)
+def test_a_damaged_tare_changes_nothing(bias):
+    sound = [*BEGIN, tared(0.1, 0.2, 0.3)]
+    assert replay([*sound, {"event": "tared", "bias": bias}]) == replay(sound)

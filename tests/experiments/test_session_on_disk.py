@@ -5,11 +5,15 @@ import stat
 import numpy as np
 import pytest
 
+from acquisition.clock import SystemClock
 from acquisition.sample import SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
 from acquisition.trial_file.writer import TRIAL_TOPICS
+from experiments.book import Book
+from experiments.phases import Phase
 from experiments.session import replay
+from experiments.store import create_session
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import TRAVEL, digest, journal, sidecar
 
@@ -43,8 +47,8 @@ def test_a_session_ends_with_exit_code_0(recorded):
 
 
 def test_a_session_says_how_to_go_on(recorded):
-    *_, last = recorded.done.out.splitlines()
-    assert last == f"Complete. Next: traction report S001 --data {recorded.data}"
+    *_, next_step, _, _ = recorded.done.out.splitlines()
+    assert next_step == f"Complete. Next: traction report S001 --data {recorded.data}"
 
 
 def test_the_folder_of_a_simulated_session_says_so(recorded):
@@ -159,3 +163,21 @@ def test_two_trials_of_one_session_differ(recorded):
     )
     count = min(len(first), len(second))
     assert bool((first["wrench_raw"][:count] != second["wrench_raw"][:count]).any())
+
+
+def test_the_journal_is_written_aside_where_somebody_has_to_look_after_the_arm(
+    tmp_path,
+):
+    seen = []
+
+    def aside(work):
+        before = len(folder.events())
+        work()
+        seen.append((before, len(folder.events())))
+
+    folder = create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
+    book = Book(folder, SystemClock(), aside=aside)
+    book.note("session-started", terrain="TF", trials=1)
+    book.note("activated")
+    assert seen == [(0, 1), (1, 2)]
+    assert book.state.phase is Phase.READY

@@ -19,6 +19,8 @@ from ft_sensor.payload import Payload
 from tests.experiments.program import only_session, run_short, write_config
 from wam.transmission import Transmission
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 LARGEST_V, LARGEST_F = 1.5e-3, 1.5  # m/s rms, N mean: drift and bias of one trial
 
 

@@ -150,7 +150,9 @@ def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
     seen = run_watched(config, tmp_path, 1, press=press)
     log = seen.folder / "log.txt"
     assert seen.done.code == 1
-    assert seen.done.err.startswith(f"Bug: ZeroDivisionError: so to speak. Log: {log}.")
+    assert seen.done.err.startswith(
+        f"Bug: ZeroDivisionError: so to speak. ARM: idle, braked. Log: {log}."
+    )
     assert "ZeroDivisionError" in log.read_text()
     assert seen.rig.network.safety_mode is SafetyMode.IDLE
 

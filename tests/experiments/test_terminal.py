@@ -6,7 +6,7 @@ import termios
 import pytest
 
 from experiments.operator import Asked, AutoKeys, Prompt
-from experiments.terminal import Cbreak, TerminalKeys, keyboard
+from experiments.terminal import LONGEST_LINE, Cbreak, TerminalKeys, keyboard
 
 
 @pytest.fixture
@@ -126,3 +126,52 @@ def test_only_keys_of_a_terminal_switch_it_over(terminal):
         assert termios.tcgetattr(program) == before
     with keyboard(TerminalKeys(program)):
         assert termios.tcgetattr(program) != before
+
+
+@pytest.mark.parametrize(
+    ("typed", "line"),
+    [
+        (b"wet stones\n", "wet stones"),
+        (b"Wet \xc3\xa9\r", "Wet é"),
+        (b"wett\x7f stones\n", "wet stones"),
+        (b"\x7f\x08wet\n", "wet"),
+        (b"we\x1b[Dt\x1bOA\x1b[3~\n", "wet"),
+        (b"wet\x1b", ""),
+        (b"\n", ""),
+        (b"wet\x01\x09\n", "wet"),
+        (b"x" * (LONGEST_LINE + 9) + b"\n", "x" * LONGEST_LINE),
+    ],
+)
+def test_a_line_ends_with_enter_and_is_given_up_with_escape(terminal, typed, line):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        assert keys.line(asked(Prompt.NOTE)) is None
+        os.write(person, typed)
+        assert keys.line(asked(Prompt.NOTE)) == line
+        assert keys.draft == ""
+
+
+def test_a_line_grows_while_it_is_typed(terminal):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        keys.line(asked(Prompt.NOTE))
+        for part, draft in ((b"we", "we"), ("é".encode()[:1], "we"), (b"\xa9", "weé")):
+            os.write(person, part)
+            assert keys.line(asked(Prompt.NOTE)) is None
+            assert keys.draft == draft
+
+
+def test_a_line_is_given_up_when_the_keyboard_is_unplugged(terminal):
+    person, keys = keys_of(terminal)
+    keys.line(asked(Prompt.NOTE))
+    os.close(person)
+    assert keys.line(asked(Prompt.NOTE)) == ""
+
+
+def test_what_was_typed_of_a_line_is_no_key_afterwards(terminal):
+    person, keys = keys_of(terminal)
+    with Cbreak(keys.descriptor):
+        keys.line(asked(Prompt.NOTE))
+        os.write(person, b"k\nk")
+        assert keys.line(asked(Prompt.NOTE)) == "k"
+        assert keys.answer(asked(Prompt.REVIEW)) == ""

@@ -7,6 +7,8 @@ import pytest
 from analysis.terrain_db import load
 from tests.experiments.program import run_short, traction, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory):

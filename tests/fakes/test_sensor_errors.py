@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fakes.sensor_errors import ErrorScale, SensorErrors
+from fakes.sensor_errors import FORCE_ERRORS, ErrorScale, SensorErrors
 
 MS = 1_000_000
 QUIET = ErrorScale(bias=0.0, drift=0.0, white=0.0, resolution=0.0)
@@ -100,3 +100,12 @@ def test_a_settled_sensor_stands_still_but_for_its_noise():
     shown = {errors.apply(k * 100 * MS, (0.0,) * 6) for k in range(20)}
     assert len(shown) == 1
     assert any(shown.pop())  # there is an offset for the tare to take away
+
+
+def test_no_session_begins_with_an_offset_that_its_tares_would_be_refused_for():
+    sizes = []
+    for seed in range(2000):
+        errors = SensorErrors(np.random.default_rng(seed))
+        sizes.append(np.linalg.norm(errors._offset[:3]))
+    assert max(sizes) == pytest.approx(3.5 * FORCE_ERRORS.bias)
+    assert np.median(sizes) == pytest.approx(1.54 * FORCE_ERRORS.bias, rel=0.05)

@@ -83,8 +83,12 @@ class Session:
             return False
         children = children_of(self.process.pid)
         self.pids = {name: children[short] for name, short in NAMES.items()}
-        self.board = Board(SharedMemory(self._open_board()))
+        self.attach()
         return True
+
+    def attach(self):
+        """Look at the memory that the processes share."""
+        self.board = Board(SharedMemory(self._open_board()))
 
     def has_stalled(self):
         """Return whether the arm was stopped because the machine stood still."""

@@ -255,3 +255,8 @@ def test_acceleration_frame_has_its_own_scale():
 def test_sensor_frames_of_another_length_are_refused(decode, length):
     with pytest.raises(FrameError):
         decode(bytes(length))
+
+
+def test_the_seven_motors_report_under_their_own_identifiers():
+    found = [frames.position_reply_id(node) for node in frames.MOTOR_NODES]
+    assert found == [0x423, 0x443, 0x463, 0x483, 0x4A3, 0x4C3, 0x4E3]

@@ -1,0 +1,200 @@
+"""The keys between two trials and at the review, and the page at the end."""
+
+import json
+
+import numpy as np
+import pytest
+
+from experiments.archive import cells_of
+from experiments.operator import Asked, Prompt
+from experiments.scripted import ScriptKeys
+from experiments.session import replay
+from tests.experiments.program import (
+    journal,
+    run_watched,
+    sidecar,
+    traction,
+)
+
+SCRIPT = """\
+note   dry stones # said before the first trial
+pause
+redo 2
+remark hand slipped
+keep
+view
+last
+keep
+"""
+
+
+def quick(asked):
+    """Record for a moment and keep nothing by oneself."""
+    if asked.prompt is Prompt.RECORDING:
+        return " " if asked.since > 0.5 else ""
+    return None
+
+
+@pytest.fixture(scope="module")
+def scripted(tmp_path_factory, config):
+    """Return a session of three trials that its script ends after the second."""
+    folder = tmp_path_factory.mktemp("scripted")
+    script = folder / "script.txt"
+    script.write_text(SCRIPT)
+    more = ("--operator-script", script)
+    return run_watched(
+        config, folder / "data", 3, *more, press=lambda asked, _: quick(asked)
+    )
+
+
+def test_a_script_ends_a_session_after_the_last_trial(scripted):
+    assert (scripted.done.code, scripted.done.err) == (5, "")
+    state = replay(journal(scripted.folder))
+    assert (state.phase, state.kept, state.rejected) == ("unfinished", (1, 2), 1)
+
+
+def test_a_note_on_the_session_is_in_the_journal_only(scripted):
+    (note,) = [
+        e
+        for e in journal(scripted.folder)
+        if e["event"] == "noted" and "trial" not in e
+    ]
+    assert (note["text"], note["who"]) == ("dry stones", "auto")
+    assert "Noted on S001: dry stones" in scripted.done.out
+
+
+def test_a_note_at_the_review_stays_with_the_trial_through_its_verdict(scripted):
+    (note,) = sidecar(scripted.folder / "trials" / "T01.mcap")["notes"]
+    assert note["text"] == "hand slipped"
+    noted = [e for e in journal(scripted.folder) if e["event"] == "noted"]
+    assert [e.get("attempt") for e in noted] == [None, 2]
+    assert note["when"] == noted[1]["utc"]
+
+
+def test_a_pause_is_a_phase_of_its_own_and_ends(scripted):
+    names = [event["event"] for event in journal(scripted.folder)]
+    assert names[names.index("paused") + 1] == "continued"
+    assert "Paused. ARM: holding. [space] to go on." in scripted.done.out
+
+
+def test_the_last_review_is_shown_again(scripted):
+    lines = scripted.done.out.splitlines()
+    first = [line for line in lines if line.startswith("T01 complete")]
+    assert len(first) == 3  # the rejected attempt, the kept one, and that once more
+    assert first[1] == first[2]
+    last = len(lines) - 1 - lines[::-1].index(first[2])
+    assert lines[last + 1].startswith(" ✔ timing worst gap")
+
+
+def test_the_screen_between_trials_says_what_to_do_and_how_long_it_takes(scripted):
+    lines = scripted.done.out.splitlines()
+    heads = [line for line in lines if "ARM: floating" in line]
+    assert heads[0].startswith("S001 TF · trial 1 of 3 · kept 0 · rejected 0")
+    clocks = [line for line in lines if line.startswith("Elapsed ")]
+    assert "left about" not in clocks[0]
+    assert heads[-1].startswith("S001 TF · trial 2 of 3 · kept 1 · rejected 1")
+    assert clocks[-1].endswith(" · left about 1 min")
+    assert "Reset: ☐ wipe ☐ foot at the far end" in lines
+    assert (
+        "[space] record   [n]ote   [v]iew last   [p]ause   [q]uit after this" in lines
+    )
+
+
+def test_the_last_trial_is_announced(scripted):
+    text = "T02 will be the last one for now. [q] again: quit at once."
+    assert text in scripted.done.out.splitlines()
+
+
+# --- the suggestion -----------------------------------------------------------------
+
+
+def test_the_next_push_is_suggested_from_the_kept_trials(recorded):
+    """Two steady pushes leave the faster and harder ones open."""
+    lines = recorded.done.out.splitlines()
+    first = lines.index("Reset: ☐ wipe ☐ foot at the far end")
+    (suggested,) = [line for line in lines if line.startswith("Suggested next: ")]
+    assert lines.index(suggested) > first + 2  # not before there is a kept trial
+    assert suggested == "Suggested next: at 0.05 to 0.2 m/s, pressing lightly"
+
+
+def test_the_coverage_of_a_trial_is_in_its_sidecar(recorded):
+    for name in ("T01", "T02"):
+        counts = np.array(
+            sidecar(recorded.folder / "trials" / f"{name}.mcap")["coverage"]
+        )
+        assert counts.shape == (4, 4)
+        assert counts.sum() > 200
+
+
+@pytest.mark.parametrize(
+    "damage", [None, "x", [[1, 2]], [[-1] * 4] * 4, [[1e30] * 4] * 4, [[[1]] * 4] * 4]
+)
+def test_a_damaged_coverage_counts_for_nothing(damage):
+    assert not cells_of(damage).any()
+    assert cells_of([[1] * 4] * 4).sum() == 16
+
+
+# --- the end ------------------------------------------------------------------------
+
+
+def test_the_end_brackets_the_drift_of_the_force(recorded):
+    tares = [e["bias"] for e in journal(recorded.folder) if e["event"] == "tared"]
+    assert len(tares) == 3  # one before each trial, one at the end
+    drift = json.loads((recorded.folder / "session.json").read_text())["force_drift"]
+    assert drift == pytest.approx(np.subtract(tares[-1], tares[0])[:3], abs=6e-4)
+    assert 0.0 < np.abs(drift).max() < 0.1  # noise of two means of a second
+    (line,) = [x for x in recorded.done.out.splitlines() if "drifted" in x]
+    assert line.endswith("fx {:+.2f}  fy {:+.2f}  fz {:+.2f}".format(*drift))
+
+
+def test_the_end_compares_the_time_it_took_with_the_estimate(recorded):
+    (line,) = [x for x in recorded.done.out.splitlines() if x.startswith("Took ")]
+    took, estimated = (
+        int(text.split(":")[0]) * 60 + int(text.split(":")[1])
+        for text in (line.split()[1], line.split()[-1])
+    )
+    # Two equal trials; the end has a tare more, the first trial the activation.
+    assert estimated == pytest.approx(took, abs=6)
+
+
+def test_the_end_names_report_and_next_terrains(recorded):
+    *_, report, terrains = recorded.done.out.splitlines()
+    assert report == f"It writes {recorded.folder / 'report' / 'index.html'}"
+    names = terrains.removeprefix("Next terrains, so that none goes with time: ")
+    assert sorted(names.split()) == ["B0", "B10", "B15", "S0", "S10", "S15", "Tf"]
+
+
+# --- scripts ------------------------------------------------------------------------
+
+
+def asked(prompt, since=3.0):
+    return Asked(prompt, 1, 1, is_complete=True, since=since)
+
+
+def keys_of(folder, text):
+    path = folder / "script.txt"
+    path.write_text(text)
+    return ScriptKeys(path)
+
+
+def test_lines_wait_for_their_own_prompt(tmp_path):
+    keys = keys_of(tmp_path, "keep\nnote two words\nredo 3\n")
+    assert keys.answer(asked(Prompt.READY)) == " "
+    assert keys.answer(asked(Prompt.RECORDING)) == ""
+    assert keys.answer(asked(Prompt.REVIEW)) == "k"
+    assert keys.answer(asked(Prompt.READY, since=0.1)) == ""
+    assert keys.answer(asked(Prompt.READY)) == "n"
+    assert keys.line(asked(Prompt.NOTE)) == "two words"
+    assert keys.answer(asked(Prompt.READY)) == " "
+    assert keys.answer(asked(Prompt.REVIEW)) == "r3"
+    assert keys.answer(asked(Prompt.REVIEW)) == "k"
+
+
+@pytest.mark.parametrize("line", ["note", "remark", "pause now", "redo", "redo 1 2"])
+def test_a_line_that_lacks_or_has_a_text_is_refused(tmp_path, config, line):
+    script = tmp_path / "script.txt"
+    script.write_text(line)
+    options = ("--fake", "--fast", "--config", config, "--data", tmp_path / "data")
+    done = traction("run", "TF", "--operator-script", script, *options)
+    assert done.code == 2
+    assert f"line 1: {line!r} - expected keep, redo 1..5 or quit" in done.err

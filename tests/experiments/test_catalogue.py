@@ -1,0 +1,526 @@
+"""Every message of the catalogue, raised through the whole program."""
+
+import functools
+import json
+import os
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from string import Formatter
+
+import numpy as np
+import pytest
+
+import fakes.rig
+from acquisition.devices import SafetyMode
+from acquisition.processes import ProcessLostError
+from experiments import activation, crews, preflight, settings, simulated, taring
+from experiments.computer_faults import COMPUTER_FAULTS
+from experiments.faults import FaultPlan
+from experiments.lock import session_lock
+from experiments.messages import CATALOGUE
+from experiments.operator import AutoKeys, Prompt
+from experiments.session import replay
+from experiments.store import list_sessions
+from ft_sensor import tare
+from tests.experiments.program import (
+    Done,
+    digest,
+    journal,
+    only_session,
+    run_short,
+    run_watched,
+    traction,
+    write_config,
+)
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
+AUTO = ("--operator-script", "auto")
+IDLE, E_STOP = SafetyMode.IDLE, SafetyMode.E_STOP
+
+
+# --- a person in a hurry ------------------------------------------------------------
+
+
+def hurry(asked):
+    """Press the keys that make a session short; leave after one fault."""
+    if asked.prompt is Prompt.READY:
+        return " " if asked.since > 0.05 else ""
+    if asked.prompt is Prompt.RECORDING:
+        return " " if asked.since > 0.8 else ""
+    if asked.prompt is Prompt.REVIEW:
+        return "k" if asked.trial == 1 else "q"
+    if asked.prompt is Prompt.LIFT and asked.attempt > 1:
+        return "q"
+    return None
+
+
+def once(prompt, act, since=0.1):
+    """Return a `press` that lets `act(scene)` happen once, at `prompt`."""
+    done = []
+
+    def press(asked, scene):
+        if asked.prompt is prompt and asked.since > since and not done:
+            done.append(True)
+            act(scene)
+        return None if asked.prompt is not prompt else hurry(asked)
+
+    return press
+
+
+def give_up(prompt):
+    return lambda asked, scene: "q" if asked.prompt is prompt else None
+
+
+# --- the scene: a session of two trials, the first one kept -------------------------
+
+
+@dataclass
+class Scene:
+    """A copy of the session on the disk, and who works on it.
+
+    Attributes:
+        data: the data folder.
+        config: the rig.toml that it was recorded with.
+        patch: changes the program for the time of a case.
+        rigs: the simulated rigs that were built.
+        crews: those who work them.
+    """
+
+    data: Path
+    config: Path
+    patch: pytest.MonkeyPatch
+    rigs: list = field(default_factory=list)
+    crews: list = field(default_factory=list)
+
+    @property
+    def rig(self):
+        return self.rigs[-1]
+
+    @property
+    def folder(self):
+        return only_session(self.data)
+
+    def watch(self, press=None):
+        """Keep hold of rigs and crews; `press(asked, scene)` goes before `hurry`."""
+        self.patch.setattr(fakes.rig, "FakeRig", self._seen(fakes.rig.FakeRig, "rigs"))
+        crew = self._seen(simulated.InlineCrew, "crews")
+        self.patch.setattr(simulated, "InlineCrew", crew)
+        usual = AutoKeys.answer
+
+        def answer(keys, asked):
+            found = press(asked, self) if press is not None else None
+            found = hurry(asked) if found is None else found
+            return usual(keys, asked) if found is None else found
+
+        self.patch.setattr(AutoKeys, "answer", answer)
+
+    def _seen(self, kind, name):
+        seen = getattr(self, name)
+
+        class Seen(kind):
+            def __init__(self, *arguments, **named):
+                super().__init__(*arguments, **named)
+                seen.append(self)
+
+        return Seen
+
+
+def resume(scene, *more, press=None) -> Done:
+    scene.watch(press)
+    return traction("resume", *AUTO, "--data", scene.data, *more)
+
+
+@dataclass(frozen=True)
+class Case:
+    """How a message is raised, and what comes of it.
+
+    Attributes:
+        act: what is done in the scene.
+        code: exit code of the command.
+        mode: of the arm at the end as its own devices know it; None = no arm.
+        words: what the message says beside the words of the catalogue.
+    """
+
+    act: Callable[[Scene], Done]
+    code: int
+    mode: SafetyMode | None = IDLE
+    words: str = ""
+
+
+def tared(act=None, text="", words="") -> Case:
+    """Return the case of a tare that is told, tried again, and the last thing done."""
+    more = ("--fault", text) if text else ()
+    lift = once(Prompt.LIFT, act) if act else lambda *_: None
+
+    def press(asked, scene):
+        return "q" if asked.prompt is Prompt.READY else lift(asked, scene)
+
+    return Case(lambda scene: resume(scene, *more, press=press), 5, words=words)
+
+
+def fault(text, code=5, mode=IDLE, words="") -> Case:
+    """Return the case of a fault raised on the command line."""
+    act = functools.partial(_resume_with, text=text)
+    return Case(act, code, mode, words)
+
+
+def _resume_with(scene, text) -> Done:
+    return resume(scene, "--fault", text)
+
+
+def acted(prompt, act, code=5, words="", since=0.1) -> Case:
+    """Return the case of something that happens to the rig at `prompt`."""
+    return Case(
+        lambda scene: resume(scene, press=once(prompt, act, since)), code, words=words
+    )
+
+
+def struck(name, mode=IDLE, words="") -> Case:
+    """Return the case of a fault of the devices during the tare, which ends it all."""
+
+    def strike(scene):
+        scene.rig.faults()[name]()
+
+    return Case(
+        lambda scene: resume(scene, press=once(Prompt.LIFT, strike)), 4, mode, words
+    )
+
+
+def found_at_once(name, mode=IDLE, words="") -> Case:
+    """Return the case of a fault between the preflight and the pendant."""
+
+    def act(scene):
+        usual = preflight.check_wrenches
+
+        def check(*arguments):
+            scene.rig.faults()[name]()
+            return usual(*arguments)
+
+        scene.patch.setattr(preflight, "check_wrenches", check)
+        return resume(scene)
+
+    return Case(act, 3, mode, words)
+
+
+def refused(act, code=2, words="") -> Case:
+    """Return the case of a command that never reaches an arm."""
+    return Case(act, code, None, words)
+
+
+# --- what happens -------------------------------------------------------------------
+
+
+def _never_active(scene):
+    scene.patch.setattr(activation, "PATIENCE", 0.3)
+    return resume(scene, press=lambda a, _: "" if a.prompt is Prompt.SUPPORT else None)
+
+
+def _weak(scene):
+    """Resume with a limit that gravity alone exceeds."""
+    folder = scene.data.parent / "weak"
+    folder.mkdir()
+    change = ("torque = [20.0, 45.0", "torque = [20.0, 1.0")
+    config = write_config(folder, rig=change)
+    return resume(scene, "--force", "--config", config)
+
+
+def _not_a_number(scene):
+    law = scene.crews[-1].desk.passing._loop._cycle._cycle._law
+    scene.patch.setattr(
+        type(law), "torque", lambda *_: (np.full(7, np.nan), np.zeros(7))
+    )
+
+
+def _deaf(scene):
+    """Let the console show no sign of life for 0.6 s."""
+    desk, left = scene.crews[-1].desk, [30]
+    usual = desk.beat
+
+    def beat():
+        left[0] -= 1
+        if left[0] < 0:
+            usual()
+
+    desk.beat = beat
+
+
+def _orphan(scene):
+    scene.crews[-1].desk.passing._loop._cycle.is_orphaned = True
+
+
+def _stuck_recorder(scene):
+    scene.crews[-1].recorder.drain = lambda: None
+
+
+def _move(scene):
+    scene.crews[-1].desk.move_to([0.0] * 7, 0.1)
+
+
+def _lose_recorder(scene):
+    def passing(cycles):
+        raise ProcessLostError("recorder", "killed by signal 9")
+
+    scene.crews[-1].desk.passing = passing
+
+
+def _swing(scene):
+    scene.rig.plant.qd[1] = 1.45
+
+
+def _narrow(scene):
+    """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
+    cycle = scene.crews[-1].desk.passing._loop._cycle._cycle
+    upper = (*cycle._limits.q_upper[:5], 1.0, cycle._limits.q_upper[6])
+    cycle._limits = replace(cycle._limits, q_upper=upper)
+
+
+def _saturate(scene):
+    scene.rig.faults()["ft-saturated"]()
+
+
+def _no_exchange(scene):
+    scene.patch.setattr(crews, "measure_exchange", lambda *_: [])
+    return resume(scene)
+
+
+def _no_loop(scene):
+    scene.patch.setattr(preflight, "loop_report", lambda _: None)
+    return resume(scene)
+
+
+def _lost_sensor(scene):
+    facts = {"trouble": "The port is gone.", "reopened": "0"}
+    scene.patch.setattr(crews.InlineCrew, "sensor_facts", lambda _: facts)
+    return resume(scene)
+
+
+def _locked(scene):
+    (folder,) = list_sessions(scene.data)
+    with session_lock(folder):
+        scene.watch()
+        return traction("resume", "S001", *AUTO, "--data", scene.data)
+
+
+def _run(scene, terrain="TF", *more):
+    options = ("--fake", "--fast", *AUTO, "--config", scene.config)
+    return traction("run", terrain, *options, "--data", scene.data, *more)
+
+
+def _kill(scene):
+    """Resume in a copy of this process, which kills itself in the second trial."""
+    child = os.fork()
+    if child == 0:
+        try:
+            resume(scene, "--fault", "crash@T2+0.3s")
+        finally:
+            os._exit(1)
+    assert os.WIFSIGNALED(os.waitpid(child, 0)[1])
+
+
+def _crashed_run(scene):
+    _kill(scene)
+    return _run(scene)
+
+
+def _crashed_resume(scene):
+    _kill(scene)
+    return resume(scene, press=give_up(Prompt.SUPPORT))
+
+
+def _complete(scene):
+    """Let the last trial count and the program end before it can say so."""
+    path = scene.folder / "events.jsonl"
+    lines = path.read_text().splitlines()
+    start = json.loads(lines[0])
+    lines[0] = json.dumps({**start, "trials": 1})
+    path.write_text("\n".join(lines[:-1]) + "\n")
+    return resume(scene)
+
+
+def _failing_status(scene, error):
+    def fail(_):
+        raise error
+
+    scene.patch.setattr(settings, "load_settings", fail)
+    return traction("status", "--data", scene.data)
+
+
+def _bad_config(scene):
+    folder = scene.data.parent / "bad"
+    folder.mkdir()
+    config = write_config(folder, matrix=("trials = 10", 'trials = "ten"'))
+    return traction("run", "TF", "--fake", "--config", config, "--data", scene.data)
+
+
+def _mixed(scene):
+    live = scene.folder.with_name("2027-01-01_S002_TF")
+    shutil.copytree(scene.folder, live)
+    done = traction("report", "S001", "S002", "--data", scene.data)
+    shutil.rmtree(live)
+    return done
+
+
+def _other_foot(scene):
+    """Say no to the question about the foot, after a session with the other one."""
+    newer = scene.folder.with_name("2027-01-01_S002_Tf.fake")
+    newer.mkdir()
+    (newer / "conditions.json").write_text('{"terrain.foot": "bare"}')
+    (newer / "events.jsonl").write_text("")
+    scene.watch(give_up(Prompt.FOOT))
+    done = traction("resume", "S001", *AUTO, "--data", scene.data)
+    shutil.rmtree(newer)
+    return done
+
+
+def _no_end_tare(scene):
+    def press(asked, _):
+        if asked.prompt is Prompt.REVIEW:
+            return "k"
+        return "q" if asked.prompt is Prompt.LIFT and asked.trial == 0 else None
+
+    return resume(scene, press=press)
+
+
+CASES = {
+    # what a preflight finds
+    "can-down": fault("can-down", 3, words="broke: the controller is bus-off"),
+    "puck-missing": fault("puck-missing", 3, words="Puck 5 does not answer (1,2,3,4,6"),
+    "not-zeroed": fault("not-zeroed", 3),
+    "ft-silent": fault("ft-silent", 3, words="No F/T data for 100 ms (port open, 0"),
+    "disk-full": fault("disk-full@T0+0s", 3, words="2.1 GB free"),
+    "exchange": Case(_no_exchange, 3, words="100 of 100 exchanges"),
+    "loop-dead": Case(_no_loop, 3),
+    "ft-lost": Case(_lost_sensor, 3, words="while it was tested: The port is gone."),
+    "not-active": Case(_never_active, 3),
+    "no-power": found_at_once("estop", E_STOP),
+    "not-ready": found_at_once("puck-silent", words="Puck 3 has not answered for "),
+    # what ends a trial and not the session: the second attempt is not begun here
+    "ft-stale": fault("ft-stale@T2+0.1s", words="T02 stopped at 0.1 s"),
+    "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
+    "overspeed": fault("overspeed@T2+0.1s", words="Joint 5 "),
+    "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
+    "foot-speed": acted(Prompt.RECORDING, _swing),
+    "joint-limit": acted(Prompt.LIFT, _narrow, 4, words="Joint 6 at "),
+    "torque-limit": Case(_weak, 4, words="Joint 2 was asked for"),
+    "console-silent": acted(Prompt.READY, _deaf, since=0.0),
+    "recorder-silent": acted(Prompt.RECORDING, _stuck_recorder),
+    "move-refused": acted(Prompt.RECORDING, _move),
+    # what is wrong with a tare
+    "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
+    "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
+    "tare-poor": tared(_saturate, words="were flagged during tare"),
+    "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
+    # what takes the arm away; in a trial: test_bus_faults
+    "can-silence": struck("can-silence"),
+    "puck-silent": struck("puck-silent", words="Puck 3 has not"),
+    "bus-off": struck("bus-off"),
+    "estop": fault("estop@T2+0.1s", 4, E_STOP, "Stop pressed at 0.1"),
+    "pendant-idle": struck("pendant-idle"),
+    "safety-idle": struck("safety-torque", words="torque fault"),
+    "safety-stop": struck("safety-voltage", E_STOP, "voltage fault"),
+    "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
+    "console-lost": acted(Prompt.READY, _orphan, since=0.0),
+    "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),
+    # disk, lock, kill, bug
+    "disk-lost": fault("disk-full@T2+0.1s", 6, words="T02 stopped at 0."),
+    "write-failed": fault("write-failed@T2+0.6s", 6, words="T02 could not be verified"),
+    "locked": refused(_locked, words=f"in process {os.getpid()} since"),
+    "crash": refused(_crashed_run, words="S001 ended without closing (T02 at "),
+    "put-away": Case(_crashed_resume, 5, words="are in rejected/T02a.*"),
+    "complete": refused(_complete, 0),
+    "bug": fault("bug@T2+0.1s", 1, words="RehearsedBugError: rehearsed."),
+    "command-bug": refused(lambda s: _failing_status(s, ZeroDivisionError("so")), 1),
+    # what was asked for cannot be
+    "config": refused(_bad_config, words='terrains[0].trials = "ten" - expected a w'),
+    "mismatch": refused(lambda s: _run(s, "S0"), words="S001 is TF, you asked for S0"),
+    "unfinished": refused(_run, words="S001 TF is unfinished, 1 of 2 kept."),
+    "mixed": refused(_mixed),
+    "nobody": refused(lambda scene: traction("run", "TF", "--data", scene.data)),
+    "foot-changed": Case(_other_foot, 2, words="S002 was recorded with the foot bare"),
+    "interrupted": Case(lambda s: resume(s, press=give_up(Prompt.SUPPORT)), 5),
+    "nothing-lost": refused(lambda s: _failing_status(s, KeyboardInterrupt()), 130),
+}
+# Asked at a prompt that is not there without a terminal; the hint takes its place.
+NO_KEYS = {"crash", "mismatch", "unfinished"}
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory, config):
+    """Return the data of a session that was left after one kept trial of two."""
+
+    def press(asked, rig):
+        second = asked.prompt is Prompt.LIFT and asked.trial == 2
+        if asked.prompt is Prompt.RECORDING:
+            return " " if asked.since > 0.3 else ""
+        return "q" if second else hurry(asked)
+
+    data = tmp_path_factory.mktemp("base") / "data"
+    seen = run_watched(config, data, 2, press=press)
+    assert replay(journal(seen.folder)).kept == (1,)
+    return data
+
+
+@pytest.fixture
+def scene(base, config, tmp_path, monkeypatch):
+    """Return a copy of the base; its tares are short, which others prove."""
+    shutil.copytree(base, tmp_path / "data")
+    monkeypatch.setattr(taring, "TARE_SECONDS", 0.5)
+    monkeypatch.setattr(tare, "MIN_DURATION", 0.4)
+    return Scene(tmp_path / "data", config, monkeypatch)
+
+
+def pattern(name):
+    """Return what the catalogue says as a regular expression, anything filled in."""
+    message = CATALOGUE[name]
+    arm = f"ARM: {message.arm}." if message.arm else ""
+    do = "" if name in NO_KEYS else message.do
+    parts = [part for part in (message.what, arm, do) if part]
+    return "".join(
+        re.escape(text) + (".*" if open_ is not None else "")
+        for text, open_, *_ in Formatter().parse(" ".join(parts))
+    )
+
+
+def files_of_first(scene):
+    paths = (scene.folder / "trials").glob("T01.*")
+    return {path.name: (digest(path), path.stat().st_mtime_ns) for path in paths}
+
+
+def test_every_row_of_the_catalogue_has_a_case():
+    assert set(CASES) == set(CATALOGUE)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched(scene, name):
+    case, before = CASES[name], files_of_first(scene)
+    done = case.act(scene)
+    told = [
+        line
+        for line in f"{done.err}\n{done.out}".splitlines()
+        if re.search(pattern(name), line) and case.words in line
+    ]
+    assert told, done.err + done.out
+    assert done.code == case.code
+    assert len(before) == 3  # the trial, its sidecar, the truth
+    assert files_of_first(scene) == before
+    assert "Traceback" not in done.err + done.out
+    if case.mode is not None:
+        network = scene.rig.network
+        assert network.safety_mode is case.mode
+        assert case.mode is E_STOP or not scene.rig.plant.qd.any()
+
+
+@pytest.mark.parametrize("name", sorted(COMPUTER_FAULTS))
+def test_faults_of_the_computer_can_be_raised_in_every_trial(name):
+    plan = FaultPlan(name, 3, 1.5)
+    assert plan.text() == f"{name}@T3+1.5s"
+
+
+def test_a_new_session_that_another_process_opened_first_is_refused(config, tmp_path):
+    done = run_short(config, tmp_path, "TF", 1, "--fault", "locked")
+    assert done.code == CATALOGUE["locked"].exit_code
+    assert re.match(pattern("locked"), done.err)

@@ -1,0 +1,160 @@
+import contextlib
+import io
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from experiments.console import Console
+from experiments.cues import Cue, Cues, build_cues
+from experiments.settings import OperatorSection
+from experiments.speech import Speaker, find_speech
+from experiments.trial import PaceWatch
+
+
+class Terminal(io.StringIO):
+    """A standard output that a person looks at."""
+
+    def isatty(self):
+        return True
+
+
+class Words:
+    """A speaker that only remembers."""
+
+    def __init__(self):
+        self.said = []
+        self.is_closed = False
+
+    def say(self, words):
+        self.said.append(words)
+
+    def close(self):
+        self.is_closed = True
+
+
+def rung(stream, *, bell=True):
+    with contextlib.redirect_stdout(stream):
+        cues = build_cues(OperatorSection(bell=bell), Console())
+        for cue in Cue:
+            cues.give(cue)
+    return stream.getvalue()
+
+
+def test_start_too_fast_and_done_ring_differently():
+    assert rung(Terminal()) == "\a" + "\a\a\a" + "\a\a"
+
+
+def test_without_a_terminal_nothing_rings():
+    assert rung(io.StringIO()) == ""
+
+
+def test_the_bell_can_be_switched_off():
+    assert rung(Terminal(), bell=False) == ""
+
+
+def test_cues_are_spoken_in_fixed_words_and_end_with_the_session():
+    words = Words()
+    cues = Cues(Console(), words, rings=False)
+    for cue in Cue:
+        cues.give(cue)
+    cues.close()
+    assert words.said == ["recording", "slower", "done"]
+    assert words.is_closed
+
+
+def test_nobody_speaks_unless_asked(monkeypatch):
+    monkeypatch.setattr("experiments.cues.find_speech", lambda: "/bin/speak")
+    assert build_cues(OperatorSection(), Console())._speaker is None
+    speaking = build_cues(OperatorSection(speech=True), Console())
+    assert speaking._speaker.program == "/bin/speak"
+
+
+@pytest.mark.parametrize(
+    ("installed", "found"),
+    [
+        ({"say", "espeak"}, "/bin/espeak"),
+        ({"espeak-ng", "spd-say"}, "/bin/spd-say"),
+        ({"espeak-ng", "espeak"}, "/bin/espeak-ng"),
+        (set(), None),
+    ],
+)
+def test_the_first_speech_program_that_is_installed_speaks(installed, found):
+    assert find_speech(lambda n: f"/bin/{n}" if n in installed else None) == found
+
+
+@pytest.fixture
+def program(tmp_path):
+    """Return a program that writes its words and its session down and stays."""
+    path = tmp_path / "speak"
+    path.write_text(
+        f"#!{sys.executable}\nimport os, sys, time\n"
+        f"with open({str(tmp_path / 'said')!r}, 'w') as file:\n"
+        "    file.write(f'{os.getsid(0) == os.getpid()} {sys.argv[1:]}')\n"
+        "print('heard', flush=True)\ntime.sleep(60)\n"
+    )
+    path.chmod(0o755)
+    return path
+
+
+def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
+    program, tmp_path, monkeypatch
+):
+    started = []
+    usual = subprocess.Popen
+
+    def start(command, **options):
+        started.append(usual(command, **{**options, "stdout": subprocess.PIPE}))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    speaker = Speaker(str(program))
+    speaker.say("slower; touch /tmp/x")
+    with started[0].stdout as heard:
+        assert heard.readline() == b"heard\n"
+    speaker.close()
+    assert (tmp_path / "said").read_text() == "True ['slower; touch /tmp/x']"
+    assert started[0].returncode == -9  # ended, not waited for
+
+
+def test_new_words_cut_the_old_ones_short(program):
+    speaker = Speaker(str(program))
+    speaker.say("recording")
+    first = speaker._speaking
+    speaker.say("done")
+    assert first.returncode == -9
+    assert speaker._speaking.poll() is None
+    speaker.close()
+    speaker.close()
+    assert speaker._speaking is None
+
+
+def test_a_speech_program_that_cannot_start_stops_nobody(tmp_path):
+    speaker = Speaker(str(tmp_path / "gone"))
+    speaker.say("recording")
+    assert speaker._speaking is None
+    assert os.listdir(tmp_path) == []  # noqa: PTH208
+
+
+def too_fast(speeds, dt=0.02):
+    watch = PaceWatch()
+    path = np.cumsum(np.array(speeds) * dt)
+    return [i * dt for i, x in enumerate(path) if watch.is_too_fast(i * dt, float(x))]
+
+
+def test_a_second_beyond_the_limit_is_too_fast_and_told_once_a_second():
+    told = too_fast([0.25] * 200)
+    assert told[0] == pytest.approx(1.02, abs=0.03)
+    assert np.diff(told).min() > 1.0
+
+
+def test_a_usual_push_with_slips_is_not_too_fast():
+    slip = [0.0] * 20 + [0.4] * 4  # 32 mm in 80 ms, twice a second
+    assert too_fast(slip * 20) == []
+
+
+def test_the_limit_is_a_fifth_of_a_metre_per_second():
+    assert too_fast([0.19] * 200) == []
+    assert too_fast([0.21] * 200)

@@ -1,0 +1,123 @@
+"""Ctrl-C once and twice in every phase in which a session can be."""
+
+import signal
+from dataclasses import dataclass
+
+import pytest
+
+from acquisition.devices import SafetyMode
+from experiments.operator import Prompt
+from experiments.phases import OPEN, Event, Phase
+from experiments.session import replay
+from tests.experiments.program import (
+    journal,
+    kept_and_sound,
+    only_session,
+    run_watched,
+    traction,
+)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """When Ctrl-C comes, and what the session is in the end.
+
+    Attributes:
+        prompt: what the person is asked for then.
+        phase: of the session, as the journal has it.
+        code: exit code.
+        end: phase that the session is left in.
+        rejected: attempts that count for nothing.
+        trial: number of the trial; 0 is the tare at the end.
+    """
+
+    prompt: Prompt
+    phase: Phase
+    code: int = 5
+    end: Phase = Phase.UNFINISHED
+    rejected: int = 0
+    trial: int = 1
+
+
+MOMENTS = [
+    Moment(Prompt.SUPPORT, Phase.PREFLIGHT, trial=0),
+    Moment(Prompt.LIFT, Phase.READY),
+    Moment(Prompt.READY, Phase.READY),
+    Moment(Prompt.NOTE, Phase.READY),
+    Moment(Prompt.PAUSED, Phase.PAUSED),
+    Moment(Prompt.RECORDING, Phase.RECORDING, rejected=1),
+    Moment(Prompt.REVIEW, Phase.REVIEW, rejected=1),
+    Moment(Prompt.LIFT, Phase.READY, 0, Phase.COMPLETE, trial=0),
+]
+_ON_THE_WAY = {Prompt.NOTE: "n", Prompt.PAUSED: "p"}
+
+
+def interrupt(moment, times, seen):
+    """Return a `press` that raises Ctrl-C and notes the phase that it came in."""
+    hit = []
+
+    def press(asked, rig):
+        is_it = (asked.prompt, asked.trial) == (moment.prompt, moment.trial)
+        if is_it and not hit:
+            if asked.since <= 0.05:
+                return ""
+            hit.append(True)
+            seen.append(replay(journal(only_session(seen[0]))).phase)
+            for _ in range(times):
+                signal.raise_signal(signal.SIGINT)
+            return ""
+        if asked.prompt is Prompt.READY:
+            return _ON_THE_WAY.get(moment.prompt, " ") if asked.since > 0.05 else ""
+        if asked.prompt is Prompt.RECORDING:
+            return " " if asked.since > 0.2 else ""
+        if asked.prompt is Prompt.REVIEW:
+            return "k" if asked.since > 0.1 else ""
+        return None
+
+    return press
+
+
+@pytest.mark.parametrize("times", [1, 2])
+@pytest.mark.parametrize("moment", MOMENTS, ids=lambda m: f"{m.prompt.value}{m.trial}")
+def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
+    config, tmp_path, monkeypatch, moment, times
+):
+    seen = [tmp_path]
+    press = interrupt(moment, times, seen)
+
+    def line(keys, asked):
+        press(asked, None)
+
+    monkeypatch.setattr("experiments.operator.AutoKeys.line", line)
+    session = run_watched(config, tmp_path, 1, press=press)
+    events, state = journal(session.folder), replay(journal(session.folder))
+    assert seen[1:] == [moment.phase]  # it came once, and where it should
+    assert session.done.code == moment.code
+    assert events[-1]["event"] == Event.ENDED
+    assert (state.phase, state.rejected) == (moment.end, moment.rejected)
+    assert state.running is None
+    assert session.rig.network.safety_mode is SafetyMode.IDLE
+    assert not session.rig.plant.qd.any()
+    assert "ARM: idle, braked." in session.done.out.splitlines()
+    assert session.done.err == ""
+    assert not list(session.folder.rglob("*.partial"))
+    assert len(kept_and_sound(session.folder)) == len(state.kept)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_every_open_phase_is_interrupted():
+    assert {moment.phase for moment in MOMENTS} == OPEN
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_ctrl_c_in_a_preflight_touches_nothing(config, tmp_path, monkeypatch, times):
+    def interrupted(*_):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("experiments.preflight.check_code", interrupted)
+    options = ("--fake", "--fast", "--operator-script", "auto", "--config", config)
+    done = traction("run", "TF", *options, "--data", tmp_path / "data")
+    assert done.code == 130
+    assert done.err == "Interrupted. Nothing that was recorded is lost.\n"
+    assert not (tmp_path / "data").exists()

@@ -1,0 +1,50 @@
+from pathlib import Path
+
+import pytest
+
+from experiments.messages import CATALOGUE, Message, catalogue_table
+from tests.experiments.program import traction
+
+README = Path(__file__).parents[2] / "README.md"
+HEAD = "| message | what you read | the arm | what to do |"
+
+
+def test_the_table_of_the_readme_is_that_of_the_catalogue():
+    lines = README.read_text().splitlines()
+    table = catalogue_table()
+    begin = lines.index(HEAD)
+    assert lines[begin : begin + len(table)] == table
+    assert not lines[begin + len(table)].startswith("|")
+
+
+def test_the_whole_catalogue_can_be_explained():
+    done = traction("check", "--explain", "all")
+    assert done.code == 0
+    assert done.out.splitlines() == catalogue_table()
+    assert len(done.out.splitlines()) == len(CATALOGUE) + 2
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_a_row_says_what_happened_and_more_and_breaks_no_table(name):
+    message = CATALOGUE[name]
+    what, do = message.sample()
+    assert what.strip(" ….")
+    assert message.more.endswith(".")
+    assert not message.arm.endswith(".")
+    assert "|" not in what + message.arm + do
+    assert "{" not in what + do
+
+
+def test_exit_codes_are_those_that_the_help_explains():
+    assert {message.exit_code for message in CATALOGUE.values()} <= {
+        *range(7),
+        130,
+    }
+
+
+def test_what_is_filled_in_is_left_open_in_a_table():
+    message = Message("{n:.0f} of {m} at T{k:02d}.", "Wait {s} s.", 0, "")
+    assert message.sample() == ("… of … at T….", "Wait … s.")
+    assert message.text({"n": 2.4, "m": 3, "k": 4, "s": 5}, "All safe.") == (
+        "2 of 3 at T04. Wait 5 s. All safe."
+    )

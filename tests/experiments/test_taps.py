@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+from acquisition.trial_file.reader import TrialReader
+from experiments.operator import Prompt
+from experiments.taps import DoubleTap
+from tests.experiments.program import journal, run_watched, write_config
+
+RATE = 500
+REST = 3.0  # N, of a foot that rests on the ground
+
+
+def pressed(*presses, lasts=3.0, rest=REST, force=12.0):
+    """Return (t, F_n, v_t) with `presses` of (beginning, duration) [s]."""
+    t = np.arange(0.0, lasts, 1 / RATE)
+    F_n = np.full(len(t), rest)
+    for begin, duration in presses:
+        F_n[(t >= begin) & (t < begin + duration)] = force
+    return t, F_n, np.zeros(len(t))
+
+
+def is_tap(t, F_n, v_t, portion=10):
+    """Feed samples as the console gets them, twenty milliseconds at a time."""
+    watch = DoubleTap()
+    parts = range(0, len(t), portion)
+    fed = [slice(max(0, i - 7), i + portion) for i in parts]  # some seen twice
+    return any(watch.feed(t[s], F_n[s], v_t[s]) for s in fed)
+
+
+@pytest.mark.parametrize(
+    ("presses", "found"),
+    [
+        ([(0.5, 0.1), (0.9, 0.1)], True),
+        ([(0.5, 0.1), (1.49, 0.1)], True),
+        ([(0.5, 0.1), (1.52, 0.1)], False),  # more than a second apart
+        ([(0.5, 0.1), (1.6, 0.1), (2.2, 0.1)], True),  # the second one begins anew
+        ([(0.5, 0.1)], False),
+        ([(0.5, 0.5), (1.1, 0.1)], False),  # leaning on it is no tap
+        ([(0.5, 0.1), (0.8, 0.5)], False),
+        ([(0.5, 0.01), (0.9, 0.01)], False),  # a knock on the frame
+        ([], False),
+    ],
+)
+def test_two_short_presses_within_a_second_are_a_double_tap(presses, found):
+    assert is_tap(*pressed(*presses)) is found
+
+
+def test_a_press_counts_beyond_eight_newtons_only():
+    presses = [(0.5, 0.1), (0.9, 0.1)]
+    assert not is_tap(*pressed(*presses, force=7.9))
+    assert is_tap(*pressed(*presses, force=8.1))
+
+
+def test_the_foot_must_be_let_go_in_between():
+    presses = [(0.5, 0.1), (0.9, 0.1)]
+    assert not is_tap(*pressed(*presses, rest=5.1))
+    assert is_tap(*pressed(*presses, rest=4.9))
+
+
+def test_a_foot_that_slides_is_pushed_and_not_tapped():
+    t, F_n, v_t = pressed((0.5, 0.1), (0.9, 0.1))
+    v_t[(t > 0.7) & (t < 0.72)] = 0.06
+    assert not is_tap(t, F_n, v_t)
+    v_t[v_t > 0] = 0.04
+    assert is_tap(t, F_n, v_t)
+
+
+def test_values_that_are_no_numbers_are_no_taps():
+    t, F_n, v_t = pressed((0.5, 0.1), (0.9, 0.1))
+    assert not is_tap(t, np.full_like(F_n, np.nan), v_t)
+    assert not is_tap(t, F_n, np.full_like(v_t, np.nan))
+
+
+def test_a_normal_push_never_counts(recorded):
+    """Not even one that presses five times as hard, so that all of it is a press."""
+    for name in ("T01", "T02"):
+        path = recorded.folder / "trials" / f"{name}.mcap"
+        cycles = TrialReader(path).cycles().data
+        t = cycles["host_ns"].astype(float) * 1e-9
+        v_t, _, F_n = cycles["traction"].T
+        for harder in (1.0, 2.0, 5.0):
+            assert not is_tap(t, harder * F_n, v_t)
+
+
+def test_a_stick_slip_push_never_counts():
+    """Load and speed of a foot that slips five times a second and sticks between."""
+    t = np.arange(0.0, 10.0, 1 / RATE)
+    phase = t * 5.0 % 1.0
+    v_t = np.where(phase > 0.8, 0.3, 0.0)
+    F_n = 7.0 + 5.0 * np.cos(2 * np.pi * phase)
+    assert not is_tap(t, F_n, v_t)
+
+
+def tapping(asked, rig):
+    """Press nothing where the foot can say it; tap it twice with a finger."""
+    if asked.prompt not in {Prompt.READY, Prompt.REVIEW}:
+        return " " if asked.prompt is Prompt.RECORDING and asked.since > 0.3 else None
+    since = asked.since - 2.0
+    is_down = 0.0 < since < 0.1 or 0.4 < since < 0.5
+    rig.plant.finger = (0.0, 0.0, 14.0 if is_down else 0.0)
+    return "q" if asked.since > 3.5 else ""
+
+
+@pytest.fixture(scope="module")
+def handsfree(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("taps")
+    return write_config(folder, rig=("double_tap = false", "double_tap = true"))
+
+
+def test_a_double_tap_starts_a_trial_and_keeps_it(handsfree, tmp_path):
+    seen = run_watched(handsfree, tmp_path, 1, press=tapping)
+    assert (seen.done.code, seen.done.err) == (0, "")
+    assert [e["event"] for e in journal(seen.folder)].count("trial-kept") == 1
+
+
+def test_without_the_setting_a_foot_is_no_key(config, tmp_path):
+    seen = run_watched(config, tmp_path, 1, press=tapping)
+    assert seen.done.code == 5
+    assert "trial-started" not in [e["event"] for e in journal(seen.folder)]

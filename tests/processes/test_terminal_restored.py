@@ -1,0 +1,111 @@
+"""A terminal is given back as it was, however a session on it ends."""
+
+import contextlib
+import fcntl
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import termios
+
+import pytest
+
+from tests.experiments.program import write_config
+
+pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(90)]
+PATIENCE, LOOK = 20.0, 0.3  # s without a word, in all and at a time
+
+
+class Person:
+    """The end of a pseudo-terminal where somebody sits, and the program on it."""
+
+    def __init__(self, *arguments):
+        self.screen, self._program = pty.openpty()
+        self.before = self.settings()
+        self.text = ""
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "experiments", *map(str, arguments)],
+            stdin=self._program,
+            stdout=self._program,
+            stderr=self._program,
+            start_new_session=True,
+            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509
+            env={**os.environ, "TERM": "xterm"},
+        )
+
+    def settings(self):
+        """Return what `stty` would show."""
+        return termios.tcgetattr(self.screen)
+
+    def type(self, keys):
+        os.write(self.screen, keys.encode())
+
+    def see(self, words, *, typing=""):
+        """Read until `words` stand on the screen, from now on; type until then.
+
+        A key that comes with its prompt may be forgotten as one that came before.
+        """
+        looks = 0
+        while words not in self.text:
+            if select.select([self.screen], [], [], LOOK)[0]:
+                self.text += os.read(self.screen, 4096).decode(errors="ignore")
+                continue
+            looks += 1
+            assert looks < PATIENCE / LOOK, f"no {words!r}: {self.text[-500:]}"
+            self.type(typing)
+        self.text = self.text.partition(words)[2]
+
+    def end(self):
+        """Read on until the program has ended; return its exit code."""
+        while self.process.poll() is None:
+            if select.select([self.screen], [], [], 0.05)[0]:
+                self.text += os.read(self.screen, 4096).decode(errors="ignore")
+        return self.process.returncode
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        for descriptor in (self.screen, self._program):
+            with contextlib.suppress(OSError):
+                os.close(descriptor)
+
+
+@pytest.fixture
+def person(tmp_path):
+    # A test machine may be busy elsewhere; that is not what is looked at here.
+    change = ("late_per_second = 10 ", "late_per_second = 500 ")
+    config = write_config(tmp_path, rig=change)
+    options = ("--fake", "--trials", 1, "--config", config, "--data", tmp_path / "data")
+    found = Person("run", "TF", *options)
+    yield found
+    found.close()
+
+
+def once(person):
+    person.type("\x03")
+
+
+def twice(person):
+    person.type("\x03\x03")
+
+
+def terminated(person):
+    os.kill(person.process.pid, signal.SIGTERM)
+
+
+def hung_up(person):
+    os.kill(person.process.pid, signal.SIGHUP)
+
+
+@pytest.mark.parametrize("leave", [once, twice, terminated, hung_up])
+def test_the_terminal_is_as_it_was_before_the_session(person, leave):
+    person.see("then [space].")
+    assert not person.settings()[3] & (termios.ICANON | termios.ECHO)
+    person.see("Lift the foot clear of everything", typing=" ")
+    leave(person)
+    assert person.end() == 5
+    assert person.settings() == person.before
+    person.see("ARM: idle, braked.")
