@@ -182,8 +182,8 @@ def _asked(request: Request, opening: Opening, found: list[str]) -> dict[str, ob
 def _say_next(request: Request, book: Book, code: int) -> None:
     """Say what comes next: the report, and the terrain that time asks for."""
     name, data = book.folder.id, data_option(request.data)
-    if code == 0 and not book.state.is_complete:
-        request.console.say(f"Done. To go on: traction resume {name}{data}")
+    if not book.state.is_complete:
+        request.console.say(f"To go on: traction resume {name}{data}")
     if code or not book.state.is_complete:
         return
     request.console.say(f"Complete. Next: traction report {name}{data}")

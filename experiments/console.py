@@ -32,7 +32,7 @@ class Console:
                 stream.reconfigure(errors="replace")  # a sign is worth no crash
 
     def say(self, text: str = "") -> None:
-        """Print one line; a closed pipe is remembered, never raised."""
+        """Print one line; a closed pipe or terminal is remembered, never raised."""
         if self.is_lost:
             return
         try:
@@ -40,9 +40,8 @@ class Console:
                 self._live.console.print(text, markup=False, highlight=False)
             else:
                 print(text, flush=True)
-        except BrokenPipeError:
-            self.is_lost = True
-            _discard_output()
+        except OSError:
+            self._lose()
 
     def check(self, mark: str, name: str, text: str) -> None:
         """Print one line of a graded page."""
@@ -51,7 +50,10 @@ class Console:
     def problem(self, text: str) -> None:
         """Print an error to stderr."""
         self.end_panel()
-        print(text, file=sys.stderr, flush=True)
+        try:
+            print(text, file=sys.stderr, flush=True)
+        except OSError:
+            self._lose()
 
     @property
     def width(self) -> int:
@@ -69,20 +71,33 @@ class Console:
             if self._live is None:
                 self._live = self._begin_live()
             self._live.update(text, refresh=True)
-        except (BrokenPipeError, OSError):
-            self.is_lost = True
+        except OSError:
+            self._lose()
 
     def end_panel(self) -> None:
         """Take the panel away; a second call does nothing."""
         live, self._live = self._live, None
         if live is not None:
-            live.stop()
+            try:
+                live.stop()
+            except OSError:
+                self._lose()
 
     def bell(self, times: int = 1) -> None:
         """Ring the terminal's bell, if there is a terminal."""
-        if self._is_terminal and not self.is_lost:
+        if not self._is_terminal or self.is_lost:
+            return
+        try:
             sys.stdout.write("\a" * times)
             sys.stdout.flush()
+        except OSError:
+            self._lose()
+
+    def _lose(self) -> None:
+        """Remember that nobody reads any more; whatever is said goes nowhere."""
+        self.is_lost = True
+        self._live = None
+        _discard_output()
 
     def _begin_live(self) -> "Live":
         from rich.console import Console as RichConsole

@@ -126,8 +126,7 @@ class SessionRunner:
 
     def _tell_stop(self) -> None:
         sitting = self._sitting
-        text = CATALOGUE["interrupted"].text({}, sitting.book.saved())
-        sitting.say(f"{text} To go on: traction resume {sitting.facts.folder.id}")
+        sitting.say(CATALOGUE["interrupted"].text({}, sitting.book.saved()))
 
     def _tell_bug(self, rest: str, text: str) -> None:
         """Say where the arm is and what is safe; the traceback goes to the log."""

@@ -87,7 +87,7 @@ def test_a_fault_of_the_bus_is_told_with_the_arm_and_what_to_do(ended):
     assert line.startswith(begin)
     assert arm in line
     assert line.endswith(f"0 trials are safe in {seen.folder}.")
-    assert seen.done.out.splitlines()[-1] == last
+    assert seen.done.out.splitlines()[-2] == last
 
 
 def test_a_fault_of_the_bus_ends_the_session_with_the_arm_at_rest(ended):
@@ -236,7 +236,7 @@ def test_a_stop_between_trials_ends_the_session_without_power(config, tmp_path, 
     (line,) = seen.done.err.splitlines()
     assert line.startswith("Stop pressed. ARM: stopped by its hardware. Release it")
     assert line.endswith(f"0 trials are safe in {seen.folder}.")
-    assert seen.done.out.splitlines()[-1] == NO_POWER
+    assert seen.done.out.splitlines()[-2] == NO_POWER
     assert seen.rig.network.safety_mode is E_STOP
     assert journal(seen.folder)[-1]["reason"] == "estop"
     rejected = {p.name for p in (seen.folder / "rejected").glob("*.mcap")}

@@ -91,7 +91,9 @@ def test_ctrl_c_leaves_earlier_trials_as_they_were(once):
 def test_ctrl_c_holds_the_arm_until_the_trial_is_closed_and_then_brakes_it(once):
     assert last_mode(once.folder / "rejected" / "T02a.mcap") is SafetyMode.ACTIVE
     assert once.rig.network.safety_mode is SafetyMode.IDLE
-    assert once.done.out.splitlines()[-1] == "ARM: idle, braked."
+    braked, hint = once.done.out.splitlines()[-2:]
+    assert braked == "ARM: idle, braked."
+    assert hint.startswith("To go on: traction resume S001")
 
 
 def test_ctrl_c_twice_damps_and_brakes_the_arm_before_the_file_is_closed(twice):

@@ -1,0 +1,107 @@
+"""Seeded damage: bytes, lines, numbers and nesting that nobody meant to write."""
+
+import re
+
+import numpy as np
+
+_TOKENS = (
+    b"-1",
+    b"0",
+    b"1e400",
+    b"nan",
+    b"-inf",
+    b"9" * 400,
+    b"99999999999999999999",
+    b"true",
+    b"null",
+    b'""',
+    b"[]",
+    b"{}",
+    b"[" * 3000,
+    b'{"a":' * 3000,
+    b"\xff\xfe",
+    b"\0",
+    b"\n",
+    b'"../../../out"',
+    b"<script>",
+    b"$(touch out)",
+)
+_NUMBER = re.compile(rb"-?\d+(\.\d+)?")
+_MOST = 4  # damages to one input
+
+
+def mutated(data: bytes, seed: int) -> bytes:
+    """Return `data` after one to four damages that `seed` names."""
+    rng = np.random.default_rng(seed)
+    for _ in range(rng.integers(1, _MOST, endpoint=True)):
+        change = _CHANGES[rng.integers(len(_CHANGES))]
+        data = change(data, rng)
+    return data
+
+
+def _place(data: bytes, rng: np.random.Generator) -> int:
+    return int(rng.integers(len(data) + 1))
+
+
+def _flip(data: bytes, rng: np.random.Generator) -> bytes:
+    if not data:
+        return b"\xff"
+    place = _place(data[1:], rng)
+    spoilt = data[place] ^ 1 << int(rng.integers(8))
+    return data[:place] + bytes((spoilt,)) + data[place + 1 :]
+
+
+def _cut(data: bytes, rng: np.random.Generator) -> bytes:
+    first, last = sorted((_place(data, rng), _place(data, rng)))
+    return data[:first] + data[last:]
+
+
+def _end(data: bytes, rng: np.random.Generator) -> bytes:
+    return data[: _place(data, rng)]
+
+
+def _repeat(data: bytes, rng: np.random.Generator) -> bytes:
+    first, last = sorted((_place(data, rng), _place(data, rng)))
+    return data[:last] + data[first:last] + data[last:]
+
+
+def _insert(data: bytes, rng: np.random.Generator) -> bytes:
+    place = _place(data, rng)
+    return data[:place] + _TOKENS[rng.integers(len(_TOKENS))] + data[place:]
+
+
+def _other_number(data: bytes, rng: np.random.Generator) -> bytes:
+    found = list(_NUMBER.finditer(data))
+    if not found:
+        return data
+    number = found[rng.integers(len(found))]
+    token = _TOKENS[rng.integers(len(_TOKENS))]
+    return data[: number.start()] + token + data[number.end() :]
+
+
+def _other_value(data: bytes, rng: np.random.Generator) -> bytes:
+    """Replace what stands after a colon or an equals sign, up to the end of it."""
+    found = list(re.finditer(rb"[:=]\s*([^,}\n]*)", data))
+    if not found:
+        return data
+    value = found[rng.integers(len(found))]
+    token = _TOKENS[rng.integers(len(_TOKENS))]
+    return data[: value.start(1)] + token + data[value.end(1) :]
+
+
+def _swap_lines(data: bytes, rng: np.random.Generator) -> bytes:
+    lines = data.splitlines(keepends=True)
+    rng.shuffle(lines)
+    return b"".join(lines)
+
+
+_CHANGES = (
+    _flip,
+    _cut,
+    _end,
+    _repeat,
+    _insert,
+    _other_number,
+    _other_value,
+    _swap_lines,
+)

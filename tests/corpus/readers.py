@@ -1,0 +1,176 @@
+"""Everything that is read from outside, each as a function of bytes and a folder.
+
+It puts the bytes where they belong in the empty folder and reads them as the program
+does. It returns or raises a `TractionError`; anything else is a failure.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from analysis import terrain_db
+from analysis.tables import load_tables
+from experiments.aftermath import settle
+from experiments.board import count_board
+from experiments.book import open_book
+from experiments.lock import session_lock
+from experiments.scripted import ScriptKeys
+from experiments.settings import load_settings
+from experiments.store import list_sessions
+from experiments.wreckage import find_unfinished
+from ft_sensor import bota, optoforce, robotous
+from ft_sensor.calibration_file import payload_from_toml, terrain_from_toml
+from ft_sensor.dating import FrameDating
+from ft_sensor.reading import StreamTiming
+from ft_sensor.sensor_calibration import sensor_from_toml
+from wam.bus_words import BusReader
+from wam.can_log import parse_log
+from wam.frames import (
+    FrameError,
+    decode_acceleration,
+    decode_force,
+    decode_joint_encoder,
+    decode_position,
+    decode_reply,
+    decode_request,
+    decode_torque,
+    decode_torques,
+    split_id,
+)
+from wam.gravity_file import gravity_from_toml
+
+SESSION = "2027-01-15_S001_TF.fake"
+_DECODERS = (
+    decode_acceleration,
+    decode_force,
+    decode_joint_encoder,
+    decode_position,
+    decode_reply,
+    decode_request,
+    decode_torque,
+    decode_torques,
+)
+_RANGES = (400.0, 400.0, 1000.0, 10.0, 10.0, 10.0)
+_WRAP = 1 << 32
+_TIMING = StreamTiming(1_250_000.0, 803_000, _WRAP, 1000.0, 50_000_000, 37)
+
+
+def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None:
+    """Put a session with one hostile file into `folder` and look at it, then settle."""
+    path = folder / "sessions" / SESSION
+    for below in ("trials", "rejected", "faults"):
+        (path / below).mkdir(parents=True)
+    (path / "events.jsonl").write_bytes(journal)
+    (path / name).write_bytes(data)
+    find_unfinished(folder)
+    matrix = load_settings(None).matrix
+    count_board(folder, matrix)
+    (session,) = list_sessions(folder)
+    with session_lock(session):
+        settle(open_book(session, SystemClock()))
+
+
+def _settings(name: str) -> Callable[[bytes, Path], None]:
+    def read(data: bytes, folder: Path) -> None:
+        (folder / "rig.toml").write_text("")
+        (folder / name).write_bytes(data)
+        config = folder / "rig.toml"
+        if name == "matrix.toml":
+            shipped = load_settings(None).rig_text
+            config.write_text(shipped)
+        load_settings(config)
+
+    return read
+
+
+def _text(parse: Callable[[str], object]) -> Callable[[bytes, Path], None]:
+    """Return a reader of a text that another file holds or that was read as UTF-8."""
+    return lambda data, _: parse(data.decode(errors="replace"))
+
+
+def _table(name: str) -> Callable[[bytes, Path], None]:
+    def read(data: bytes, folder: Path) -> None:
+        (folder / name).write_bytes(data)
+        load_tables([folder / name])
+
+    return read
+
+
+def _database(data: bytes, folder: Path) -> None:
+    path = folder / "terrains.json"
+    path.write_bytes(data)
+    database = terrain_db.load(path)
+    for name in database.terrains:
+        database.terrain(name).predict(3.0, 0.05)
+
+
+def _script(data: bytes, folder: Path) -> None:
+    path = folder / "script.txt"
+    path.write_bytes(data)
+    ScriptKeys(path)
+
+
+def _bus_log(data: bytes, _: Path) -> None:
+    reader = BusReader()
+    for frame in parse_log(data.decode(errors="replace").splitlines()):
+        reader.read(frame)
+    reader.finish()
+
+
+def _frames(data: bytes, _: Path) -> None:
+    """Read frames of every length out of `data`, by every decoder."""
+    for start in range(0, len(data), 10):
+        split_id(int.from_bytes(data[start : start + 2], "little") & 0x7FF)
+        for decode in _DECODERS:
+            for size in range(9):
+                try:
+                    decode(data[start + 2 : start + 2 + size])
+                except FrameError:
+                    continue
+
+
+def _sensor(data: bytes, _: Path) -> None:
+    """Read `data` as the stream of each make, in pieces, and date what it holds."""
+    scanners = (
+        bota.scanner(_RANGES),
+        robotous.scanner(lambda: 1000.0),
+        optoforce.scanner(_RANGES),
+    )
+    for scanner in scanners:
+        dating = FrameDating(_TIMING)
+        for at_ns, start in enumerate(range(0, len(data), 23)):
+            readings = scanner.feed(data[start : start + 23])
+            dating.date(readings, at_ns * 1_000_000, 0)
+    bota.find_boot_text(data)
+    bota.find_acknowledgements(data)
+    robotous.find_answer(data, 1)
+    optoforce.find_configuration_answer(data)
+    optoforce.find_serial_number(data)
+
+
+READERS: dict[str, Callable[[bytes, Path], None]] = {
+    "journal": lambda data, folder: _session(folder, "events.jsonl", data),
+    "session": lambda data, folder: _session(folder, "session.json", data),
+    "sidecar": lambda data, folder: _session(folder, "trials/T01.json", data),
+    "partial": lambda data, folder: _session(
+        folder, "trials/T01.mcap.partial", data, RUNNING
+    ),
+    "rig": _settings("rig.toml"),
+    "matrix": _settings("matrix.toml"),
+    "gravity": _text(lambda text: gravity_from_toml(text, "gravity.toml")),
+    "foot": _text(payload_from_toml),
+    "terrain": _text(terrain_from_toml),
+    "sensor-calibration": _text(lambda text: sensor_from_toml(text, "sensor.toml")),
+    "database": _database,
+    "table": _table("trial.csv"),
+    "npz": _table("trials.npz"),
+    "script": _script,
+    "bus-log": _bus_log,
+    "frames": _frames,
+    "sensor": _sensor,
+}
+RUNNING = b"""\
+{"event": "session-started", "terrain": "TF", "trials": 2}
+{"event": "activated"}
+{"event": "trial-started", "trial": 1, "attempt": 1}
+"""

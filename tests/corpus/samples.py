@@ -1,0 +1,138 @@
+"""One sound input of each kind, small: what mutations begin with."""
+
+import io
+import json
+from functools import cache
+from importlib import resources
+
+import numpy as np
+
+from analysis.terrain_db import FORMAT, VERSION
+from fakes.sensor_kinds import SERIAL_KINDS, SensorChoice, make_stream
+from ft_sensor.calibration import SensorFit
+from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
+from ft_sensor.payload import TerrainFrame, payload_of
+from ft_sensor.sensor_calibration import SensorCalibration, sensor_to_toml
+from tests.corpus.readers import RUNNING
+from wam.constants import Body
+from wam.frames import encode_force, encode_position, encode_torques
+from wam.gravity_file import GravityCalibration, gravity_to_toml
+from wam.tool import Tool
+
+_TOOL = Tool(
+    Body(0.136, np.array([0.0, 0.0, 0.006]), np.diag([7e-5, 7e-5, 1.4e-4])),
+    Body(0.45, np.array([0.01, 0.0, 0.062]), np.diag([4e-4, 5.5e-4, 4.5e-4])),
+    np.array([0.01, 0.0, 0.112]),
+)
+_UTC = "2027-01-15T08:00:00Z"
+_JOURNAL = (
+    RUNNING
+    + b"""\
+{"event": "trial-recorded", "trial": 1, "attempt": 1}
+{"event": "trial-kept", "trial": 1, "attempt": 1, "reason": "", "who": "mk"}
+{"event": "trial-started", "trial": 2, "attempt": 1}
+{"event": "trial-rejected", "trial": 2, "attempt": 1, "reason": "too fast"}
+{"event": "session-ended", "reason": "unfinished"}
+{"event": "verdict-changed", "trial": 2, "attempt": 1, "verdict": "keep"}
+"""
+)
+_SIDECAR = {"trial": "T01", "attempt": 1, "sha256": "", "verdict": "keep"}
+_SCRIPT = b"keep\nredo 2  # again\nremark wet\nquit\n"
+_LOG = b"""\
+(1800000000.000100) can0 404#16
+(1800000000.000400) can0 463#00C000
+(1800000000.000900) can0 405#AA80000000000000
+"""
+
+
+def _gravity() -> str:
+    rng = np.random.default_rng(1)
+    found = GravityCalibration(
+        mus=rng.normal(size=(7, 3)),
+        residual=0.02,
+        rank=12,
+        foot="tread",
+        tool=_TOOL,
+        measured_utc=_UTC,
+        is_simulated=True,
+        poses=rng.normal(size=(10, 7)),
+        torques=rng.normal(size=(10, 7)),
+    )
+    return gravity_to_toml(found)
+
+
+def _sensor_calibration() -> str:
+    fit = SensorFit(0.5, np.zeros(3), np.zeros(6), 0.0, 1.0, 0.02, 0.001)
+    found = SensorCalibration(
+        fit, "tread", 0.1, _UTC, True, np.stack([np.eye(3)] * 6), np.zeros((6, 6))
+    )
+    return sensor_to_toml(found)
+
+
+def _database() -> dict[str, object]:
+    table = [[1.0, 2.0], [2.0, 3.0]]
+    model = {"mean": table, "sd": table, "parameters": {"mu": 0.6}}
+    terrain = {"kind": "stones", "trials": 3, "samples": 90, "rho": 0.5}
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "simulated": True,
+        "made_utc": _UTC,
+        "default": "gp",
+        "axes": {"F_n": [1.0, 5.0], "v_t": [0.0, 0.1]},
+        "terrains": {"S0": {**terrain, "limits": {"2": 0.1}, "models": {"gp": model}}},
+    }
+
+
+def _npz() -> bytes:
+    rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])
+    file = io.BytesIO()
+    np.savez(file, **{"TF/00": rows})
+    return file.getvalue()
+
+
+def _frames() -> bytes:
+    words = (
+        encode_force((1.0, 2.0, 3.0)),
+        encode_position(-5),
+        encode_torques([9] * 4),
+    )
+    return b"".join(b"\x63\x04" + word.ljust(8, b"\0") for word in words)
+
+
+def _stream() -> bytes:
+    """Return 20 ms of each make of sensor."""
+    data = bytearray()
+    for kind in SERIAL_KINDS:
+        stream = make_stream(SensorChoice(kind), lambda _: (1.0,) * 6, None, 0)
+        data += b"".join(said for _, said in stream.due(20_000_000))
+    return bytes(data)
+
+
+@cache
+def samples() -> dict[str, bytes]:
+    """Return a sound input for every reader, by its name."""
+    shipped = resources.files("experiments.data")
+    payload = payload_of(_TOOL)
+    frame = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)
+    texts = {
+        "rig": (shipped / "rig.toml").read_text(),
+        "matrix": (shipped / "matrix.toml").read_text(),
+        "gravity": _gravity(),
+        "foot": payload_to_toml(payload, _TOOL.sole),
+        "terrain": terrain_to_toml("S10", frame, {"measured": _UTC}),
+        "sensor-calibration": _sensor_calibration(),
+        "database": json.dumps(_database()),
+        "sidecar": json.dumps(_SIDECAR),
+        "session": json.dumps({"kept": ["T01"], "phase": "unfinished"}),
+        "table": "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n",
+    }
+    return {name: text.encode() for name, text in texts.items()} | {
+        "journal": _JOURNAL,
+        "partial": bytes(64),
+        "npz": _npz(),
+        "script": _SCRIPT,
+        "bus-log": _LOG,
+        "frames": _frames(),
+        "sensor": _stream(),
+    }

@@ -1,0 +1,100 @@
+"""Inputs that once did harm, or might: each is read or refused, quickly."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition.errors import SettingsError
+from experiments.settings import load_settings
+from ft_sensor.calibration_file import terrain_facts, terrain_from_toml, terrain_to_toml
+from ft_sensor.payload import TerrainFrame
+from tests.corpus.mutations import mutated
+from tests.corpus.readers import READERS
+from tests.corpus.samples import samples
+from tests.corpus.trial import read
+
+CORPUS = Path(__file__).parents[1] / "data" / "corpus"
+ROOT = Path(__file__).parents[2]
+SECONDS = 2.0  # of CPU
+MEMORY = 200 * 2**20
+FRAME = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)
+
+# Reads every file of the corpus under a limit of its address space; one line each.
+READER = """
+import json, resource, sys
+from pathlib import Path
+from tests.corpus.trial import read
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+limit = pages * resource.getpagesize() + int(sys.argv[1])
+resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+for path in sorted(Path(sys.argv[2]).iterdir()):
+    found = read(path.name.split(".")[0], path.read_bytes())
+    said = [path.name, found.is_sound, found.seconds, found.error]
+    print(json.dumps(said))
+"""
+
+
+def test_no_file_of_the_corpus_does_harm():
+    done = subprocess.run(
+        [sys.executable, "-c", READER, str(MEMORY), str(CORPUS)],
+        cwd=ROOT,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    said = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(said) == len(list(CORPUS.iterdir()))
+    assert [row for row in said if not row[1] or row[2] > SECONDS] == []
+
+
+def test_every_file_of_the_corpus_has_a_reader():
+    names = {path.name.split(".")[0] for path in CORPUS.iterdir()}
+    assert names <= set(READERS)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_a_sound_input_is_read(name):
+    found = read(name, samples()[name])
+    assert (found.error, found.strays) == ("", ())
+
+
+@pytest.mark.parametrize("name", READERS)
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 1 << 30))
+def test_a_damaged_input_is_read_or_refused(name, seed):
+    found = read(name, mutated(samples()[name], seed))
+    assert found.is_sound, found
+    assert found.seconds < SECONDS
+
+
+def test_a_terrain_file_needs_finite_numbers():
+    text = terrain_to_toml("S10", FRAME, {}).replace("0.45", "nan")
+    with pytest.raises(SettingsError, match="finite"):
+        terrain_from_toml(text)
+
+
+@given(st.text(st.characters(exclude_categories=["Cs"]), max_size=40))
+def test_what_is_said_of_a_terrain_survives_its_file(text):
+    written = terrain_to_toml("S10", FRAME, {"remark": text})
+    assert terrain_facts(written) == {"remark": text}
+
+
+@pytest.mark.parametrize("path", ["/dev/zero", "/dev/full"])
+def test_settings_are_not_read_from_a_device(path):
+    with pytest.raises(SettingsError, match="cannot be read"):
+        load_settings(Path(path))
+
+
+def test_settings_larger_than_any_matrix_are_not_read(tmp_path):
+    config = tmp_path / "rig.toml"
+    config.write_text("#" * 2_000_000)
+    with pytest.raises(SettingsError, match="cannot be read"):
+        load_settings(config)

@@ -1,0 +1,29 @@
+"""Print the fault matrix as a table in Markdown: `python -m tests.faults`."""
+
+from tests.faults.expected import TABLE, Cell, End
+from tests.faults.processes import TABLE as PROCESSES
+from tests.faults.stage import PHASES
+
+
+def lines() -> list[str]:
+    """Return the table, and below it why some cells are as they are."""
+    notes: list[str] = []
+
+    def word(cell: Cell) -> str:
+        if not cell.why:
+            return cell.end.value
+        if cell.why not in notes:
+            notes.append(cell.why)
+        return f"{cell.end.value} [{notes.index(cell.why) + 1}]"
+
+    rows = [f"| fault | {' | '.join(PHASES)} |", "|---" * (len(PHASES) + 1) + "|"]
+    for fault, row in {**TABLE, **PROCESSES}.items():
+        rows.append(f"| `{fault}` | {' | '.join(word(cell) for cell in row)} |")
+    rows += ["", *(f"[{n}] {why}." for n, why in enumerate(notes, 1))]
+    cells = [c for row in {**TABLE, **PROCESSES}.values() for c in row]
+    absent = sum(cell.end is End.ABSENT for cell in cells)
+    return [*rows, "", f"{len(cells) - absent} cells, {absent} cannot exist."]
+
+
+if __name__ == "__main__":
+    print("\n".join(lines()))  # noqa: T201

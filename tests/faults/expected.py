@@ -1,0 +1,347 @@
+"""What each fault has to come to in each phase, as data."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from acquisition.cycle import ArmState
+from tests.faults.stage import PHASES
+
+HOLD, DAMP = ArmState.HOLD, ArmState.DAMP
+
+
+class End(Enum):
+    """How the command ends."""
+
+    COMPLETE = "nothing happens"
+    REFUSED = "refused, nothing created"
+    NOT_ACTIVATED = "not activated, resumed"
+    TOLD = "told, the trial goes on or is redone"
+    REDONE = "trial interrupted and redone"
+    UNTARED = "five tares refused, resumed"
+    UNBRACKETED = "kept, the last tare is missing"
+    ENDED = "session ends, resumed"
+    UNWRITTEN = "session ends, what is on the disk stays"
+    STOPPED = "unfinished on purpose, resumed"
+    INTERRUPTED = "ends at once"
+    KILLED = "ends; the arm is braked without it, resumed"
+    LOST_EARLY = "ends, nothing recorded"
+    ABSENT = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """What the arm does, and how long after the fault it may take.
+
+    Attributes:
+        limit_ms: the limit that the fault reaches; 20 ms are added to it.
+        seen: by the pucks: "driven", "last torques", "braked", "without power".
+        state: of the loop; None = whatever it was.
+        text: what the message says of it.
+    """
+
+    limit_ms: float
+    seen: str
+    state: ArmState | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """What has to come of one fault in one phase.
+
+    Attributes:
+        end: how the command ends.
+        text: what the message contains; for WAITS what is said to the operator.
+        rejected: reasons of the attempts that were put away.
+        arm: what the arm does at once; None = what it did before.
+        at_rest: what it does in the end.
+        why: why the cell cannot exist, or what is particular about it.
+    """
+
+    end: End
+    text: str = ""
+    rejected: tuple[str, ...] = ()
+    arm: Arm | None = None
+    at_rest: str = "braked"
+    why: str = ""
+
+
+Row = tuple[Cell, ...]
+OK = Cell(End.COMPLETE)
+NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
+AT_REVIEW = ("session ended at the review",)
+
+
+def _row(cell: Cell, **others: Cell) -> Row:
+    """Return a row with `cell` everywhere but in the phases that are named."""
+    assert set(others) <= set(PHASES)
+    return tuple(others.get(phase, cell) for phase in PHASES)
+
+
+def _refused(text: str) -> Cell:
+    return Cell(End.REFUSED, text)
+
+
+def _ending(text: str, arm: Arm, why: str, **others: Cell) -> Row:
+    """Return the row of a fault that takes the arm away and ends the session."""
+    ended = Cell(End.ENDED, text, arm=arm)
+    ended = replace(ended, at_rest=arm.seen if arm.seen == NO_POWER else "braked")
+    phases = {
+        "recording": replace(ended, rejected=(f"interrupted: {why}",)),
+        "review": replace(ended, rejected=AT_REVIEW),
+        "end": replace(OK, at_rest=ended.at_rest),
+    }
+    return _row(ended, **{**phases, **others})
+
+
+NO_POWER = "without power"
+_SILENT = Arm(10, "last torques", HOLD, "held by its last torques")
+_UNKNOWN = Arm(10, "last torques", HOLD, "UNKNOWN - support it")
+_IDLE = Arm(5, "braked", ArmState.IDLE, "idle, braked")
+_BEAT = replace(_IDLE, limit_ms=100)
+_STOPPED = Arm(2, NO_POWER, ArmState.IDLE, "stopped by its hardware")
+_HELD = Arm(20, "driven", HOLD, "holding")
+_DAMPED = Arm(4, "driven", DAMP, "damping, then holding")
+_PUCK = "Puck 3 has not answered for "
+_MODULE = "The safety module put the arm to idle: "
+
+
+def _not_ready(text: str) -> Cell:
+    return Cell(End.NOT_ACTIVATED, text)
+
+
+_UNPOWERED = replace(
+    _not_ready("The arm is in E-stop: its pucks have no power."), at_rest=NO_POWER
+)
+_IN_STOP = replace(
+    _refused("The arm is in E-stop: its pucks have no power."), at_rest=NO_POWER
+)
+
+
+def _module(word: str, idle: Cell) -> Row:
+    """Return the row of a monitor of the safety module that strikes at once."""
+    text = f"{_MODULE}{word} fault."
+    told_anew = replace(OK, why="the start-up tells the module its limits anew")
+    return _ending(text, _IDLE, "pendant-idle", preflight=told_anew, idle=idle)
+
+
+def _sensor(limit_ms: float, waits: str, preflight: Cell, **others: Cell) -> Row:
+    """Return the row of a wrist sensor that gives nothing to be trusted."""
+    held = replace(_HELD, limit_ms=limit_ms)
+    redone = Cell(End.REDONE, "T01 stopped at", ("interrupted: ft-stale",), held)
+    waiting = Cell(End.TOLD, waits)
+    phases = {
+        "preflight": preflight,
+        "ready": replace(redone, arm=None, why="stops as soon as it is recorded"),
+        "recording": redone,
+        "review": replace(waiting, why="the trial is whole; the last tare waits"),
+    }
+    return _row(waiting, **{**phases, **others})
+
+
+def _lost_sensor(waits: str, preflight: Cell) -> Row:
+    """Return the row of a sensor that has to be opened again."""
+    untared = Cell(End.UNTARED, waits)
+    cut = replace(untared, rejected=("interrupted: ft-stale",))
+    kept = Cell(End.UNBRACKETED, waits)
+    held = Arm(20, "driven", HOLD, "holding")
+    return _row(
+        untared,
+        preflight=preflight,
+        ready=cut,
+        recording=replace(cut, arm=held),
+        review=kept,
+        end=kept,
+    )
+
+
+def _limit(text: str, why: str, preflight: Cell = NO_LOOP) -> Row:
+    """Return the row of a limit of the guard on the arm's motion."""
+    told = Cell(End.TOLD, text, arm=_DAMPED)
+    return _row(
+        told,
+        preflight=preflight,
+        idle=Cell(End.ENDED, text, why="found when the arm becomes active"),
+        recording=replace(told, end=End.REDONE, rejected=(f"interrupted: {why}",)),
+        end=OK,
+    )
+
+
+def _disk(word: str) -> Row:
+    text = f"cannot be written ({word})"
+    lost = Cell(End.UNWRITTEN, text)
+    crashed = replace(lost, rejected=("the session ended without closing",))
+    return _row(
+        lost, recording=crashed, preflight=replace(lost, why="nothing to resume")
+    )
+
+
+_NO_DATA = _refused("No F/T data for 100 ms")
+_NO_FRAME = _refused("No whole F/T frame")
+_FEW = "are too few for a tare"
+_FLAGGED = "F/T samples were flagged during tare"
+_BRAKED = Cell(End.ABSENT, why="joint 7 is braked like the others")
+_SLIP = Cell(
+    End.REDONE,
+    "Joint 7 moved",
+    ("interrupted: joint7-slip",),
+    Arm(100, "driven", HOLD, "holding"),
+)
+_NAN = "A position or torque was not a number."
+_CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
+_HEARTBEAT = f"{_MODULE}heartbeat fault."
+
+TABLE: dict[str, Row] = {
+    "reply-lost": _row(OK),
+    "reply-lost-3": _row(OK, preflight=_refused("Puck 3 does not report a position.")),
+    "reply-lost-10": _ending(
+        _PUCK,
+        _SILENT,
+        "can-silence",
+        preflight=_refused("Puck 3 does not report a position."),
+        idle=replace(OK, why="over before torques are made ready"),
+    ),
+    "reply-lost-some": _row(OK),
+    "reply-late": _row(OK),
+    "reply-doubled": _row(OK),
+    "reply-swapped": _row(OK),
+    "reply-spoilt": _row(OK, preflight=_refused("Puck 3 does not report a position.")),
+    "puck-silent": _ending(
+        _PUCK,
+        _SILENT,
+        "can-silence",
+        preflight=_refused("Puck 3 does not answer (1,2,4,5,6,7 do)."),
+        idle=_not_ready("Puck 3 has not answered for 100 ms."),
+    ),
+    "puck-reboot": _ending(
+        _PUCK,
+        _SILENT,
+        "can-silence",
+        preflight=_refused("The arm is not zeroed."),
+        idle=_not_ready("Puck 3 has not answered for 100 ms."),
+    ),
+    "puck-hot": _row(OK),
+    "puck-error": _row(OK),
+    "can-silence": _ending(
+        "No reply from the arm for ",
+        _UNKNOWN,
+        "can-silence",
+        preflight=_refused("Pucks 1,2,3,4,5,6,7 do not answer"),
+        idle=_not_ready("Pucks 1,2,3,4,5,6,7 have not answered for 100 ms."),
+    ),
+    "bus-off": _ending(
+        "The CAN interface refuses to send and receive; no reply",
+        _UNKNOWN,
+        "can-silence",
+        preflight=_refused("CAN fake bus broke"),
+        idle=_not_ready("The CAN interface refuses to send and receive."),
+    ),
+    "bus-flooded": _row(OK),
+    "estop": _ending(
+        "Stop pressed", _STOPPED, "estop", preflight=_IN_STOP, idle=_UNPOWERED
+    ),
+    "pendant-idle": _ending(
+        "The pendant or the safety module put the arm to idle",
+        _IDLE,
+        "pendant-idle",
+        preflight=replace(OK, why="the arm is idle already"),
+        idle=replace(OK, why="the arm is idle already"),
+    ),
+    "safety-heartbeat": _ending(
+        _HEARTBEAT,
+        _BEAT,
+        "pendant-idle",
+        preflight=Cell(End.ENDED, _HEARTBEAT, why="found when the arm becomes active"),
+        idle=Cell(End.ENDED, _HEARTBEAT, why="found when the arm becomes active"),
+    ),
+    "safety-speed": _module("velocity", Cell(End.ENDED, f"{_MODULE}velocity fault.")),
+    "safety-torque": _module(
+        "torque",
+        replace(
+            _not_ready("The arm was not activated within 120 s."),
+            why="the module refuses to become active",
+        ),
+    ),
+    "safety-voltage": _ending(
+        "The safety module stopped the arm: voltage fault.",
+        _STOPPED,
+        "estop",
+        preflight=_IN_STOP,
+        idle=_UNPOWERED,
+    ),
+    "ft-stale": _sensor(20, _FEW, _NO_DATA),
+    "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
+    "ft-garbled": _sensor(20, _FEW, _NO_FRAME),
+    "ft-saturated": _sensor(
+        0,
+        _FLAGGED,
+        Cell(End.TOLD, _FLAGGED),
+        ready=Cell(End.TOLD, _FLAGGED, why="the review says so, the last tare too"),
+        recording=Cell(End.TOLD, _FLAGGED, why="the review says so, the last tare too"),
+    ),
+    "ft-not-a-number": _sensor(
+        20, _FLAGGED, _refused("The F/T sensor sends raw gauge data or absurd forces")
+    ),
+    "ft-unplugged": _lost_sensor(_FEW, _NO_DATA),
+    "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up anew")),
+    "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
+    "not-a-number": _ending(
+        _NAN,
+        Arm(2, "braked", ArmState.IDLE, "idle"),
+        "not-a-number",
+        preflight=NO_LOOP,
+        idle=_CANNOT_COUNT,
+    ),
+    "joint-limit": _limit("Joint 6 at ", "joint-limit"),
+    "torque-limit": _limit("Joint 2 was asked for ", "torque-limit"),
+    "foot-speed": _limit("The foot moved at ", "foot-speed"),
+    "overspeed": _limit(
+        "Joint 5 ", "overspeed", replace(OK, why="the arm is braked, and stays so")
+    ),
+    "joint7-slip": _row(
+        OK,
+        preflight=_BRAKED,
+        idle=_BRAKED,
+        tare=replace(_SLIP, arm=None, why="watched in trials: stops the next one"),
+        ready=replace(_SLIP, arm=None, why="watched in trials: stops the next one"),
+        recording=_SLIP,
+        review=replace(OK, why="watched in trials only"),
+    ),
+    "stall-3-ms": _row(OK),
+    "stall-20-ms": _row(
+        OK,
+        recording=Cell(
+            End.REDONE,
+            "T01 stopped at",
+            ("interrupted: ft-stale",),
+            replace(_HELD, limit_ms=20),
+            why="no force was looked at meanwhile",
+        ),
+    ),
+    "stall-150-ms": _row(
+        Cell(End.ENDED, _HEARTBEAT, arm=replace(_IDLE, limit_ms=150)),
+        preflight=replace(OK, why="the arm is idle"),
+        idle=replace(OK, why="the arm is idle"),
+        recording=Cell(
+            End.ENDED,
+            _HEARTBEAT,
+            ("interrupted: ft-stale",),
+            replace(_IDLE, limit_ms=150),
+        ),
+        review=Cell(End.ENDED, _HEARTBEAT, AT_REVIEW, replace(_IDLE, limit_ms=150)),
+        end=OK,
+    ),
+    "clock-step": _row(OK),
+    "disk-full": _disk("No space left on device"),
+    "disk-read-only": _disk("Read-only file system"),
+}
+
+
+def cells() -> list[tuple[str, str, Cell]]:
+    """Return (fault, phase, what has to come of it) of every cell that can exist."""
+    return [
+        (fault, phase, cell)
+        for fault, row in TABLE.items()
+        for phase, cell in zip(PHASES, row, strict=True)
+        if cell.end is not End.ABSENT
+    ]

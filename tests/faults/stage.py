@@ -1,0 +1,219 @@
+"""The whole program with one fault in one phase, and the arm as its pucks saw it."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+import experiments.conduct
+import experiments.runner
+import fakes.rig
+from acquisition.cycle import ArmState, Cycle
+from acquisition.devices import SafetyMode
+from acquisition.guard import Limits
+from acquisition.trial_file.verify import verify
+from experiments.operator import AutoKeys, Prompt
+from fakes.rig import FakeRig, Rehearsal
+from tests.experiments.program import Done, journal, run_short, sidecar, traction
+
+PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
+MS = 1_000_000
+_FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
+_PROMPTS = {
+    "tare": (Prompt.LIFT, 0.9),  # still since 0.6 s, the mean is being taken
+    "ready": (Prompt.READY, 0.06),
+    "recording": (Prompt.RECORDING, 0.2),
+    "review": (Prompt.REVIEW, 0.06),
+    "end": (Prompt.REVIEW, 0.1),
+}
+
+
+@dataclass(slots=True)
+class Scene:
+    """What a fault can reach: the simulated devices and the loop's cycle."""
+
+    rig: FakeRig
+    patch: pytest.MonkeyPatch
+    cycle: Cycle | None = None
+    strikes: int = 0
+    struck_ns: int | None = None
+    heard_ns: int = 0
+    seen: list[tuple[int, str, ArmState]] = field(default_factory=list)
+    usual_limits: Limits | None = None
+
+    def mend(self) -> None:
+        """Give the guard its limits back."""
+        if self.usual_limits is not None:
+            self.cycle._limits, self.usual_limits = self.usual_limits, None
+
+    @property
+    def arm(self) -> str:
+        """What the arm does, in the eyes of its pucks."""
+        network = self.rig.network
+        if network.safety_mode is SafetyMode.E_STOP:
+            return "without power"
+        if self.rig.plant._is_held:
+            return "braked"
+        is_fresh = network.schedule.now_ns - self.heard_ns < _FRESH_NS
+        return "driven" if is_fresh else "last torques"
+
+    def look(self) -> None:
+        """Note what the arm does now, when it is something else than before."""
+        state = self.cycle.status.state if self.cycle else ArmState.IDLE
+        now = (self.arm, state)
+        if not self.seen or self.seen[-1][1:] != now:
+            self.seen.append((self.rig._clock.now_ns(), *now))
+
+    def reached_ms(self, arm: str, state: ArmState | None) -> float | None:
+        """Return how long after the strike the arm did this; None = never."""
+        for at_ns, *found in self.seen_since():
+            if found[0] == arm and state in (None, found[1]):
+                return (at_ns - self.struck_ns) / MS
+        return None
+
+    def seen_since(self):
+        """Return what the arm did from the strike on."""
+        before = [row for row in self.seen if row[0] <= self.struck_ns]
+        after = [row for row in self.seen if row[0] > self.struck_ns]
+        return [(self.struck_ns, *row[1:]) for row in before[-1:]] + after
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """How it ended: what was said, what is on the disk, what the arm did."""
+
+    done: Done
+    scene: Scene
+    folder: Path | None
+    data: Path
+
+    @property
+    def events(self) -> list[dict]:
+        return journal(self.folder) if self.folder else []
+
+    @property
+    def rejected(self) -> list[str]:
+        """Return the reasons of the rejected attempts whose files are sound."""
+        paths = sorted((self.folder / "rejected").glob("T???.mcap"))
+        assert all(verify(p).sha256 == sidecar(p)["sha256"] for p in paths)
+        return [sidecar(path)["reason"] for path in paths]
+
+
+Strike = Callable[[Scene], None]
+
+
+def run_with(strike: Strike, phase: str, config: Path, data: Path) -> Seen:
+    """Run a session of one trial in which `strike` comes once, in `phase`."""
+    with pytest.MonkeyPatch.context() as patch:
+        scenes = _watch(patch)
+        _at(patch, phase, scenes, strike)
+        done = run_short(config, data, "TF", 1)
+    found = [path for path in (data / "sessions").glob("2*") if path.is_dir()]
+    return Seen(done, scenes[0], found[0] if found else None, data)
+
+
+def resume(data: Path) -> Done:
+    """Go on with the session on a rig that is well again."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(AutoKeys, "answer", lambda _, asked: _press(asked))
+        return traction("resume", "--operator-script", "auto", "--data", data)
+
+
+def copied(data: Path, target: Path) -> Path:
+    """Return a copy of a data folder."""
+    shutil.copytree(data, target)
+    return target
+
+
+def _press(asked) -> str:
+    """Press the keys that make a session short."""
+    waits = {Prompt.READY: (0.3, " "), Prompt.RECORDING: (0.5, " ")}
+    wait, key = waits.get(asked.prompt, (0.3, "k"))
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED}:
+        return " "
+    if asked.prompt is Prompt.LIFT:
+        return "q" if asked.since > 15.0 else ""
+    return key if asked.since > wait else ""
+
+
+def _watch(patch: pytest.MonkeyPatch) -> list[Scene]:
+    """Let every simulated rig, cycle and torque frame be seen."""
+    scenes: list[Scene] = []
+
+    class Rig(fakes.rig.FakeRig):
+        def __init__(self, *arguments, **named):
+            super().__init__(*arguments, **named)
+            scenes.append(scene := Scene(self, patch))
+            bank = self.network._bank
+            usual = bank.receive_torques
+
+            def receive(*given):
+                scene.heard_ns = self.network.schedule.now_ns
+                usual(*given)
+
+            bank.receive_torques = receive
+
+    usual_call = Cycle.__call__
+
+    def call(cycle, tick):
+        scene = scenes[-1]
+        scene.cycle = cycle
+        try:
+            usual_call(cycle, tick)
+        finally:
+            scene.look()
+
+    usual_mend = Rehearsal.mend
+
+    def mend(rehearsal):
+        scenes[-1].mend()
+        usual_mend(rehearsal)
+
+    patch.setattr(Rehearsal, "mend", mend)
+    patch.setattr(fakes.rig, "FakeRig", Rig)
+    patch.setattr(Cycle, "__call__", call)
+    return scenes
+
+
+def _at(patch, phase: str, scenes: list[Scene], strike: Strike) -> None:
+    """Let `strike` come once, in `phase`."""
+
+    def strike_once() -> None:
+        scene = scenes[0]
+        if not scene.strikes:
+            scene.strikes += 1
+            scene.struck_ns = scene.rig._clock.now_ns()
+            strike(scene)
+
+    def answer(_, asked):
+        prompt, since = _PROMPTS.get(phase, (None, 0.0))
+        if asked.prompt is prompt and asked.since > since:
+            is_first = not scenes[0].strikes
+            strike_once()
+            return "k" if phase == "end" else "" if is_first else _press(asked)
+        return _press(asked) if phase != "end" or asked.prompt is not prompt else ""
+
+    patch.setattr(AutoKeys, "answer", answer)
+    if phase == "preflight":
+        _before(patch, experiments.conduct, "run_preflight", strike_once)
+    if phase == "idle":
+        _before(patch, experiments.runner, "activate", strike_once, idle=0.2)
+
+
+def _before(patch, module, name: str, first, idle: float = 0.0) -> None:
+    usual = getattr(module, name)
+
+    def replaced(*given, **named):
+        first()
+        if idle:  # the arm stays as it is for a while: the loop runs, nobody asks
+            given[0].control.advance(idle)
+        return usual(*given, **named)
+
+    patch.setattr(module, name, replaced)
+
+
+def inject(name: str) -> Strike:
+    """Return the strike that a rehearsal calls `name`."""
+    return lambda scene: Rehearsal(scene.rig).inject(name)

@@ -1,0 +1,141 @@
+"""Every fault in every phase through the whole program, on stepped time.
+
+By default one cell of every fault, the phases taken in turn; all of them with
+`-m long`. `python -m tests.faults` prints the matrix.
+"""
+
+import pytest
+
+from tests.experiments.program import kept_and_sound, write_config
+from tests.faults.expected import TABLE, Cell, End, cells
+from tests.faults.stage import PHASES, resume, run_with
+from tests.faults.strikes import strike_of
+
+pytestmark = pytest.mark.timeout(240)  # two simulated minutes on a busy machine
+ALLOWANCE_MS = 20.0  # beyond the fault's own limit
+CODES = {
+    End.COMPLETE: 0,
+    End.REFUSED: 3,
+    End.NOT_ACTIVATED: 3,
+    End.TOLD: 0,
+    End.REDONE: 0,
+    End.UNTARED: 3,
+    End.UNBRACKETED: 0,
+    End.ENDED: 4,
+    End.UNWRITTEN: 6,
+}
+SEVERAL_LINES = {End.UNWRITTEN, End.UNTARED, End.UNBRACKETED}
+WHOLE = {End.COMPLETE, End.TOLD, End.REDONE, End.UNBRACKETED}
+# One fault of each kind by default, each in another phase; the rest is long.
+DAILY = {
+    ("puck-silent", "idle"),
+    ("safety-torque", "tare"),
+    ("stall-150-ms", "recording"),
+    ("estop", "end"),
+    ("overspeed", "review"),
+    ("ft-garbled", "preflight"),
+}
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    return write_config(tmp_path_factory.mktemp("config"))
+
+
+def marked():
+    """Return every cell as a parameter, most of them marked long."""
+    return [
+        pytest.param(
+            fault,
+            phase,
+            cell,
+            id=f"{fault}-{phase}",
+            marks=[] if (fault, phase) in DAILY else [pytest.mark.long],
+        )
+        for fault, phase, cell in cells()
+    ]
+
+
+@pytest.mark.parametrize(("fault", "phase", "cell"), marked())
+def test_a_fault_comes_to_what_the_table_says(config, tmp_path, fault, phase, cell):
+    seen = run_with(strike_of(fault), phase, config, tmp_path / "data")
+    assert seen.scene.strikes == 1
+    check_words(seen, cell)
+    check_arm(seen, cell)
+    check_files(seen, cell)
+    check_resume(seen, cell)
+
+
+def check_words(seen, cell: Cell) -> None:
+    done = seen.done
+    assert done.code == CODES[cell.end], done.err
+    assert "Traceback" not in done.err + done.out
+    if cell.end is End.COMPLETE:
+        assert done.err == ""
+        assert cell.text in done.out
+        return
+    (*lines, last) = done.err.splitlines()
+    assert lines == [] or cell.end in SEVERAL_LINES
+    assert cell.text in last
+    if cell.end is End.UNBRACKETED:
+        assert "No tare at the end" in done.out
+    if cell.arm is not None:
+        assert f"ARM: {cell.arm.text}" in last
+
+
+def check_arm(seen, cell: Cell) -> None:
+    """Hold the arm against the table, in the eyes of its pucks."""
+    scene = seen.scene
+    assert scene.arm == cell.at_rest
+    if cell.end is End.REFUSED:
+        assert all(arm != "driven" for _, arm, _ in scene.seen)
+    if cell.arm is not None:
+        reached = scene.reached_ms(cell.arm.seen, cell.arm.state)
+        assert reached is not None, scene.seen_since()
+        assert reached <= cell.arm.limit_ms + ALLOWANCE_MS
+
+
+def check_files(seen, cell: Cell) -> None:
+    if cell.end is End.REFUSED:
+        assert seen.folder is None
+        return
+    is_whole = cell.end in WHOLE
+    if cell.end is not End.UNWRITTEN:
+        assert seen.rejected == list(cell.rejected)
+        assert kept_and_sound(seen.folder) == (["T01"] if is_whole else [])
+        assert list(seen.data.rglob("*.partial")) == []
+        assert seen.events[-1]["event"] == "session-ended"
+    for why in cell.rejected:
+        is_fault = why.startswith("interrupted")
+        flight = seen.folder / "faults" / "T01a.flight.mcap"
+        assert flight.exists() is is_fault
+
+
+def check_resume(seen, cell: Cell) -> None:
+    """A session that is not complete is completed; one that is needs nothing."""
+    if seen.folder is None:
+        return
+    done = resume(seen.data)
+    is_left = cell.end not in WHOLE
+    if cell.end is End.UNWRITTEN:
+        # What the disk has of the journal decides.
+        is_left = done.code == 0
+        assert is_left or done.err.startswith("There is no unfinished session")
+        return
+    assert done.code == (0 if is_left else 2), done.err
+    assert kept_and_sound(seen.folder) == ["T01"]
+
+
+def test_every_cell_that_cannot_exist_says_why():
+    absent = [c for row in TABLE.values() for c in row if c.end is End.ABSENT]
+    assert absent
+    assert all(cell.why for cell in absent)
+
+
+def test_every_phase_and_every_end_is_in_the_table():
+    assert {phase for _, phase, _ in cells()} == set(PHASES)
+    assert {cell.end for _, _, cell in cells()} == set(CODES)
+
+
+def test_the_daily_cells_are_in_the_table():
+    assert {(fault, phase) for fault, phase, _ in cells()} >= DAILY

@@ -1,0 +1,257 @@
+"""Processes, signals and the disk in every phase, on the wall clock."""
+
+import contextlib
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import pytest
+
+from acquisition.cycle import ArmState
+from acquisition.devices import SafetyMode
+from tests.experiments.program import traction, write_config
+from tests.faults.expected import End
+from tests.faults.processes import TABLE
+from tests.faults.stage import PHASES
+from tests.processes.watching import (
+    NAMES,
+    ROOT,
+    Session,
+    children_of,
+    is_running,
+    until,
+    wait,
+)
+
+pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(180)]
+TRIES = 3  # a session may stop because the machine stood still
+REACTION = 0.6  # s, from the fault to an arm that holds or is braked
+SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
+BRAKED = {SafetyMode.IDLE, SafetyMode.E_STOP}
+CODES = {
+    End.STOPPED: {5},
+    End.ENDED: {4},
+    End.LOST_EARLY: {3, 4},
+    End.COMPLETE: {0},
+    End.UNBRACKETED: {0},
+    End.INTERRUPTED: {130},
+    End.KILLED: {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP},
+}
+# One phase of every fault without `long`, another one each.
+DAILY = {
+    ("console killed", "review"),
+    ("recorder killed", "ready"),
+    ("sensor reader killed", "tare"),
+    ("SIGINT", "preflight"),
+    ("SIGTERM", "recording"),
+    ("terminal closed", "idle"),
+}
+
+# The program, its operator waiting at one prompt until the fault has come.
+START = """
+import sys
+from pathlib import Path
+from experiments.operator import AutoKeys, Prompt, RehearsedHand
+prompt, marker = sys.argv.pop(1), Path(sys.argv.pop(1))
+answer, follow = AutoKeys.answer, RehearsedHand.follow
+def waiting(keys, asked):
+    is_last = prompt == "end" and asked.prompt is Prompt.LIFT and asked.trial == 0
+    if asked.prompt.value == prompt or is_last:
+        marker.touch()
+        if not marker.with_suffix(".over").exists():
+            return ""
+    return answer(keys, asked)
+def idle(hand, asked):
+    if asked.prompt.value != prompt or prompt != "support":
+        follow(hand, asked)
+AutoKeys.answer, RehearsedHand.follow = waiting, idle
+from experiments.cli import main
+sys.exit(main())
+"""
+SLOW_DISK = """
+import os, sys
+fsync = os.fsync
+def slow(descriptor):
+    __import__("select").select([], [], [], 0.2)
+    fsync(descriptor)
+os.fsync = slow
+"""
+PROMPTS = {
+    "preflight": "none",
+    "idle": "support",
+    "tare": "lift",
+    "ready": "ready",
+    "recording": "recording",
+    "review": "review",
+    "end": "end",
+}
+
+
+@dataclass
+class Scene:
+    """A session that waits in a phase."""
+
+    seen: Session
+    terminal: int
+    marker: object
+
+    is_closing: bool = False
+
+    def read_terminal(self):
+        """Take what is shown, or the program would wait for whoever reads it."""
+        with contextlib.suppress(OSError):
+            while not self.is_closing:
+                if select.select([self.terminal], [], [], 0.05)[0]:
+                    os.read(self.terminal, 4096)
+
+    def close_terminal(self):
+        """Close the window; a second call does nothing."""
+        if not self.is_closing:
+            self.is_closing = True
+            wait(0.1)  # nobody reads any more
+            os.close(self.terminal)
+
+    def go_on(self):
+        self.marker.with_suffix(".over").touch()
+
+
+@contextmanager
+def waiting_in(phase, folder, fault):
+    """Start a session and let it wait in `phase`; end what is left of it."""
+    data = folder / "data"
+    data.mkdir()
+    marker = folder / "there"
+    config = write_config(folder, travel=0.12)
+    command = [sys.executable, "-c", START, PROMPTS[phase], str(marker), "run", "TF"]
+    command += ["--fake", "--trials", "1", "--operator-script", "auto"]
+    command += ["--config", str(config), "--data", str(data)]
+    environment = dict(os.environ)
+    if fault.startswith("fsync"):
+        (folder / "sitecustomize.py").write_text(SLOW_DISK)
+        environment["PYTHONPATH"] = str(folder)
+    ours, theirs = pty.openpty()
+    with (data / "out.txt").open("w") as out:
+        process = subprocess.Popen(
+            command,
+            cwd=ROOT,
+            stdout=theirs if fault == "terminal closed" else out,
+            stderr=out,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+            env=environment,
+        )
+    os.close(theirs)
+    seen = Session(process, data)
+    scene = Scene(seen, ours, marker)
+    threading.Thread(target=scene.read_terminal, daemon=True).start()
+    try:
+        yield scene
+    finally:
+        for pid in [process.pid, *seen.pids.values()]:
+            if is_running(pid):
+                os.kill(pid, signal.SIGKILL)
+        process.wait(10)
+        scene.close_terminal()
+
+
+def arrive(scene, phase):
+    """Return when the session waits in `phase`; False if the machine is too slow."""
+    seen = scene.seen
+
+    def is_there():
+        if phase == "preflight":
+            return set(NAMES.values()) <= set(children_of(seen.process.pid))
+        return scene.marker.exists()
+
+    if not until(is_there, 60):
+        assert seen.has_stalled(), seen.output()
+        return False
+    children = children_of(seen.process.pid)
+    seen.pids = {name: children[short] for name, short in NAMES.items()}
+    wait(0.5)  # it is in the middle of it, not at its beginning
+    if phase != "preflight":
+        seen.attach()
+    return True
+
+
+def strike(scene, fault):
+    """Let `fault` happen."""
+    seen, console = scene.seen, scene.seen.process.pid
+    if fault.endswith(" killed"):
+        seen.kill(fault.removesuffix(" killed"))
+    elif fault == "SIGINT twice":
+        os.kill(console, signal.SIGINT)
+        wait(0.1)
+        os.kill(console, signal.SIGINT)
+    elif fault == "terminal closed":
+        scene.close_terminal()
+    elif fault.startswith("SIG"):
+        os.kill(console, signal.Signals[fault])
+
+
+def is_safe(seen):
+    if seen.board is None:
+        return True  # nobody has asked for the arm
+    if is_running(seen.pids["control"]) and seen.status().is_running:
+        return seen.status().control.state in SAFE
+    if not is_running(seen.pids["fake rig"]):
+        return True  # it goes last, when the arm is braked
+    return seen.pucks_mode() in BRAKED
+
+
+def marked():
+    """Return every cell as a parameter, most of them marked long."""
+    return list(_marked())
+
+
+def _marked():
+    for fault, row in TABLE.items():
+        for phase, cell in zip(PHASES, row, strict=True):
+            marks = [] if (fault, phase) in DAILY else [pytest.mark.long]
+            yield pytest.param(fault, phase, cell, id=f"{fault}-{phase}", marks=marks)
+
+
+@pytest.mark.parametrize(("fault", "phase", "cell"), marked())
+def test_what_befalls_the_computer_leaves_the_arm_safe(tmp_path, fault, phase, cell):
+    tries = (tmp_path / str(number) for number in range(TRIES))
+    assert any(is_survived(folder, fault, phase, cell) for folder in tries)
+
+
+def is_survived(folder, fault, phase, cell):
+    """Hold one session against the table; False if the machine's stall came first."""
+    folder.mkdir()
+    with waiting_in(phase, folder, fault) as scene:
+        seen = scene.seen
+        if not arrive(scene, phase):
+            return False
+        strike(scene, fault)
+        if cell.end is not End.COMPLETE:
+            assert until(lambda: is_safe(seen), REACTION) is not None, seen.output()
+        scene.go_on()
+        assert until(lambda: not is_running(seen.process.pid), 60), seen.output()
+        code = seen.process.wait(1)
+        if code not in CODES[cell.end] and seen.has_stalled():
+            return False
+        assert code in CODES[cell.end], seen.output()
+        assert "Traceback" not in seen.output()
+        assert cell.text in seen.output()
+        gone = until(lambda: not any(is_running(p) for p in seen.pids.values()), 10)
+        assert gone, "a process was left behind"
+    check_resume(seen.data, cell)
+    return True
+
+
+def check_resume(data, cell):
+    """What was begun is completed; where nothing was begun nothing is left."""
+    if not (data / "sessions").exists():
+        return
+    done = traction("resume", "--fast", "--operator-script", "auto", "--data", data)
+    nothing = done.err.startswith("There is no unfinished session")
+    assert done.code == 0 or nothing, done.err
+    assert not list(data.rglob("trials/*.partial"))

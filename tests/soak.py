@@ -1,0 +1,289 @@
+"""Simulated hours of sessions with random faults; what has to hold is checked.
+
+python tests/soak.py --hours 1 --seed 1
+
+Every session is run, and resumed until it is complete, as a person would. Before each
+trial the journal, session.json and the verified files have to agree; after each
+command the exit code and every message have to be known, the arm at rest, and nothing
+left behind: descriptors, children, shared memory, memory.
+"""
+
+import argparse
+import gc
+import json
+import os
+import re
+import resource
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from string import Formatter
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import fakes.rig
+from acquisition.devices import SafetyMode
+from experiments.messages import CATALOGUE
+from experiments.operator import AutoKeys, Prompt
+from experiments.session import replay
+from experiments.store import find_session
+from fakes.clock import START_NS
+from fakes.rig import FakeRig
+from tests.experiments.program import (
+    Done,
+    journal,
+    kept_and_sound,
+    only_session,
+    traction,
+    write_config,
+)
+
+TRIALS = 3
+CODES = {0, 3, 4, 5, 6}
+FAULT_SHARE = 0.7  # of the sessions
+MOST_RESUMES = 4
+GROWTH_KB = 60_000  # of a process after its first sessions
+WARM_SESSIONS = 10
+TERRAINS = ("TF", "Tf", "S0", "B10")
+# What a rehearsal can raise in a trial without ending this very process.
+FAULTS = (
+    "reply-lost-10",
+    "reply-lost-some",
+    "reply-spoilt",
+    "reply-swapped",
+    "puck-silent",
+    "puck-reboot",
+    "puck-hot",
+    "can-silence",
+    "bus-off",
+    "bus-flooded",
+    "safety-speed",
+    "safety-torque",
+    "safety-heartbeat",
+    "safety-voltage",
+    "estop",
+    "pendant-idle",
+    "ft-stale",
+    "ft-frozen",
+    "ft-garbled",
+    "ft-saturated",
+    "ft-not-a-number",
+    "ft-unplugged",
+    "ft-reboot",
+    "overspeed",
+    "joint7-slip",
+)
+
+
+@dataclass(slots=True)
+class Soak:
+    """What has happened so far.
+
+    Attributes:
+        folder: where the sessions are.
+        rng: draws terrains, faults and moments.
+        rigs: the simulated rigs of the present session.
+        simulated_ns: how much time has passed in all simulations.
+        counts: sessions, trials, resumes, faults by name.
+        base: descriptors and memory after the first sessions.
+    """
+
+    folder: Path
+    rng: np.random.Generator
+    rigs: list[FakeRig] = field(default_factory=list)
+    simulated_ns: int = 0
+    counts: Counter = field(default_factory=Counter)
+    base: tuple[int, int] | None = None
+    data: Path = Path()
+
+    def check_files(self) -> None:
+        """Hold journal, session.json and verified files against each other."""
+        folder = only_session(self.data)
+        state = replay(find_session(self.data, folder.name).events())
+        kept = [f"T{number:02d}" for number in sorted(state.kept)]
+        assert kept == kept_and_sound(folder), (kept, folder)
+        facts = json.loads((folder / "session.json").read_text())
+        assert sorted(facts["kept"]) == kept, (kept, facts)
+        rejected = {path.stem for path in (folder / "rejected").glob("T???.json")}
+        assert len(rejected) == state.rejected, (rejected, state.rejected)
+        self.counts["checks of files"] += 1
+
+    def check_command(self, done: Done) -> None:
+        """Hold exit code, messages and arm against what may be."""
+        assert done.code in CODES, done.err
+        for line in done.err.splitlines():
+            assert is_known(line), line
+        rig = self.rigs[-1]
+        is_braked = rig.plant._is_held or rig.network.safety_mode is SafetyMode.E_STOP
+        assert is_braked, (rig.network.safety_mode, done.err)
+        assert not children(), children()
+
+    def check_growth(self) -> None:
+        """Hold descriptors, shared memory and memory against the beginning."""
+        gc.collect()
+        left = [path.name for path in Path("/dev/shm").glob("*traction*")]
+        assert left == [], left
+        now = (descriptors(), resident_kb())
+        if self.counts["sessions"] == WARM_SESSIONS:
+            self.base = now
+        if self.base is not None:
+            assert now[0] <= self.base[0] + 2, f"{now[0]} descriptors: {self.base[0]}"
+            assert now[1] <= self.base[1] + GROWTH_KB, f"{now[1]} kB: {self.base[1]}"
+
+
+def descriptors() -> int:
+    """Return how many files this process has open."""
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def resident_kb() -> int:
+    """Return the memory of this process [kB]."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() // 1024
+
+
+def children() -> list[str]:
+    """Return the processes that this one has started and that still run."""
+    task = Path(f"/proc/self/task/{os.getpid()}/children")
+    return task.read_text().split() if task.exists() else []
+
+
+def _pattern(what: str) -> str:
+    parts = Formatter().parse(what)
+    return "".join(
+        re.escape(text) + ("" if name is None else ".+") for text, name, *_ in parts
+    )
+
+
+_KNOWN = [re.compile(_pattern(message.what)) for message in CATALOGUE.values()]
+
+
+def is_known(line: str) -> bool:
+    """Return whether a message is one of the catalogue, or a driver's with its hint."""
+    return any(known.match(line) for known in _KNOWN) and "Bug" not in line
+
+
+def run_session(soak: Soak, config: Path) -> None:
+    """Run one session with its fault, and resume it until it is complete."""
+    rng = soak.rng
+    number = soak.counts["sessions"]
+    soak.data = soak.folder / f"{number:05d}"
+    soak.rigs.clear()
+    options = ["--trials", TRIALS, "--seed", int(rng.integers(1 << 30))]
+    if rng.random() < FAULT_SHARE:
+        name = str(rng.choice(FAULTS))
+        moment = f"@T{rng.integers(1, TRIALS + 1)}+{rng.uniform(0.0, 0.8):.2f}s"
+        options += ["--fault", name + moment]
+        soak.counts[f"fault {name}"] += 1
+    terrain = str(rng.choice(TERRAINS))
+    fake = ("--fake", "--fast", "--operator-script", "auto")
+    where = ("--config", config, "--data", soak.data)
+    done = traction("run", terrain, *fake, *where, *options)
+    soak.check_command(done)
+    soak.check_files()
+    for _ in range(MOST_RESUMES):
+        if done.code == 0:
+            break
+        soak.counts["resumes"] += 1
+        done = traction("resume", "--operator-script", "auto", "--data", soak.data)
+        soak.check_command(done)
+        soak.check_files()
+    assert done.code == 0, done.err
+    assert len(kept_and_sound(only_session(soak.data))) == TRIALS
+    assert journal(only_session(soak.data))[-1]["reason"] == "complete"
+    soak.counts["sessions"] += 1
+    soak.simulated_ns += sum(rig._clock.now_ns() - START_NS for rig in soak.rigs)
+    soak.rigs.clear()
+    remove(soak.data)
+    soak.check_growth()
+
+
+def remove(folder: Path) -> None:
+    """Delete the files of a session that was checked."""
+    for path in sorted(folder.rglob("*"), reverse=True):
+        if path.is_dir():
+            path.rmdir()
+        else:
+            path.unlink()
+    folder.rmdir()
+
+
+def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
+    """Keep hold of every simulated rig; look at the files before every trial."""
+
+    class Seen(fakes.rig.FakeRig):
+        def __init__(self, *given: object, **named: object) -> None:
+            super().__init__(*given, **named)
+            soak.rigs.append(self)
+
+    seen: list[tuple[int, int]] = []
+
+    def answer(_: AutoKeys, asked) -> str:
+        if asked.prompt is Prompt.READY and seen[-1:] != [(asked.trial, asked.attempt)]:
+            seen[:] = [(asked.trial, asked.attempt)]
+            soak.counts["trials"] += 1
+            soak.check_files()
+        return press(asked)
+
+    patch.setattr(fakes.rig, "FakeRig", Seen)
+    patch.setattr(AutoKeys, "answer", answer)
+
+
+def press(asked) -> str:
+    """Press the keys of short trials; keep all that are not interrupted."""
+    waits = {Prompt.READY: (0.1, " "), Prompt.RECORDING: (1.0, " ")}
+    wait, key = waits.get(asked.prompt, (0.05, "k"))
+    if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED}:
+        return " "
+    if asked.prompt is Prompt.LIFT:
+        return "q" if asked.since > 30.0 else ""
+    return key if asked.since > wait else ""
+
+
+def soaked(hours: float, seed: int, folder: Path, tell: Callable[[Soak], None]) -> Soak:
+    """Run sessions until so much simulated time has passed; `tell` after each."""
+    soak = Soak(folder, np.random.default_rng(seed))
+    config = write_config(folder)
+    with pytest.MonkeyPatch.context() as patch:
+        watch(patch, soak)
+        while soak.simulated_ns < hours * 3.6e12:
+            run_session(soak, config)
+            tell(soak)
+    return soak
+
+
+def summary(soak: Soak) -> list[str]:
+    """Return what happened, line by line."""
+    lines = [f"{soak.simulated_ns / 3.6e12:.3f} simulated hours"]
+    lines += [f"{name}: {count}" for name, count in sorted(soak.counts.items())]
+    if soak.base is not None:
+        lines.append(f"descriptors {descriptors()}, {soak.base[0]}")
+        lines.append(f"memory {resident_kb()} kB, after the first {soak.base[1]} kB")
+    return lines
+
+
+def tell(soak: Soak) -> None:
+    """Print a line now and then, for whoever waits."""
+    if soak.counts["sessions"] % 20 == 0:
+        print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
+
+
+def main() -> None:
+    """Soak as long as the command line says and print a summary."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--hours", type=float, default=1.0)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="soak-") as place:
+        soak = soaked(given.hours, given.seed, Path(place), tell)
+    print("\n".join(summary(soak)))  # noqa: T201
+
+
+if __name__ == "__main__":
+    main()
