@@ -31,6 +31,6 @@ TABLE: dict[str, tuple[Cell, ...]] = {
     "SIGINT twice": _row(_STOPPED, _BEFORE, _LEFT_OUT),
     "SIGTERM": _row(_STOPPED, _NO_ARM, _LEFT_OUT),
     "SIGHUP": _row(_STOPPED, _NO_ARM, _LEFT_OUT),
-    "terminal closed": _row(_STOPPED, _STOPPED, replace(_LEFT_OUT, text="")),
+    "terminal closed": _row(_STOPPED, _NO_ARM, replace(_LEFT_OUT, text="")),
     "fsync of 200 ms": _row(Cell(End.COMPLETE), Cell(End.COMPLETE)),
 }

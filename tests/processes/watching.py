@@ -26,7 +26,7 @@ NAMES = {
     "sensor reader": "traction-reader",
     "fake rig": "traction-fake",
 }
-STALLED = ("late cycles", "No reply from the arm", "F/T sample")
+STALLED = ("late cycles", "No reply from the arm", " ms old (limit")
 START = "import sys; from experiments.cli import main; sys.exit(main())"
 
 
