@@ -4,6 +4,14 @@ from tests.faults.expected import TABLE, Cell, End
 from tests.faults.processes import TABLE as PROCESSES
 from tests.faults.stage import PHASES
 
+HEAD = """\
+# Every fault in every phase
+
+What comes of each fault that `--fault` can raise, and of signals and killed processes, in
+each phase of a session. Made by `python -m tests.faults > docs/faults.md`; the tests in
+`tests/faults` hold the program against it.
+"""
+
 
 def lines() -> list[str]:
     """Return the table, and below it why some cells are as they are."""
@@ -25,5 +33,10 @@ def lines() -> list[str]:
     return [*rows, "", f"{len(cells) - absent} cells, {absent} cannot exist."]
 
 
+def page() -> str:
+    """Return docs/faults.md."""
+    return "\n".join([HEAD, *lines()]) + "\n"
+
+
 if __name__ == "__main__":
-    print("\n".join(lines()))  # noqa: T201
+    print(page(), end="")  # noqa: T201
