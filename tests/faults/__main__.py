@@ -7,9 +7,9 @@ from tests.faults.stage import PHASES
 HEAD = """\
 # Every fault in every phase
 
-What comes of each fault that `--fault` can raise, and of signals and killed processes, in
-each phase of a session. Made by `python -m tests.faults > docs/faults.md`; the tests in
-`tests/faults` hold the program against it.
+What comes of each fault that `--fault` can raise, and of signals and killed processes,
+in each phase of a session. Made by `python -m tests.faults > docs/faults.md`; the tests
+in `tests/faults` hold the program against it.
 """
 
 
