@@ -47,9 +47,8 @@ CODES = {
     End.INTERRUPTED: {130},
     End.KILLED: {-signal.SIGKILL, -signal.SIGTERM, -signal.SIGHUP},
 }
-# One phase of every fault without `long`, another one each.
+# These run every day; a killed console is in tests/processes too.
 DAILY = {
-    ("console killed", "review"),
     ("recorder killed", "ready"),
     ("sensor reader killed", "tare"),
     ("SIGINT", "preflight"),
