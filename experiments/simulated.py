@@ -21,6 +21,8 @@ from experiments.parts import (
 from experiments.rehearsing import Rehearsing
 from experiments.sensor_settings import SensorSection
 from experiments.settings import RigSettings, Settings, TerrainRow
+from ft_sensor.serial_link import SerialPort
+from ft_sensor.serial_sensor import SerialSensor
 from wam.can_link import CanLink
 from wam.model import ArmModel
 from wam.tool import tool_facts, tool_of
@@ -105,7 +107,6 @@ def stepped(
 
     clock, facts = SteppedClock(), world.facts()
     model, law_model = models
-    is_on_bus = settings.rig.ft_sensor.is_on_bus
     simulation = FakeRig(
         scene_of(facts["scene"]),
         model.constants,
@@ -118,12 +119,9 @@ def stepped(
     arm = build_arm(settings.rig, model.constants, link, board, clock)
 
     def sensor() -> WrenchSensor:
-        if is_on_bus:
+        if settings.rig.ft_sensor.is_on_bus:
             return open_bus_sensor(arm, link, clock)
-        port = simulation.open_port()
-        serial = build_sensor(settings.rig, port, clock, is_simulated=True)
-        serial.open()
-        return serial
+        return _opened_sensor(settings.rig, simulation.open_port(), clock)
 
     def parts(opened: WrenchSensor) -> LoopParts:
         return LoopParts(
@@ -140,6 +138,12 @@ def stepped(
 
     crew = InlineCrew(board, clock, arm, sensor, parts)
     return clock, crew, Rehearsal(simulation, PACES[facts["pace"]])
+
+
+def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSensor:
+    sensor = build_sensor(rig, port, clock, is_simulated=True)
+    sensor.open()
+    return sensor
 
 
 def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:

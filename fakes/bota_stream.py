@@ -4,8 +4,9 @@ import re
 from dataclasses import dataclass
 from enum import Enum, auto
 
+from fakes.firmware import Measurement, Saying, Schedule
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import Measurement, Saying, Schedule, SensorStream, Source
+from fakes.sensor_stream import SensorStream, Source
 from ft_sensor import bota
 from ft_sensor.bota import Acknowledgement, BootText, BotaFrame
 

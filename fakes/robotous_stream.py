@@ -2,15 +2,9 @@
 
 from dataclasses import dataclass
 
+from fakes.firmware import Measurement, Saying, Schedule, count_of
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import (
-    Measurement,
-    Saying,
-    Schedule,
-    SensorStream,
-    Source,
-    count_of,
-)
+from fakes.sensor_stream import SensorStream, Source
 from ft_sensor import robotous
 from ft_sensor.reading import Wrench
 from ft_sensor.robotous import MODELS, RobotousFrame

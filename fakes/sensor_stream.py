@@ -4,104 +4,20 @@
 with them. What is particular to a make is its `Firmware`. Told the time, never waits.
 """
 
-import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from enum import Enum, auto
-from typing import Protocol
 
+from fakes.firmware import Firmware, Measurement, Saying, Schedule
 from fakes.sensor_errors import SensorErrors
-from fakes.stream_faults import StreamFaults
+from fakes.stream_faults import ByteFault, StreamFaults, damage
 from ft_sensor.framing import wire_time_ns
 from ft_sensor.reading import ALL_AXES, Wrench
 
 Source = Callable[[int], Sequence[float]]
-Saying = tuple[int, bytes]  # when it is said [ns], and what
 
-FULL_COUNT = 32767  # of a sensor that sends 16-bit counts
 ROOM = 25.0  # where it stands [degrees Celsius]
 _NO_RANGES: Wrench = (1e9, 1e9, 1e9, 1e9, 1e9, 1e9)
 _PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth adds
-
-
-class ByteFault(Enum):
-    """What may happen to one byte on the wire."""
-
-    FLIP = auto()
-    DROP = auto()
-    DOUBLE = auto()
-
-
-def damage(data: bytes, fault: ByteFault, index: int, bit: int = 0) -> bytes:
-    """Return `data` with one byte, at `index`, flipped in `bit`, dropped or doubled."""
-    byte = data[index : index + 1]
-    middle = {
-        ByteFault.FLIP: bytes((byte[0] ^ 1 << bit,)),
-        ByteFault.DROP: b"",
-        ByteFault.DOUBLE: byte * 2,
-    }[fault]
-    return data[:index] + middle + data[index + 1 :]
-
-
-@dataclass(frozen=True, slots=True)
-class Schedule:
-    """When a running device takes its samples, by its own clock: first and period."""
-
-    first_ns: int
-    period_ns: float
-
-
-@dataclass(slots=True)
-class Measurement:
-    """What the gauges and the device's clock show at one sample.
-
-    Attributes:
-        wrench: fx fy fz tx ty tz [N, N m], clipped at the ranges.
-        saturated: bit i set = axis i was clipped.
-        device_us: the device's clock [us], not wrapped.
-        number: frames sent since power-on, as a counter shows them.
-        is_skipping: the sample before could not be sent.
-        temperature: [degrees Celsius].
-    """
-
-    wrench: Wrench
-    saturated: int
-    device_us: int
-    number: int
-    is_skipping: bool
-    temperature: float
-
-
-class Firmware(Protocol):
-    """What is particular to a make: its words and its frames.
-
-    Attributes:
-        baudrate: speed of its line [bit/s].
-        schedule: when it samples; None = it does not stream. A new object is a new
-            beginning.
-        on_since_ns: when its power was switched on, or it reset itself.
-        clock_rate: how fast its clock runs, 1 = right.
-        frame_size: [bytes].
-    """
-
-    baudrate: int
-    schedule: Schedule | None
-    on_since_ns: int
-    clock_rate: float
-    frame_size: int
-
-    def power_up(self, t_ns: int) -> list[Saying]:
-        """Begin anew; return what it says by itself."""
-        ...
-
-    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
-        """Take bytes from the client; return the answers."""
-        ...
-
-    def frame(self, shown: Measurement, status: int) -> bytes:
-        """Return the bytes of a frame with `status` bits set beside its own."""
-        ...
 
 
 class SensorStream:
@@ -315,10 +231,3 @@ def _clipped(wrench: Sequence[float], ranges: Wrench) -> tuple[list[float], int]
             saturated |= 1 << axis
         shown.append(min(max(value, -most), most))
     return shown, saturated
-
-
-def count_of(value: float) -> int:
-    """Return `value` as a 16-bit count; what is no number reads full scale."""
-    if not math.isfinite(value):
-        return FULL_COUNT
-    return max(-FULL_COUNT, min(FULL_COUNT, round(value)))

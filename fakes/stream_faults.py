@@ -1,11 +1,31 @@
 """What can go wrong between the gauges of a serial wrist sensor and its host."""
 
 import math
+from enum import Enum, auto
 
 from ft_sensor.reading import Wrench
 
 _GARBLED = 9  # byte of a frame that is inverted: in the middle of a force
 _NOT_A_NUMBER: Wrench = (math.nan, math.inf, 0.0, 0.0, 0.0, 0.0)
+
+
+class ByteFault(Enum):
+    """What may happen to one byte on the wire."""
+
+    FLIP = auto()
+    DROP = auto()
+    DOUBLE = auto()
+
+
+def damage(data: bytes, fault: ByteFault, index: int, bit: int = 0) -> bytes:
+    """Return `data` with one byte, at `index`, flipped in `bit`, dropped or doubled."""
+    byte = data[index : index + 1]
+    middle = {
+        ByteFault.FLIP: bytes((byte[0] ^ 1 << bit,)),
+        ByteFault.DROP: b"",
+        ByteFault.DOUBLE: byte * 2,
+    }[fault]
+    return data[:index] + middle + data[index + 1 :]
 
 
 class StreamFaults:

@@ -5,11 +5,8 @@ import pytest
 
 from fakes.bota_stream import BotaOptions, bota_stream
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import (
-    ByteFault,
-    SensorStream,
-    damage,
-)
+from fakes.sensor_stream import SensorStream
+from fakes.stream_faults import ByteFault, damage
 from ft_sensor.bota import (
     Acknowledgement,
     BotaStatus,

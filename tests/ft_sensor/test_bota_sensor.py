@@ -12,42 +12,14 @@ from acquisition.errors import (
 )
 from fakes.bota_stream import BotaOptions, bota_stream
 from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import ByteFault
 from fakes.serial_port import FakeSerialPort
+from fakes.stream_faults import ByteFault
 from ft_sensor.bota import BotaStatus
 from ft_sensor.bota_device import BotaDevice, BotaSettings
 from ft_sensor.line import Line
 from ft_sensor.serial_link import SerialLink
 from ft_sensor.serial_sensor import SerialSensor
-
-MS = 1_000_000
-LOAD = (1.0, -2.0, 30.0, 0.1, 0.2, -0.3)
-
-
-class SteppedTime:
-    """A clock that jumps: to the next byte when waiting, to the end when sleeping."""
-
-    def __init__(self) -> None:
-        self.now = 10_000_000_000
-        self.world: FakeSerialPort
-
-    def now_ns(self) -> int:
-        return self.now
-
-    def utc_ns(self) -> int:
-        return self.now
-
-    def sleep_until(self, t_ns: int) -> None:
-        self.now = max(self.now, t_ns)
-
-    def wait(self, link, deadline_ns: int) -> bool:
-        while not link.is_readable():
-            event = self.world.next_event_ns()
-            if event is None or event > deadline_ns:
-                self.sleep_until(deadline_ns)
-                return link.is_readable()
-            self.sleep_until(event)
-        return True
+from tests.ft_sensor.sensor_bench import LOAD, MS, SteppedTime
 
 
 def sensor_on(port, clock, baudrate=460800, **settings) -> SerialSensor:

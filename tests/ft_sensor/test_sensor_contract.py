@@ -1,12 +1,13 @@
 """What every wrist sensor has to do, and what those on a serial line."""
 
+import contextlib
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
-from fakes.sensor_stream import ByteFault
+from fakes.stream_faults import ByteFault
 from ft_sensor.reading import axis_names, largest_traction
 from tests.ft_sensor.sensor_bench import LOAD, MAKES, MS, BusBench, SensorBench
 
@@ -62,6 +63,9 @@ def test_every_sensor_tells_who_it_is_and_what_became_of_its_samples(any_bench):
 def test_every_sensor_can_be_closed_twice(any_bench):
     any_bench.sensor.close()
     any_bench.sensor.close()
+    # nothing is left over to be read
+    with contextlib.suppress(LinkError):
+        assert any_bench.sensor.poll(any_bench.clock.now_ns()) == []
 
 
 @pytest.mark.parametrize("chunk", CHUNKS)
