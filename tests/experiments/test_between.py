@@ -16,6 +16,8 @@ from tests.experiments.program import (
     traction,
 )
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 SCRIPT = """\
 note   dry stones # said before the first trial
 pause

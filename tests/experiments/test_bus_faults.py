@@ -17,6 +17,8 @@ from tests.experiments.program import (
     sidecar,
 )
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 AFTER = 0.2  # s into the recording
 ALL_FRESH = 0x7F << MOTOR_FRESH_SHIFT
 

@@ -16,6 +16,8 @@ from wam.first_moments import gravity_torque, moments_of_links
 from wam.gravity_file import GravityCalibration, gravity_to_toml
 from wam.model import ArmModel
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 CONSTANTS = load_constants()
 POSES = np.random.default_rng(9).uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (10, 7))
 # The bare foot of this rig weighs otherwise than the one with a tread.

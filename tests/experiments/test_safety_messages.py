@@ -13,6 +13,8 @@ from tests.experiments.program import run_watched, traction, write_config
 from wam.frames import encode_set
 from wam.safety_limits import SafetyLimits
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 FOUND = Circumstances("T01", 1.5)
 SAFETY_TABLE = """
 speed_warning = 0.5       # m/s at elbow and forearm; left out: 0.9 of the fault

@@ -13,6 +13,8 @@ from tests.experiments.program import (
     write_config,
 )
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 OPTOFORCE = """kind = "optoforce"
 sensitivity = [18.28, 18.41, 2.12, 278.72, 259.55, 448.47]
 serial_number = "HEX00042"

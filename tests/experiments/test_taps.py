@@ -6,6 +6,8 @@ from experiments.operator import Prompt
 from experiments.taps import DoubleTap
 from tests.experiments.program import journal, run_watched, write_config
 
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+
 RATE = 500
 REST = 3.0  # N, of a foot that rests on the ground
 

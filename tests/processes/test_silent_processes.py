@@ -6,7 +6,7 @@ import signal
 import pytest
 
 from acquisition.cycle import ArmState
-from tests.processes.watching import session, until, wait
+from tests.processes.watching import running_trial, until
 
 pytestmark = pytest.mark.wall_clock
 LIMIT = 0.5  # s, of a heartbeat
@@ -27,9 +27,7 @@ def holds(seen):
 def test_a_process_that_stops_for_a_while_ends_the_trial_only(
     tmp_path, victim, message
 ):
-    with session(tmp_path / "data") as seen:
-        seen.wait_for_trial()
-        wait(1.0)
+    with running_trial(tmp_path) as seen:
         pid = seen.process.pid if victim == "console" else seen.pids[victim]
         os.kill(pid, signal.SIGSTOP)
         try:
@@ -44,10 +42,8 @@ def test_a_process_that_stops_for_a_while_ends_the_trial_only(
 
 
 def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):
-    with session(tmp_path / "data") as seen:
-        seen.wait_for_trial()
-        wait(1.0)
+    with running_trial(tmp_path) as seen:
         seen.process.send_signal(signal.SIGINT)
         assert seen.process.wait(15) == 5, seen.output()
         assert "ARM: idle, braked." in seen.output()
-        assert not list((tmp_path / "data").rglob("*.partial"))
+        assert not list(tmp_path.rglob("*.partial"))

@@ -26,7 +26,12 @@ NAMES = {
     "sensor reader": "traction-reader",
     "fake rig": "traction-fake",
 }
-STALLED = ("late cycles", "No reply from the arm", " ms old (limit")
+STALLED = (
+    "late cycles",
+    "No reply from the arm",
+    "not answered for",
+    " ms old (limit",
+)
 START = "import sys; from experiments.cli import main; sys.exit(main())"
 
 
@@ -166,3 +171,19 @@ def session(data, *options):
             if is_running(pid):
                 os.kill(pid, signal.SIGKILL)
         process.wait(10)
+
+
+@contextmanager
+def running_trial(folder, tries=3):
+    """Yield a session in the second second of its trial.
+
+    A machine that stalls may end a trial, or never let it begin; another is begun then.
+    """
+    for number in range(tries):
+        with session(folder / f"data{number}") as seen:
+            if seen.wait_for_trial():
+                wait(1.0)
+                if not seen.has_trial_ended():
+                    yield seen
+                    return
+    raise AssertionError(f"the machine ended {tries} trials before they were looked at")
