@@ -27,8 +27,8 @@ from acquisition.loop import LATE_NS, PERIOD_NS
 from acquisition.realtime import choose_cores
 from acquisition.sample import Record
 from experiments.bench import BenchReport, ProcessUse, run_bench
-from experiments.crews import ProcessCrew
 from experiments.preflight import start_devices
+from experiments.process_crew import ProcessCrew
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, load_settings
 

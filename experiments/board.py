@@ -7,8 +7,8 @@ from pathlib import Path
 from acquisition.errors import SettingsError
 from experiments.arguments import data_option
 from experiments.lock import owner_of
+from experiments.matrix_settings import MatrixSettings, TerrainRow
 from experiments.order import suggest_order
-from experiments.settings import MatrixSettings, TerrainRow
 from experiments.store import SessionFolder, list_sessions, read_json, sha256_of
 from experiments.wreckage import find_unfinished
 

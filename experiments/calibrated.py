@@ -9,7 +9,9 @@ from pydantic import ValidationError
 
 from acquisition.errors import SettingsError
 from experiments.calibration_files import check_kind, read_calibration
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.matrix_settings import TerrainRow
+from experiments.rig_settings import RigSettings
+from experiments.settings import Settings
 from ft_sensor.calibration_file import terrain_facts, terrain_from_toml
 from ft_sensor.sensor_calibration import SensorCalibration, sensor_from_toml
 

@@ -21,12 +21,13 @@ from experiments.console import Console
 from experiments.faults import plan_faults
 from experiments.foot_check import confirm_foot, foot_before
 from experiments.lock import session_lock
+from experiments.matrix_settings import TerrainRow
 from experiments.operator import Keys, RehearsedHand
 from experiments.phases import Event
 from experiments.preflight import Preflight, connect_rig, run_preflight
 from experiments.rigs import FakeOptions, Rig
 from experiments.runner import SessionRunner
-from experiments.settings import Settings, TerrainRow
+from experiments.settings import Settings
 from experiments.stage import Stage
 from experiments.store import create_session, session_utc_ns, write_json, write_text
 from experiments.terminal import keyboard

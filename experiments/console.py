@@ -4,6 +4,7 @@ import io
 import os
 import shutil
 import sys
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from rich.live import Live
 
 GOOD, WARNING, BAD = "✔", "▲", "✘"
+_BELOW_TEXT = " " * 18  # where the text of a graded line begins
 
 
 class Console:
@@ -33,8 +35,13 @@ class Console:
 
     def say(self, text: str = "") -> None:
         """Print one line; a closed pipe or terminal is remembered, never raised."""
+        self._say(text, "")
+
+    def _say(self, text: str, indent: str) -> None:
         if self.is_lost:
             return
+        if self._is_terminal:
+            text = wrapped(text, self.width, indent)
         try:
             if self._live is not None:
                 self._live.console.print(text, markup=False, highlight=False)
@@ -45,11 +52,13 @@ class Console:
 
     def check(self, mark: str, name: str, text: str) -> None:
         """Print one line of a graded page."""
-        self.say(f" {mark} {name:<14} {text}")
+        self._say(f" {mark} {name:<14} {text}", _BELOW_TEXT)
 
     def problem(self, text: str) -> None:
         """Print an error to stderr."""
         self.end_panel()
+        if sys.stderr.isatty():
+            text = wrapped(text, self.width)
         try:
             print(text, file=sys.stderr, flush=True)
         except OSError:
@@ -119,6 +128,27 @@ class Console:
         RichConsole(no_color=not self._color, highlight=False, markup=False).print(
             table
         )
+
+
+def wrapped(text: str, width: int, indent: str = "") -> str:
+    """Return `text` broken between words at `width`; a longer word stays whole.
+
+    Args:
+        text: lines to be broken.
+        width: of the terminal [characters].
+        indent: what the lines after a break begin with.
+    """
+    lines = [
+        textwrap.fill(
+            line,
+            width,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        for line in text.split("\n")
+    ]
+    return "\n".join(lines)
 
 
 def _discard_output() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 
 from experiments.console import Console
-from experiments.settings import OperatorSection
+from experiments.rig_settings import OperatorSection
 from experiments.speech import Speaker, find_speech
 
 

@@ -7,9 +7,9 @@ from experiments.choosing import ask
 from experiments.conditions import FILE
 from experiments.console import GOOD, WARNING, Console
 from experiments.machine_checks import Finding
+from experiments.matrix_settings import TerrainRow
 from experiments.messages import CATALOGUE
 from experiments.operator import Keys, Prompt
-from experiments.settings import TerrainRow
 from experiments.store import SessionFolder, list_sessions, read_json
 
 _FOOT = "terrain.foot"  # in the conditions of a session

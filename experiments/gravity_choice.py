@@ -5,7 +5,8 @@ from pathlib import Path
 from acquisition.errors import SettingsError
 from experiments.calibration_files import NOTHING, check_kind, read_calibration
 from experiments.parts import build_tool
-from experiments.settings import RigSettings, Settings
+from experiments.rig_settings import RigSettings
+from experiments.settings import Settings
 from wam.constants import load_constants
 from wam.gravity import gravity_model
 from wam.gravity_file import GravityCalibration, fits_tool, gravity_from_toml

@@ -4,7 +4,7 @@ import math
 import random
 from collections.abc import Mapping, Sequence
 
-from experiments.settings import TerrainRow
+from experiments.matrix_settings import TerrainRow
 
 _DRAWS = 400
 _SEED = 1  # the same data give the same advice

@@ -17,8 +17,9 @@ from acquisition.flight import FrameTape
 from acquisition.guard import Limits
 from acquisition.sample import Flag
 from acquisition.shared_sensor import SharedSensor, publish
+from experiments.matrix_settings import TerrainRow
+from experiments.rig_settings import FootSection, RigSettings
 from experiments.sensor_settings import build_device
-from experiments.settings import FootSection, RigSettings, TerrainRow
 from ft_sensor.barrett import BarrettSensor
 from ft_sensor.observer import LiveFoot
 from ft_sensor.payload import TerrainFrame, payload_of

@@ -16,7 +16,7 @@ from acquisition.errors import (
 from acquisition.timing import SLOW_EXCHANGE_NS, loop_report
 from experiments import provenance
 from experiments.console import BAD, GOOD, WARNING, Console
-from experiments.crews import EXCHANGE_CYCLES
+from experiments.crew import EXCHANGE_CYCLES
 from experiments.gravity_choice import gravity_words
 from experiments.machine_checks import (
     Finding,
@@ -26,9 +26,11 @@ from experiments.machine_checks import (
     check_wrenches,
     reach_words,
 )
+from experiments.matrix_settings import TerrainRow
 from experiments.messages import preflight_error
+from experiments.rig_settings import RigSettings
 from experiments.rigs import FakeOptions, Rig, build_rig
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.settings import Settings
 from wam.health import complaints, temperature_range
 
 LOOP_TEST = 5.0  # s

@@ -14,14 +14,16 @@ from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
 from experiments.arguments import FRICTION
 from experiments.calibrated import with_calibrations
-from experiments.crews import Crew, Jobs, ProcessCrew
+from experiments.crew import Crew
 from experiments.gravity_choice import build_law_model, read_gravity
+from experiments.matrix_settings import TerrainRow
 from experiments.parts import (
     build_tool,
     terrain_frame,
 )
+from experiments.process_crew import Jobs, ProcessCrew
 from experiments.rehearsing import Rehearsing, RemoteRehearsal
-from experiments.settings import Settings, TerrainRow
+from experiments.settings import Settings
 from experiments.simulated import World, stepped
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from wam.constants import load_constants

@@ -9,7 +9,9 @@ from acquisition.board import Board
 from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
 from acquisition.errors import SettingsError
-from experiments.crews import Crew, InlineCrew
+from experiments.crew import Crew
+from experiments.inline_crew import InlineCrew
+from experiments.matrix_settings import TerrainRow
 from experiments.parts import (
     LoopParts,
     build_arm,
@@ -19,8 +21,9 @@ from experiments.parts import (
     terrain_frame,
 )
 from experiments.rehearsing import Rehearsing
+from experiments.rig_settings import RigSettings
 from experiments.sensor_settings import SensorSection
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.settings import Settings
 from ft_sensor.serial_link import SerialPort
 from ft_sensor.serial_sensor import SerialSensor
 from wam.can_link import CanLink

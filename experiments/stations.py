@@ -20,8 +20,9 @@ from acquisition.loop import Loop
 from acquisition.processes import Station, name_process
 from acquisition.realtime import Wish, request
 from acquisition.shared_sensor import SharedSensor, publish
-from experiments.crews import ARM_INFO, measure_exchange
+from experiments.crew import ARM_INFO, measure_exchange
 from experiments.gravity_choice import build_law_model
+from experiments.matrix_settings import TerrainRow
 from experiments.parts import (
     LoopParts,
     build_arm,
@@ -30,7 +31,7 @@ from experiments.parts import (
     build_tool,
     open_bus_sensor,
 )
-from experiments.settings import RigSettings, TerrainRow
+from experiments.rig_settings import RigSettings
 from ft_sensor.keeper import SensorKeeper, stream_facts
 from ft_sensor.serial_link import open_port
 from ft_sensor.serial_sensor import SerialSensor

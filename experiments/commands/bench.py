@@ -34,8 +34,8 @@ def run(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
     from experiments.bench import run_bench
     from experiments.console import Console
-    from experiments.crews import ProcessCrew
     from experiments.preflight import connect_rig, start_devices
+    from experiments.process_crew import ProcessCrew
     from experiments.rigs import FakeOptions
     from experiments.settings import load_settings
 

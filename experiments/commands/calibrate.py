@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.settings import Settings, TerrainRow
+    from experiments.matrix_settings import TerrainRow
+    from experiments.settings import Settings
     from experiments.stage import Stage
 
 EXAMPLES = """\

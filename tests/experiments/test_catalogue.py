@@ -16,7 +16,14 @@ import pytest
 import fakes.rig
 from acquisition.devices import SafetyMode
 from acquisition.processes import ProcessLostError
-from experiments import activation, crews, preflight, settings, simulated, taring
+from experiments import (
+    activation,
+    inline_crew,
+    preflight,
+    settings,
+    simulated,
+    taring,
+)
 from experiments.computer_faults import COMPUTER_FAULTS
 from experiments.faults import FaultPlan
 from experiments.lock import session_lock
@@ -283,7 +290,7 @@ def _saturate(scene):
 
 
 def _no_exchange(scene):
-    scene.patch.setattr(crews, "measure_exchange", lambda *_: [])
+    scene.patch.setattr(inline_crew, "measure_exchange", lambda *_: [])
     return resume(scene)
 
 
@@ -294,7 +301,7 @@ def _no_loop(scene):
 
 def _lost_sensor(scene):
     facts = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(crews.InlineCrew, "sensor_facts", lambda _: facts)
+    scene.patch.setattr(inline_crew.InlineCrew, "sensor_facts", lambda _: facts)
     return resume(scene)
 
 

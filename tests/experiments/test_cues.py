@@ -9,7 +9,7 @@ import pytest
 
 from experiments.console import Console
 from experiments.cues import Cue, Cues, build_cues
-from experiments.settings import OperatorSection
+from experiments.rig_settings import OperatorSection
 from experiments.speech import Speaker, find_speech
 from experiments.trial import PaceWatch
 

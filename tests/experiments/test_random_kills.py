@@ -17,8 +17,6 @@ from experiments.store import list_sessions
 from tests.experiments.program import digest, kept_and_sound, run_watched, traction
 from tests.experiments.test_resuming import short
 
-pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
-KILLS = 20
 CLOCK = SystemClock()
 
 
@@ -47,14 +45,26 @@ def run_or_resume(config, data):
     return seen.done.code
 
 
-def test_every_kill_is_survived_and_no_kept_trial_is_lost(tmp_path, config):
-    rng = np.random.default_rng(7)
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_twenty_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
+    survive(tmp_path, config, 20, np.random.default_rng(7))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+def test_two_hundred_kills_are_survived_and_no_kept_trial_is_lost(tmp_path, config):
+    survive(tmp_path, config, 200, np.random.default_rng(8))
+
+
+def survive(tmp_path, config, count, rng):
+    """Kill sessions `count` times; after each the kept trials are the sound files."""
     kills, number = 0, 0
-    while kills < KILLS:
+    while kills < count:
         number += 1
         data = tmp_path / str(number)
         safe = {}
-        while kills < KILLS:
+        while kills < count:
             status = run_until(config, data, float(rng.uniform(0.2, 5.0)))
             kills += os.WIFSIGNALED(status)
             if not list_sessions(data):

@@ -1,195 +1,24 @@
-"""Who works a rig: everything in this thread, or one process for each job."""
+"""Who works a rig with one process for each job."""
 
-from __future__ import annotations
-
-import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from acquisition.board import Board
 from acquisition.clock import Clock
-from acquisition.desk import Desk, InlinePassing
-from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.desk import Desk
+from acquisition.devices import SafetyMode
 from acquisition.errors import TractionError
-from acquisition.loop import PERIOD_NS, Loop
+from acquisition.loop import PERIOD_NS
 from acquisition.processes import Child, ProcessLostError
 from acquisition.realtime import Grant, choose_cores
-from acquisition.recorder import Recorder, TrialRecording
 from acquisition.recorder_process import RemoteRecorder
-from experiments.parts import LoopParts, build_attendant
-from wam.arm import WamArm
+from experiments.crew import ARM_INFO
 from wam.startup import ArmInfo
 
-ARM_INFO = TypeAdapter(ArmInfo)
 _GRANTS = TypeAdapter(list[Grant])
-EXCHANGE_CYCLES = 100
-
-
-class Crew(Protocol):
-    """What the console asks of those who work the rig.
-
-    Attributes:
-        desk: the console's side of the loop.
-    """
-
-    desk: Desk
-
-    @property
-    def recorder(self) -> TrialRecording:
-        """What writes the trials."""
-        ...
-
-    @property
-    def recorder_pid(self) -> int:
-        """Number of the process that writes them."""
-        ...
-
-    def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
-        ...
-
-    def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque.
-
-        Returns:
-            From request to seventh position [ns]; incomplete ones are left out.
-        """
-        ...
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open the wrist sensor; return what it says about itself."""
-        ...
-
-    def sensor_facts(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text."""
-        ...
-
-    def define_position(self, q: Sequence[float]) -> None:
-        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
-        ...
-
-    def begin(self) -> None:
-        """Let the loop run from here on."""
-        ...
-
-    def grants(self) -> dict[str, list[Grant]]:
-        """Return what the kernel granted to each process."""
-        ...
-
-    def idle(self) -> bool:
-        """Brake the arm whatever has happened; return whether that is confirmed."""
-        ...
-
-    def safety_mode(self) -> SafetyMode:
-        """Return what the safety module said last."""
-        ...
-
-    def close(self) -> None:
-        """Brake the arm and end everything; safe to repeat."""
-        ...
-
-
-class InlineCrew:
-    """Arm, sensor, loop and recorder in this thread, on any clock."""
-
-    def __init__(
-        self,
-        board: Board,
-        clock: Clock,
-        arm: WamArm,
-        open_sensor: Callable[[], WrenchSensor],
-        parts: Callable[[WrenchSensor], LoopParts],
-    ) -> None:
-        self.arm = arm
-        self._board = board
-        self._clock = clock
-        self._open_sensor = open_sensor
-        self._parts = parts
-        self._sensor: WrenchSensor | None = None
-        self.recorder = Recorder(board, clock)
-        self.desk = Desk(board, clock, _not_begun)
-
-    @property
-    def recorder_pid(self) -> int:
-        """Number of this process, which writes the trials too."""
-        return os.getpid()
-
-    def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
-        return self.arm.start()
-
-    def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque."""
-        return measure_exchange(self.arm, self._clock)
-
-    def open_sensor(self) -> dict[str, str]:
-        """Open the wrist sensor; return what it says about itself."""
-        self._sensor = self._open_sensor()
-        return self._sensor.describe()
-
-    def sensor_facts(self) -> dict[str, str]:
-        """Return what became of the sensor's samples since it was opened, as text."""
-        return self._sensor.stream_facts() if self._sensor is not None else {}
-
-    def define_position(self, q: Sequence[float]) -> None:
-        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
-        self.arm.define_position(np.array(q))
-
-    def begin(self) -> None:
-        """Let the loop run from here on, whenever the console waits."""
-        if self._sensor is None:
-            raise RuntimeError("the sensor was not opened")
-        attendant = build_attendant(self._parts(self._sensor))
-        loop = Loop(attendant, self._clock)
-        attendant.stats = loop.stats
-        self.desk.passing = InlinePassing(loop, self.recorder)
-        self.desk.beat()
-
-    def grants(self) -> dict[str, list[Grant]]:
-        """Return nothing: this thread asks for nothing."""
-        return {}
-
-    def idle(self) -> bool:
-        """Brake the arm; return whether that is confirmed."""
-        return self.arm.idle()
-
-    def safety_mode(self) -> SafetyMode:
-        """Return what the safety module said last."""
-        return self.arm.safety_mode()
-
-    def close(self) -> None:
-        """Brake the arm and give bus and port back; safe to repeat."""
-        self.recorder.abandon()
-        self.arm.close()
-        if self._sensor is not None:
-            self._sensor.close()
-            self._sensor = None
-        self._board.close()
-
-
-def measure_exchange(arm: WamArm, clock: Clock) -> list[int]:
-    """Ask `arm` 100 times for its positions, one period apart, without torque.
-
-    Returns:
-        From request to seventh position [ns]; incomplete exchanges are left out.
-    """
-    times: list[int] = []
-    next_ns = clock.now_ns() + PERIOD_NS
-    for _ in range(EXCHANGE_CYCLES):
-        clock.sleep_until(next_ns)
-        reading = arm.read(clock.now_ns())
-        if reading.is_complete:
-            times.append(reading.arm_ns - reading.host_ns)
-        next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
-    return times
-
-
-def _not_begun(cycles: int) -> None:
-    raise RuntimeError(f"the loop does not run yet; {cycles} cycles were waited for")
 
 
 @dataclass(frozen=True, slots=True)

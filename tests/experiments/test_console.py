@@ -1,0 +1,28 @@
+"""Lines for people: broken between words where there is a terminal."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.console import Console, wrapped
+
+
+def test_a_line_is_broken_between_words_and_indented():
+    text = " x preflight      one two three four"
+    assert wrapped(text, 26, " " * 18) == (
+        " x preflight      one two\n" + " " * 18 + "three\n" + " " * 18 + "four"
+    )
+
+
+def test_a_path_longer_than_the_terminal_stays_whole():
+    path = "/data/" + "x" * 40 + "-y/events.jsonl"
+    assert path in wrapped(f"Log: {path}", 30).split("\n")
+
+
+@given(st.lists(st.text("abc,.-", min_size=1, max_size=9)), st.integers(12, 90))
+def test_every_word_stays_whole_and_in_order(words, width):
+    assert wrapped(" ".join(words), width).split() == words
+
+
+def test_without_a_terminal_a_long_line_stays_one_line(capsys):
+    Console().say("word " * 40)
+    assert capsys.readouterr().out.count("\n") == 1
