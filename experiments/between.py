@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from acquisition.cycle import ArmState
 from acquisition.errors import SessionError
+from experiments.company import FaultedError
 from experiments.foot_keys import FootKeys
 from experiments.operator import Prompt
 from experiments.phases import Event
@@ -116,9 +117,15 @@ def _note(sitting: Sitting, name: TrialName) -> None:
 def _pause(sitting: Sitting, name: TrialName) -> None:
     sitting.control.request(ArmState.HOLD)
     sitting.book.note(Event.PAUSED)
-    sitting.say("Paused. ARM: holding. [space] to go on.")
-    while sitting.stage.tick(Prompt.PAUSED, name) != " ":
-        pass
+    is_over = False
+    while not is_over:
+        sitting.say("Paused. ARM: holding. [space] to go on.")
+        try:
+            while sitting.stage.tick(Prompt.PAUSED, name) != " ":
+                pass
+            is_over = True
+        except FaultedError as fault:
+            sitting.mend(fault)  # and nobody is there: the pause goes on
     sitting.book.note(Event.CONTINUED)
     sitting.control.request(ArmState.FLOAT)
 

@@ -11,8 +11,6 @@ from experiments.screens import review_keys
 from experiments.sitting import Sitting
 from experiments.trial import TrialName
 
-# Verdicts of the guard after which no trial can follow.
-ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 _ENDED = "session ended at the review"
 
 
@@ -34,13 +32,12 @@ def ask_verdict(sitting: Sitting, name: TrialName, outcome: Outcome) -> None:
                 take_note(sitting, name, is_on_trial=True)
                 sitting.say(review_keys())
         except FaultedError as fault:
-            # The trial is whole: only the end of the session takes it away.
-            verdict = sitting.stage.worst(fault.verdict)
-            if verdict.reason in ENDING:
+            try:
+                sitting.mend(fault)
+            except FaultedError:
+                # The trial is whole: only the end of the session takes it away.
                 sitting.reject(name, _ENDED)
-                raise FaultedError(verdict) from fault
-            sitting.tell_fault(verdict)
-            sitting.stage.mend()
+                raise
             continue
         if _obey(sitting, name, key or feet.key("k")):
             return

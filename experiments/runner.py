@@ -10,7 +10,7 @@ from experiments.between import wait_ready
 from experiments.book import Book, at_once
 from experiments.company import FaultedError, StopAskedError
 from experiments.cues import build_cues
-from experiments.judging import ENDING, ask_verdict
+from experiments.judging import ask_verdict
 from experiments.messages import CATALOGUE, Circumstances, rest_text
 from experiments.phases import Event
 from experiments.recording import record_trial
@@ -98,11 +98,9 @@ class SessionRunner:
             self._one_trial()
         except FaultedError as fault:
             self._faults += 1
-            verdict = sitting.stage.worst(fault.verdict)
-            if verdict.reason in ENDING or self._faults >= FAULTS_IN_A_ROW:
-                raise FaultedError(verdict) from fault
-            sitting.tell_fault(verdict)
-            sitting.stage.mend()
+            if self._faults >= FAULTS_IN_A_ROW:
+                raise FaultedError(sitting.stage.worst(fault.verdict)) from fault
+            sitting.mend(fault)
         else:
             self._faults = 0
 

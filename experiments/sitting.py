@@ -8,12 +8,16 @@ from acquisition.errors import TractionError
 from acquisition.guard import Verdict
 from experiments.archive import Archive
 from experiments.book import Book
+from experiments.company import FaultedError
 from experiments.cues import Cues
 from experiments.messages import Circumstances, fault_text
 from experiments.phases import Event
 from experiments.rigs import Rig
 from experiments.stage import Stage
 from experiments.trial import SessionFacts, TrialName
+
+# Verdicts of the guard after which no trial can follow.
+_ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 
 
 @dataclass(slots=True)
@@ -90,6 +94,18 @@ class Sitting:
         """Return why the guard stopped the arm, and what is safe."""
         found = replace(self.place, is_bus_down=self.control.loop.is_bus_down)
         return fault_text(verdict, found, self.book.saved())
+
+    def mend(self, fault: FaultedError) -> None:
+        """Say why the guard stopped the arm, which holds, and go on.
+
+        Raises:
+            FaultedError: no trial can follow: the arm has gone.
+        """
+        verdict = self.stage.worst(fault.verdict)
+        if verdict.reason in _ENDING:
+            raise FaultedError(verdict) from fault
+        self.tell_fault(verdict)
+        self.stage.mend()
 
     def judge(self, event: Event, name: TrialName, why: str) -> None:
         """Write a verdict into the journal; the files of the trial follow it."""

@@ -5,12 +5,14 @@ import json
 import numpy as np
 import pytest
 
+from acquisition.devices import SafetyMode
 from experiments.archive import cells_of
 from experiments.operator import Asked, Prompt
 from experiments.scripted import ScriptKeys
 from experiments.session import replay
 from tests.experiments.program import (
     journal,
+    only_session,
     run_watched,
     sidecar,
     traction,
@@ -200,3 +202,35 @@ def test_a_line_that_lacks_or_has_a_text_is_refused(tmp_path, config, line):
     done = traction("run", "TF", "--operator-script", script, *options)
     assert done.code == 2
     assert f"line 1: {line!r} - expected keep, redo 1..5 or quit" in done.err
+
+
+ENDS = {
+    # fault, exit code, phase that the session is left in, mode of the arm
+    "loop-late": (0, "complete", SafetyMode.IDLE),
+    "estop": (4, "unfinished", SafetyMode.E_STOP),
+}
+
+
+@pytest.mark.parametrize("fault", ENDS)
+def test_a_pause_goes_on_after_a_fault_that_can_be_mended(config, tmp_path, fault):
+    struck, told = [], []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.READY:
+            return " " if struck else "p"
+        if asked.prompt is Prompt.PAUSED and not struck:
+            struck.append(True)
+            rig.faults()[fault]()
+            return ""
+        if asked.prompt is Prompt.PAUSED:
+            told.append(replay(journal(only_session(tmp_path))).phase)
+            return " " if len(told) > 20 else ""
+        if asked.prompt is Prompt.REVIEW:
+            return "k"
+        return quick(asked)
+
+    seen = run_watched(config, tmp_path, 1, press=press)
+    state = replay(journal(seen.folder))
+    assert (seen.done.code, state.phase, seen.rig.network.safety_mode) == ENDS[fault]
+    assert (set(told) == {"paused"}) is (seen.done.code == 0)
+    assert seen.done.out.count("Paused. ARM: holding.") == 2 - bool(seen.done.code)
