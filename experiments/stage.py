@@ -18,6 +18,7 @@ TICK = 0.02  # the console looks this often [s]
 REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] means something else
+_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED})  # nothing is wanted of the arm
 _T = TypeVar("_T")
 
 
@@ -32,6 +33,7 @@ class Stage:
     _asked: tuple[Prompt, int, int] | None = None
     _asked_at: int = 0
     _is_stopped: bool = False
+    _known: str = ""  # reason of a fault that was told and goes on
 
     @property
     def control(self) -> Desk:
@@ -48,7 +50,8 @@ class Stage:
         """Let 20 ms pass; return the key pressed, raise what stops everything.
 
         Raises:
-            FaultedError: the guard stopped the arm.
+            FaultedError: the guard stopped the arm. Where nothing is wanted of the arm,
+                a fault that goes on is raised once: keys are heard again.
             StopAskedError: a stop was asked for; at the review `StopFlag` says so.
             TractionError: a process or the disk is in trouble.
         """
@@ -77,9 +80,7 @@ class Stage:
         """Let 20 ms pass and return what is asked for, which the hand follows."""
         self.control.advance(TICK)
         self._show()
-        verdict = self.control.status.verdict
-        if verdict is not None:
-            raise FaultedError(verdict)
+        self._raise_news(prompt)
         if self.company.console.is_lost:
             self.company.stop.ask()
         number, attempt = (name.number, name.attempt) if name else (0, 0)
@@ -92,6 +93,15 @@ class Stage:
         if self.company.hand is not None:
             self.company.hand.follow(asked)
         return asked
+
+    def _raise_news(self, prompt: Prompt) -> None:
+        """Raise the guard's verdict, unless it has been told and only goes on."""
+        verdict = self.control.status.verdict
+        if verdict is None or prompt not in _AT_REST:
+            self._known = ""
+        if verdict is not None and verdict.reason != self._known:
+            self._known = verdict.reason
+            raise FaultedError(verdict)
 
     def look(self, view: Callable[[int], list[str]] | None) -> None:
         """Show what `view(width)` returns eight times a second, None for nothing."""
