@@ -1,16 +1,12 @@
-"""Who answers the prompts: a person at the keyboard, a script, or nobody (auto)."""
+"""What is asked for, and who answers without a person: keys and hand of a rehearsal."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
-from pathlib import Path
 from typing import Protocol
 
-from acquisition.errors import SettingsError
-from experiments.messages import CATALOGUE
 from experiments.rehearsing import Rehearsing
 
 REJECT_REASONS = {
@@ -163,25 +159,3 @@ class RehearsedHand:
             self._rehearsal.put_down()
         elif asked.prompt is Prompt.RECORDING:
             self._rehearsal.push()
-
-
-def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
-    """Return who answers: a script, `auto`, or the keyboard.
-
-    Raises:
-        SettingsError: a real session without a terminal, or a bad script.
-    """
-    stdin = sys.stdin
-    has_person = stdin is not None and stdin.isatty()
-    if script == "auto" or (script is None and is_fake and not has_person):
-        return AutoKeys()
-    if script is not None:
-        from experiments.scripted import ScriptKeys
-
-        return ScriptKeys(Path(script))
-    if stdin is None or not has_person:
-        message = CATALOGUE["nobody"]
-        raise SettingsError(message.what, hint=message.do)
-    from experiments.terminal import TerminalKeys
-
-    return TerminalKeys(stdin.fileno())

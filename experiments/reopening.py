@@ -14,9 +14,9 @@ from experiments.arguments import PACES
 from experiments.book import Book, open_book
 from experiments.conduct import Opening, Request, conduct
 from experiments.console import Console
+from experiments.key_choice import choose_keys
 from experiments.lock import session_lock
 from experiments.messages import CATALOGUE
-from experiments.operator import choose_keys
 from experiments.phases import Event, Phase
 from experiments.rigs import FakeOptions
 from experiments.session import refusal

@@ -55,7 +55,8 @@ def run(args: argparse.Namespace) -> int:
     from experiments.calibrating.guide import guided
     from experiments.company import Company, StopFlag, signals_ask
     from experiments.console import Console
-    from experiments.operator import RehearsedHand, choose_keys
+    from experiments.key_choice import choose_keys
+    from experiments.operator import RehearsedHand
     from experiments.preflight import connect_rig, run_preflight
     from experiments.rigs import FakeOptions
     from experiments.settings import load_settings

@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
     from experiments.conduct import Opening, Request, conduct
     from experiments.console import Console
-    from experiments.operator import choose_keys
+    from experiments.key_choice import choose_keys
     from experiments.phases import Event
     from experiments.reopening import resume
     from experiments.rigs import FakeOptions

@@ -5,6 +5,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.faults import FaultPlan, parse_fault
+from experiments.key_choice import choose_keys
 from experiments.operator import (
     AUTO_ATTEMPTS,
     AUTO_PATIENCE,
@@ -12,7 +13,6 @@ from experiments.operator import (
     AutoKeys,
     Prompt,
     RehearsedHand,
-    choose_keys,
 )
 from experiments.terminal import TerminalKeys
 
