@@ -109,7 +109,7 @@ def _follow(sitting: Sitting, name: TrialName, outcome: Outcome) -> None:
             return
         if pace.is_too_fast(outcome.seconds, outcome.displacement):
             sitting.cues.give(Cue.TOO_FAST)
-        if outcome.seconds >= said + LIVE_SECONDS:
+        if not stage.company.console.is_live and outcome.seconds >= said + LIVE_SECONDS:
             said = outcome.seconds
             v_t, F_t, F_n = record["traction"].tolist()
             where = (outcome.seconds, outcome.displacement, rig.frame.travel)
