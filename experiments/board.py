@@ -1,5 +1,6 @@
 """The matrix board: kept trials per terrain, counted from verified files only."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -114,12 +115,12 @@ def parse_where(text: str) -> dict[str, str]:
 
 
 def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> list[str]:
-    """Return what is open, what is to be resumed and which terrain comes next."""
+    """Return what others have open, what is to be resumed, which terrain comes next."""
     steps: list[str] = []
     sessions = [s for s in list_sessions(data) if s.is_simulated is is_simulated]
     for session in sessions:
         owner = owner_of(session)
-        if owner is not None:
+        if owner is not None and owner.pid != os.getpid():
             phase = read_json(session.path / "session.json").get("phase", "opening")
             steps.append(
                 f"{session.id} {session.terrain} is open in process {owner.pid} since "

@@ -83,6 +83,10 @@ def test_a_killed_session_is_resumed_and_completed(resumed):
     assert (facts["phase"], facts["kept"]) == ("complete", ["T01", "T02"])
 
 
+def test_a_session_does_not_name_itself_as_open_elsewhere(resumed):
+    assert "is open in process" not in resumed.done.out
+
+
 def test_a_resume_says_what_becomes_of_the_trial_that_ran(resumed):
     first, second, *_ = resumed.done.out.splitlines()
     assert first == (
