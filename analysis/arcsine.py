@@ -9,19 +9,21 @@ is the same everywhere and the arcsine has a cusp at zero distance, so functions
 very rough.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from analysis.kernels import Composable, Contraction
+from analysis.kernels import Composable, Contraction, Evaluator
 from analysis.series import Array
 
 _ROOT_2 = np.sqrt(2.0)
-_BIAS_EXPONENT = -np.log(20.0) / np.log(3.0)  # beta 1/20 for 3 lengths, 20 for 1/3
+# l / sd(x) and beta that a search starts with
+_STARTS = (((3.0, 3.0), 0.05), ((3.0, 0.3), 20.0), ((0.1, 0.1), 20.0))
 
 
-class _Rows(NamedTuple):
+class Augmented(NamedTuple):
     """Augmented rows U = (sqrt(beta), sqrt(2) x/l), shape (n, 1 + d), and A = c + U'U.
 
     Attributes:
@@ -56,49 +58,26 @@ class Arcsine(Composable):
         """What is added to both factors under the root [-]."""
         return 0.0 if self.as_printed else 1.0
 
-    def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
-        """Return the covariances of two sets of rows, shape (n, m)."""
-        rows, others = self._rows(theta, X), self._rows(theta, X_other)
-        return self._angles(rows, others)[0] * np.exp(2.0 * theta[0])
+    def rows(self, theta: Array, X: Array) -> Augmented:
+        """Return the augmented rows of X (n, d) at theta."""
+        bias = np.full(X.shape[0], np.exp(0.5 * theta[-1]))
+        U = np.column_stack([bias, _ROOT_2 * X / np.exp(theta[1:-1])])
+        return Augmented(U, self.c + np.einsum("na,na->n", U, U))
 
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return sf^2 asin(p/(c + p)) of every row."""
-        A = self._rows(theta, X).A
+        A = self.rows(theta, X).A
         return np.exp(2.0 * theta[0]) * np.arctan2(
             A - self.c, np.sqrt(self.c * (2.0 * A - self.c))
         )
 
-    def evaluate(
-        self, theta: Array, X: Array, X_other: Array
-    ) -> tuple[Array, Contraction]:
-        """Return K and its contraction.
-
-        With D = sqrt(A A' - N^2), the sine's partner, and any parameter t,
-        dk/dt = sf^2 [dN/dt - N/2 (dA/dt / A + dA'/dt / A')] / D. So W o sf^2/D and that
-        times N are all that is needed, and their products with U and 1/A.
-        """
-        rows, others = self._rows(theta, X), self._rows(theta, X_other)
-        angle, N, D = self._angles(rows, others)
-        sf2 = np.exp(2.0 * theta[0])
-        K = sf2 * angle
-        # at repeated inputs with c = 0 the arcsine has its cusp: D = 0, slope set to 0
-        weight = np.divide(sf2, D, out=np.zeros_like(D), where=D > 0)
-
-        def contract(W: Array) -> Array:
-            q = W * weight
-            r = q * N
-            of_shape = 2.0 * np.einsum("na,na->a", rows.U, q @ others.U)
-            of_shape -= (rows.U**2).T @ (r.sum(axis=1) / rows.A)
-            of_shape -= (others.U**2).T @ (r.sum(axis=0) / others.A)
-            # U_0^2 = beta and U_d^2 ~ l_d^-2: slopes of log beta and of -2 log l_d
-            of_sf = 2.0 * np.vdot(W, K)
-            return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])
-
-        return K, contract
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and its contraction for any theta."""
+        return _ArcsineOver(self, X, X_other)
 
     def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
         """Return sum_i w_i dk(x_i, x_i)/dtheta, shape (p,)."""
-        U, A = self._rows(theta, X)
+        U, A = self.rows(theta, X)
         of_sf = 2.0 * float(w @ self.diagonal(theta, X))
         # d asin(p/A)/dp = c / (A sqrt(A^2 - p^2))
         root = np.sqrt(self.c * (2.0 * A - self.c))
@@ -106,14 +85,20 @@ class Arcsine(Composable):
         of_shape = np.exp(2.0 * theta[0]) * ((U**2).T @ (w * share))
         return np.concatenate([[of_sf], -2.0 * of_shape[1:], [of_shape[0]]])
 
-    def start(self, sd_y: float, sd_x: Array, stretch: float) -> Array:
-        """Return sf = sd(y), l_d = stretch sd(x_d), beta = 1/20, 1, 20 for 3, 1, 1/3.
+    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2, and lengths with a bias.
 
-        Long lengths with next to no bias, and short ones with a large bias, are optima
-        of their own, which no start with beta = 1 finds.
+        Short lengths with a large bias, and long ones with next to none, are optima of
+        their own.
         """
-        beta = stretch**_BIAS_EXPONENT
-        return np.log(np.concatenate([[sd_y], stretch * sd_x, [beta]]))
+        return [
+            np.log(
+                np.concatenate(
+                    [[0.5 * sd_y], np.resize(stretch, sd_x.size) * sd_x, [beta]]
+                )
+            )
+            for stretch, beta in _STARTS
+        ]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""
@@ -121,31 +106,71 @@ class Arcsine(Composable):
         span = [[-6.0, 4.0], *([[-4.0, 6.0]] * self.dimensions), [-6.0, 6.0]]
         return centre[:, None] + np.array(span)
 
-    def _rows(self, theta: Array, X: Array) -> _Rows:
-        bias = np.full(X.shape[0], np.exp(0.5 * theta[-1]))
-        U = np.column_stack([bias, _ROOT_2 * X / np.exp(theta[1:-1])])
-        return _Rows(U, self.c + np.einsum("na,na->n", U, U))
 
-    def _angles(self, rows: _Rows, others: _Rows) -> tuple[Array, Array, Array]:
-        """Return asin(u), N and D = sqrt(A A' - N^2), each of shape (n, m).
+class _ArcsineOver:
+    """The kernel over two sets of rows, in memory of its own.
 
-        D by Lagrange's identity, A A' - N^2 = c (c + p + p') + sum_{a<b} (U_a U'_b -
-        U_b U'_a)^2, which cancels nothing where u is close to one; then asin(u) =
-        atan2(N, D).
+    Of D = sqrt(A A' - N^2), the sine's partner, everything that depends on the rows
+    alone is computed once: by Lagrange's identity A A' - N^2 = c (c + p + p') +
+    sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and the lengths taken out these are
+    squares of x_a - x'_a and of x_a x'_b - x_b x'_a. The latter is written as
+    x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where two rows are close.
+    """
+
+    def __init__(self, kernel: Arcsine, X: Array, X_other: Array) -> None:
+        self._kernel, self._X, self._X_other = kernel, X, X_other
+        shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
+        self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
+        self._squares = np.empty((d + len(self._pairs), *shape))
+        steps = [np.subtract.outer(X[:, a], X_other[:, a]) for a in range(d)]
+        for a, b in self._pairs:
+            steps.append(X[:, b, None] * steps[a] - X[:, a, None] * steps[b])
+        for step, square in zip(steps, self._squares, strict=True):
+            np.multiply(step, step, out=square)
+        self._K, self._N, self._D = (np.empty(shape) for _ in range(3))
+
+    def __call__(self, theta: Array) -> tuple[Array, Contraction]:
+        """Return K and its contraction, with asin(u) = atan(N / D)."""
+        rows = self._kernel.rows(theta, self._X)
+        others = self._kernel.rows(theta, self._X_other)
+        sf2, K, D = float(np.exp(2.0 * theta[0])), self._K, self._D
+        np.matmul(rows.U, np.ascontiguousarray(others.U.T), out=self._N)
+        self._fill_partner(theta, rows, others)
+        with np.errstate(divide="ignore"):  # repeated inputs as printed: pi/2
+            np.divide(self._N, D, out=K)
+        np.arctan(K, out=K)
+        K *= sf2
+        if self._kernel.as_printed:
+            # at repeated inputs the arcsine has its cusp: its slope is set to 0
+            D[D == 0.0] = np.inf
+        return K, lambda W: self._contract(W, sf2, rows, others)
+
+    def _fill_partner(self, theta: Array, rows: Augmented, others: Augmented) -> None:
+        c, D, beta = self._kernel.c, self._D, np.exp(theta[-1])
+        inverse = 2.0 * np.exp(-2.0 * theta[1:-1])
+        weights = [beta * inverse, [inverse[a] * inverse[b] for a, b in self._pairs]]
+        flat = self._squares.reshape(self._squares.shape[0], -1)
+        np.matmul(np.concatenate(weights), flat, out=D.reshape(-1))
+        if c:
+            D += (c * (rows.A - 0.5 * c))[:, None]
+            D += c * (others.A - 0.5 * c)
+        np.sqrt(D, out=D)
+
+    def _contract(
+        self, W: Array, sf2: float, rows: Augmented, others: Augmented
+    ) -> Array:
+        """Return sum_ij W_ij dK_ij/dtheta.
+
+        For any parameter t, dk/dt = sf^2 [dN/dt - N/2 (dA/dt / A + dA'/dt / A')] / D.
+        So W/D and that times N are all that is needed, and their products with U and
+        1/A.
         """
-        N = rows.U @ others.U.T
-        D2 = self._squares(rows, others)
-        np.sqrt(D2, out=D2)
-        return np.arctan2(N, D2), N, D2
-
-    def _squares(self, rows: _Rows, others: _Rows) -> Array:
-        c = self.c
-        D2 = np.add.outer(c * (rows.A - 0.5 * c), c * (others.A - 0.5 * c))
-        columns = rows.U.shape[1]
-        for a in range(columns):
-            for b in range(a + 1, columns):
-                wedge = np.multiply.outer(rows.U[:, a], others.U[:, b])
-                wedge -= np.multiply.outer(rows.U[:, b], others.U[:, a])
-                wedge *= wedge
-                D2 += wedge
-        return D2
+        of_sf = 2.0 * float(np.vdot(W, self._K))
+        q = np.divide(W, self._D, out=W)
+        r = np.multiply(q, self._N, out=self._N)
+        of_shape = 2.0 * np.einsum("na,na->a", rows.U, q @ others.U)
+        of_shape -= (rows.U**2).T @ (r.sum(axis=1) / rows.A)
+        of_shape -= (others.U**2).T @ (r.sum(axis=0) / others.A)
+        of_shape *= sf2
+        # U_0^2 = beta and U_d^2 ~ l_d^-2: slopes of log beta and of -2 log l_d
+        return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])

@@ -82,9 +82,9 @@ def say_noise(found: Findings) -> str:
     ]
     return (
         "Constant noise against noise chosen among the training trials of each fold: "
-        "constant, log-linear in F_n and v_t, or heavy-tailed (Student's t). Above: "
-        "how many folds chose what, and NLPD before and after on trials left out; "
-        "whiskers: standard error over trials. "
+        "constant, log-linear in F_n and v_t, or that with heavy tails (Student's t). "
+        "On the right: how many folds chose what, and NLPD before and after on trials "
+        "left out; whiskers: standard error over trials. "
         + (f"Gain: {', '.join(better)}." if better else "It brings nothing here.")
     )
 

@@ -6,6 +6,7 @@ from analysis.figures import (
     ERROR_LABEL,
     MODEL_COLOURS,
     MODEL_HATCHES,
+    ONE_COLUMN,
     WIDTH,
     Axes,
     Figure,
@@ -18,6 +19,7 @@ from analysis.figures import (
 from analysis.models import FITTERS, TITLES
 from analysis.study import Study
 
+_MOST_NARROW = 10  # terrains whose bars one column of a paper holds
 _MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart
 _MAP_COLUMNS = 2  # heat maps side by side
 
@@ -27,7 +29,8 @@ def draw_errors(study: Study) -> Figure | None:
     results = [r for r in study.terrains.values() if r.folds]
     if not results:
         return None
-    figure = new_figure(2.9)
+    is_narrow = len(results) <= _MOST_NARROW
+    figure = new_figure(3.1, ONE_COLUMN if is_narrow else WIDTH)
     ax = figure.subplots()
     width = 0.8 / len(FITTERS)
     for k, model in enumerate(FITTERS):
@@ -40,7 +43,7 @@ def draw_errors(study: Study) -> Figure | None:
             color=MODEL_COLOURS[k % len(MODEL_COLOURS)],
             hatch=MODEL_HATCHES[k % len(MODEL_HATCHES)],
             edgecolor="white",
-            error_kw={"elinewidth": 0.9, "capsize": 2.5},
+            error_kw={"elinewidth": 0.7, "capsize": 1.2},
             label=TITLES[model],
         )
     for k, result in enumerate(results):
@@ -57,7 +60,7 @@ def draw_errors(study: Study) -> Figure | None:
     ax.set_xlabel("terrain")
     ax.set_ylabel(ERROR_LABEL)
     ax.grid(visible=False, axis="x")
-    figure.legend(loc="outside upper center", ncols=3)
+    figure.legend(loc="outside upper center", ncols=2 if is_narrow else 3)
     return figure
 
 

@@ -60,6 +60,7 @@ MODEL_HATCHES = ("", "///", "...", "xxx", "---")
 MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 _DPI = 160
+_MARK = 6.0  # points of the watermark per inch of the figure's width
 _CLASS_COLOURS = {
     SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
     BIG: ("#7f2704", "#d9690f", "#fdb97d"),
@@ -105,7 +106,7 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure, `height` inches high, as wide as both columns."""
+    """Return an empty figure of so many inches, by default as wide as both columns."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -114,6 +115,8 @@ def panel_grid(
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of `count` panels that share their axes, row by row.
 
+    One panel alone is as wide as one column of a paper.
+
     Args:
         count: number of panels.
         height: of one row [inches].
@@ -121,7 +124,7 @@ def panel_grid(
     """
     columns = min(most_columns, count)
     rows = -(-count // columns)
-    figure = new_figure(height * rows + 0.7)
+    figure = new_figure(height * rows + 0.7, ONE_COLUMN if count == 1 else WIDTH)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     axes = list(grid.flat)
     for spare in axes[count:]:
@@ -152,7 +155,7 @@ def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
             ha="center",
             va="center",
             rotation=20,
-            fontsize=44,
+            fontsize=_MARK * figure.get_figwidth(),
             color="#808080",
             alpha=0.25,  # not bold: another font would have to be embedded
             zorder=100,

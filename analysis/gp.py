@@ -1,39 +1,23 @@
-"""Gaussian process regression: marginal likelihood, its optimum, prediction.
+"""Gaussian process regression: the likeliest hyperparameters, and prediction.
 
-Equations 6 and 7 of the traction paper; the likelihood and its gradient come from one
-Cholesky factorisation (Rasmussen and Williams, 2006, eqs. 2.30 and 5.9).
+Equations 6 and 7 of the traction paper.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import get_blas_funcs, get_lapack_funcs, solve_triangular
+from scipy.linalg import solve_triangular
 
 from acquisition.errors import SettingsError
 from analysis.kernels import Kernel, SquaredExponential
+from analysis.likelihood import Likelihood, factorise, split
 from analysis.noise import ConstantNoise, Noise
 from analysis.search import Optimum, Start, maximise, spread
 from analysis.series import Array
 
 MINIMUM_ROWS = 20
 
-_potrf, _potrs, _potri = get_lapack_funcs(("potrf", "potrs", "potri"), dtype=float)
-(_syr,) = get_blas_funcs(("syr",), dtype=float)
-_JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that works
-_BLOCK = 2000  # columns predicted at a time
-
-
-class Factor(NamedTuple):
-    """The covariance C = K + S, factorised.
-
-    Attributes:
-        L: lower Cholesky factor, zero above the diagonal.
-        jitter: what had to be added to the diagonal [N^2], mostly 0.
-    """
-
-    L: Array
-    jitter: float
+_BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,66 +91,13 @@ class GaussianProcess:
         return mean, variance
 
 
-def factorise(K: Array, S: Array) -> Factor:
-    """Return the Cholesky factor of K + diag(S), with jitter only if it needs some.
-
-    Raises:
-        SettingsError: not positive definite with the largest jitter either.
-    """
-    for share in _JITTERS:
-        C = K.copy()
-        jitter = share * float(np.mean(np.diagonal(K)))
-        C.flat[:: C.shape[0] + 1] += S + jitter
-        # the transpose of a symmetric matrix is itself, in the order LAPACK likes
-        L, info = _potrf(C.T, lower=1, clean=1, overwrite_a=1)
-        if info == 0:
-            return Factor(L, jitter)
-    raise SettingsError(
-        f"The covariance of {K.shape[0]} samples is not positive definite.",
-        hint="Check the samples for enormous values.",
-    )
-
-
-def likelihood(
-    model: tuple[Kernel, Noise], theta: Array, X: Array, r: Array
-) -> tuple[float, Array]:
-    """Return the log marginal likelihood of r and its gradient in theta.
-
-    The gradient is 1/2 sum_ij (alpha alpha' - C^-1)_ij dC_ij. That weight is symmetric,
-    so the kernel is given its lower triangle with half of the diagonal.
-
-    Args:
-        model: kernel and noise.
-        theta: the kernel's, then the noise's hyperparameters.
-        X: inputs, shape (n, d).
-        r: outputs with the mean function taken off, shape (n,).
-
-    Raises:
-        SettingsError: the covariance cannot be factorised.
-    """
-    kernel, noise = model
-    theta_kernel, theta_noise = split(kernel, theta)
-    K, contract = kernel.evaluate(theta_kernel, X, X)
-    S, contract_noise = noise.evaluate(theta_noise, X)
-    L = factorise(K, S).L
-    alpha = _potrs(L, r, lower=1)[0]
-    half_log_det = float(np.sum(np.log(np.diagonal(L))))
-    lml = -0.5 * float(r @ alpha) - half_log_det - 0.5 * r.size * np.log(2.0 * np.pi)
-    inverse = _potri(L, lower=1, overwrite_c=1)[0]
-    minus = _syr(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)
-    on_diagonal = -np.diagonal(minus)
-    minus.T.flat[:: r.size + 1] *= 0.5
-    # K is symmetric: handing the transpose over keeps both in one order of memory
-    slope = -contract(minus.T)
-    return lml, np.concatenate([slope, contract_noise(on_diagonal)])
-
-
 def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
     kernel, noise = model
+    likelihood = Likelihood(model, X, r)
 
     def objective(theta: Array) -> tuple[float, Array]:
-        lml, slope = likelihood(model, theta, X, r)
+        lml, slope = likelihood(theta)
         prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
         slope[-prior_slope.size :] += prior_slope
         return lml + prior, slope
@@ -209,7 +140,7 @@ def fit_gp(
         noise=noise,
         theta=optimum.theta,
         X=X,
-        alpha=_potrs(factor.L, y - offset, lower=1)[0],
+        alpha=factor.solve(y - offset),
         offset=offset,
         centre=centre,
         scale=scale,
@@ -229,9 +160,3 @@ def check_outputs(y: Array) -> None:
             f"(at least {MINIMUM_ROWS} that differ).",
             hint="Record more motion inside the window of velocities.",
         )
-
-
-def split(kernel: Kernel, theta: Array) -> tuple[Array, Array]:
-    """Return the kernel's and the noise's part of theta."""
-    count = len(kernel.names)
-    return theta[:count], theta[count:]

@@ -1,12 +1,16 @@
 """Covariance functions of Gaussian processes, and how they compose.
 
-A kernel evaluates its matrix once and hands back, with it, a function that contracts
-any weight matrix W with the derivatives: sum_ij W_ij dK_ij/dtheta_k. No derivative
-matrix is ever formed, and a sum or product of kernels needs only the contractions of
-its parts: W for a sum, W times the other's matrix for a product.
+A kernel over two sets of rows evaluates its matrix once and hands back, with it, a
+function that contracts any weight matrix W with the derivatives: sum_ij W_ij
+dK_ij/dtheta_k. No derivative matrix is ever formed, and a sum or product of kernels
+needs only the contractions of its parts: W for a sum, W times the other's matrix for a
+product.
+
+A search evaluates the same rows some hundred times. Fresh memory of a few hundred rows
+squared costs as much as what is computed in it, so an `Evaluator` keeps its own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,9 +18,13 @@ import numpy as np
 
 from analysis.series import Array
 
+# W -> sum_ij W_ij dK_ij/dtheta_k, shape (p,); W may be overwritten
 Contraction = Callable[[Array], Array]
+# theta -> K and its contraction; both are good until the next call
+Evaluator = Callable[[Array], tuple[Array, Contraction]]
 
-_OTHER_STRETCH = 3.0  # of a second part's lengths, or equal parts would stay equal
+_LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
+_STRETCHES = ((0.3, 3.0), (3.0, 0.3), (0.1, 0.1))  # l / sd(x) that a search starts with
 
 
 class Kernel(Protocol):
@@ -35,18 +43,16 @@ class Kernel(Protocol):
         """Return k(x, x) of every row of X, shape (n,)."""
         ...
 
-    def evaluate(
-        self, theta: Array, X: Array, X_other: Array
-    ) -> tuple[Array, Contraction]:
-        """Return K, shape (n, m), and its contraction with a W of the same shape."""
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K, shape (n, m), and its contraction for any theta."""
         ...
 
     def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
         """Return sum_i w_i dk(x_i, x_i)/dtheta_k, shape (p,)."""
         ...
 
-    def start(self, sd_y: float, sd_x: Array, stretch: float) -> Array:
-        """Return a start of the search: lengths `stretch` standard deviations."""
+    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return the three starts of the search, each of shape (p,)."""
         ...
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -55,9 +61,13 @@ class Kernel(Protocol):
 
 
 class Composable:
-    """Gives a kernel `+` and `*`."""
+    """Gives a kernel its matrix, `+` and `*`."""
 
     __slots__ = ()
+
+    def matrix(self: Kernel, theta: Array, X: Array, X_other: Array) -> Array:
+        """Return the covariances of the rows of X (n, d) and X_other (m, d): (n, m)."""
+        return self.over(X, X_other)(theta)[0]
 
     def __add__(self: Kernel, other: Kernel) -> "Sum":
         """Return the kernel of the sum of two independent functions."""
@@ -83,50 +93,13 @@ class SquaredExponential(Composable):
         """Names of the hyperparameters."""
         return ("log_sf", *(f"log_l{d + 1}" for d in range(self.dimensions)))
 
-    def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
-        """Return the covariances of two sets of rows, shape (n, m).
-
-        The exponent is one matrix product, -|z|^2/2 + z'z' - |z'|^2/2; what rounding
-        leaves above zero is cut off.
-        """
-        lengths = np.exp(theta[1:])
-        Z, Z_other = X / lengths, X_other / lengths
-        half = 0.5 * np.einsum("nd,nd->n", Z, Z)
-        half_other = 0.5 * np.einsum("nd,nd->n", Z_other, Z_other)
-        K = np.column_stack([Z, -half, np.ones(half.size)]) @ np.vstack(
-            [Z_other.T, np.ones(half_other.size), -half_other]
-        )
-        np.minimum(K, 0.0, out=K)
-        np.exp(K, out=K)
-        K *= np.exp(2.0 * theta[0])
-        return K
-
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return sf^2 for every row."""
         return np.full(X.shape[0], np.exp(2.0 * theta[0]))
 
-    def evaluate(
-        self, theta: Array, X: Array, X_other: Array
-    ) -> tuple[Array, Contraction]:
-        """Return K and its contraction.
-
-        With G = W o K: sum_ij G_ij (x_i - x'_j)^2 = (x o x)'(G 1) + (x' o x')'(G' 1)
-        - 2 x'(G x'), so the lengths cost one product with G and no matrix of their own.
-        """
-        K = self.matrix(theta, X, X_other)
-        lengths = np.exp(theta[1:])
-        Z, Z_other = X / lengths, X_other / lengths
-        augmented = np.column_stack([np.ones(Z_other.shape[0]), Z_other])
-
-        def contract(W: Array) -> Array:
-            G = W * K
-            product = G @ augmented
-            row_sums, column_sums = product[:, 0], G.sum(axis=0)
-            slopes_l = (Z * Z).T @ row_sums + (Z_other * Z_other).T @ column_sums
-            slopes_l -= 2.0 * np.einsum("nd,nd->d", Z, product[:, 1:])
-            return np.concatenate([[2.0 * row_sums.sum()], slopes_l])
-
-        return K, contract
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and its contraction for any theta."""
+        return _SquaredExponentialOver(X, X_other)
 
     def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
         """Return 2 sf^2 sum_i w_i for sf and nothing for the lengths."""
@@ -134,15 +107,56 @@ class SquaredExponential(Composable):
         slope[0] = 2.0 * float(w @ self.diagonal(theta, X))
         return slope
 
-    def start(self, sd_y: float, sd_x: Array, stretch: float) -> Array:
-        """Return sf = sd(y), l_d = stretch sd(x_d)."""
-        return np.log(np.concatenate([[sd_y], stretch * sd_x]))
+    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2 and lengths: one input of two, the other, or both."""
+        return [
+            np.log(np.concatenate([[0.5 * sd_y], np.resize(stretch, sd_x.size) * sd_x]))
+            for stretch in _STRETCHES
+        ]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in log sd(x_d) + [-4, 6]."""
         centre = np.log(np.concatenate([[sd_y], sd_x]))
         span = np.array([[-6.0, 4.0]] + [[-4.0, 6.0]] * self.dimensions)
         return centre[:, None] + span
+
+
+class _SquaredExponentialOver:
+    """A squared exponential over two sets of rows, in memory of its own."""
+
+    def __init__(self, X: Array, X_other: Array) -> None:
+        self._X, self._X_other = X, X_other
+        (n, d), m = X.shape, X_other.shape[0]
+        self._left, self._right = np.ones((n, d + 2)), np.ones((d + 2, m))
+        self._K = np.empty((n, m))
+
+    def __call__(self, theta: Array) -> tuple[Array, Contraction]:
+        """Return K and its contraction.
+
+        The exponent is one matrix product, 2 log sf - |z|^2/2 + z'z' - |z'|^2/2; what
+        rounding leaves above its largest value is cut off.
+        """
+        lengths, K = np.exp(theta[1:]), self._K
+        Z, Z_other = self._X / lengths, self._X_other / lengths
+        self._left[:, :-2], self._right[:-2] = Z, Z_other.T
+        self._left[:, -2] = 2.0 * theta[0] - 0.5 * np.einsum("nd,nd->n", Z, Z)
+        self._right[-1] = -0.5 * np.einsum("nd,nd->n", Z_other, Z_other)
+        np.matmul(self._left, self._right, out=K)
+        np.minimum(K, 2.0 * theta[0], out=K)
+        np.exp(K, out=K)
+        return K, lambda W: self._contract(W, Z, Z_other)
+
+    def _contract(self, W: Array, Z: Array, Z_other: Array) -> Array:
+        """Return sum_ij W_ij dK_ij/dtheta.
+
+        With G = W o K: sum_ij G_ij (x_i - x'_j)^2 = (x o x)'(G 1) + (x' o x')'(G' 1)
+        - 2 x'(G x'), so the lengths cost one product with G and no matrix of their own.
+        """
+        G = np.multiply(W, self._K, out=W)
+        row_sums, column_sums = G.sum(axis=1), G.sum(axis=0)
+        slopes_l = (Z * Z).T @ row_sums + (Z_other * Z_other).T @ column_sums
+        slopes_l -= 2.0 * np.einsum("nd,nd->d", Z, G @ Z_other)
+        return np.concatenate([[2.0 * row_sums.sum()], slopes_l])
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,29 +176,33 @@ class _Pair(Composable):
         count = len(self.left.names)
         return theta[:count], theta[count:]
 
+    def _both(
+        self, left: Evaluator, right: Evaluator, theta: Array
+    ) -> tuple[tuple[Array, Contraction], tuple[Array, Contraction]]:
+        a, b = self._split(theta)
+        return left(a), right(b)
+
 
 @dataclass(frozen=True, slots=True)
 class Sum(_Pair):
     """k = k_left + k_right."""
-
-    def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
-        """Return the sum of the covariances, shape (n, m)."""
-        a, b = self._split(theta)
-        return self.left.matrix(a, X, X_other) + self.right.matrix(b, X, X_other)
 
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return the sum of the variances, shape (n,)."""
         a, b = self._split(theta)
         return self.left.diagonal(a, X) + self.right.diagonal(b, X)
 
-    def evaluate(
-        self, theta: Array, X: Array, X_other: Array
-    ) -> tuple[Array, Contraction]:
-        """Return K and the contractions of both parts with the same W."""
-        a, b = self._split(theta)
-        K, left = self.left.evaluate(a, X, X_other)
-        K_right, right = self.right.evaluate(b, X, X_other)
-        return K + K_right, lambda W: np.concatenate([left(W), right(W)])
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and the contractions of both parts with the same W."""
+        left, right = self.left.over(X, X_other), self.right.over(X, X_other)
+
+        def at(theta: Array) -> tuple[Array, Contraction]:
+            (K_left, of_left), (K_right, of_right) = self._both(left, right, theta)
+            return K_left + K_right, lambda W: np.concatenate(
+                [of_left(W.copy()), of_right(W)]
+            )
+
+        return at
 
     def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
         """Return the slopes of both parts, shape (p,)."""
@@ -192,11 +210,10 @@ class Sum(_Pair):
         left = self.left.diagonal_slope(a, X, w)
         return np.concatenate([left, self.right.diagonal_slope(b, X, w)])
 
-    def start(self, sd_y: float, sd_x: Array, stretch: float) -> Array:
-        """Return both starts, the right one with longer lengths."""
-        left = self.left.start(sd_y, sd_x, stretch)
-        return np.concatenate(
-            [left, self.right.start(sd_y, sd_x, _OTHER_STRETCH * stretch)]
+    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return the starts of both, the right ones with longer lengths."""
+        return _side_by_side(
+            self.left.starts(sd_y, sd_x), self.right.starts(sd_y, _LONGER * sd_x)
         )
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -208,24 +225,22 @@ class Sum(_Pair):
 class Product(_Pair):
     """k = k_left k_right; the left part carries the unit of y."""
 
-    def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
-        """Return the product of the covariances, shape (n, m)."""
-        a, b = self._split(theta)
-        return self.left.matrix(a, X, X_other) * self.right.matrix(b, X, X_other)
-
     def diagonal(self, theta: Array, X: Array) -> Array:
         """Return the product of the variances, shape (n,)."""
         a, b = self._split(theta)
         return self.left.diagonal(a, X) * self.right.diagonal(b, X)
 
-    def evaluate(
-        self, theta: Array, X: Array, X_other: Array
-    ) -> tuple[Array, Contraction]:
-        """Return K and the contractions, each part's W weighed by the other's K."""
-        a, b = self._split(theta)
-        K, left = self.left.evaluate(a, X, X_other)
-        K_right, right = self.right.evaluate(b, X, X_other)
-        return K * K_right, lambda W: np.concatenate([left(W * K_right), right(W * K)])
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and the contractions, each W weighed by the other's K."""
+        left, right = self.left.over(X, X_other), self.right.over(X, X_other)
+
+        def at(theta: Array) -> tuple[Array, Contraction]:
+            (K_left, of_left), (K_right, of_right) = self._both(left, right, theta)
+            return K_left * K_right, lambda W: np.concatenate(
+                [of_left(W * K_right), of_right(W * K_left)]
+            )
+
+        return at
 
     def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
         """Return the slopes of both parts, weighed by the other's variance."""
@@ -234,13 +249,16 @@ class Product(_Pair):
         right = self.right.diagonal_slope(b, X, w * self.left.diagonal(a, X))
         return np.concatenate([left, right])
 
-    def start(self, sd_y: float, sd_x: Array, stretch: float) -> Array:
-        """Return both starts; the right part is dimensionless with sf = 1."""
-        left = self.left.start(sd_y, sd_x, stretch)
-        return np.concatenate(
-            [left, self.right.start(1.0, sd_x, _OTHER_STRETCH * stretch)]
+    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return the starts of both; the right part is dimensionless with sf = 1."""
+        return _side_by_side(
+            self.left.starts(sd_y, sd_x), self.right.starts(2.0, _LONGER * sd_x)
         )
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return the bounds of both parts, shape (p, 2)."""
         return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
+
+
+def _side_by_side(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
+    return [np.concatenate(pair) for pair in zip(left, right, strict=True)]

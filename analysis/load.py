@@ -6,7 +6,7 @@ the file carries, so a better calibration can be applied years later.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,18 +121,10 @@ def load_trial(path: Path) -> RecordedTrial:
     _check_metadata(reader)
     cycles = reader.cycles().data
     _check_cycles(path, cycles)
-    try:
-        payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
-        terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
-        constants = load_constants(_text(reader, "arm_model.toml"))
-        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
-        model = ArmModel(constants, Tool(nothing, nothing, sole_point))
-    except SettingsError as error:
-        raise TrialFileError(path, error.message.rstrip(".")) from error
-    except (ValueError, ArithmeticError, RuntimeError) as error:
-        raise TrialFileError(path, f"has an impossible arm model ({error})") from error
+    at_hand = _calibrated(reader)
+    payload, frame = at_hand.payload, at_hand.frame
     t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
-    path_of_sole = model.sole_path(np.ascontiguousarray(cycles["position"]))
+    path_of_sole = at_hand.model.sole_path(np.ascontiguousarray(cycles["position"]))
     velocity = foot_velocity(t, path_of_sole.position)
     raw = np.ascontiguousarray(cycles["wrench_raw"])
     contact = payload.contact(raw, path_of_sole.rotation)
@@ -141,7 +133,7 @@ def load_trial(path: Path) -> RecordedTrial:
     trial = RecordedTrial(
         path=path,
         metadata=reader.metadata,
-        terrain=terrain,
+        terrain=at_hand.terrain,
         cycles=cycles,
         t=t,
         sole=path_of_sole.position,
@@ -152,14 +144,47 @@ def load_trial(path: Path) -> RecordedTrial:
         lateral=force @ axes[1],
         frame=frame,
         payload=payload,
-        constants=constants,
-        sole_point=np.asarray(sole_point, dtype=np.float64),
+        constants=at_hand.constants,
+        sole_point=at_hand.sole_point,
     )
     try:
         trial.series()
     except SettingsError as error:
         raise TrialFileError(path, f"is of no use ({error.message})") from error
     return trial
+
+
+class _Calibrated(NamedTuple):
+    """What a trial file carries besides its cycles."""
+
+    payload: Payload
+    sole_point: Array
+    terrain: str
+    frame: TerrainFrame
+    constants: ArmConstants
+    model: ArmModel
+
+
+def _calibrated(reader: TrialReader) -> _Calibrated:
+    """Return calibration, terrain and arm of a trial file.
+
+    Raises:
+        TrialFileError: one of them is missing or impossible.
+    """
+    try:
+        payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
+        terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
+        constants = load_constants(_text(reader, "arm_model.toml"))
+        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        model = ArmModel(constants, Tool(nothing, nothing, sole_point))
+    except SettingsError as error:
+        raise TrialFileError(reader.path, error.message.rstrip(".")) from error
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        raise TrialFileError(
+            reader.path, f"has an impossible arm model ({error})"
+        ) from error
+    point = np.asarray(sole_point, dtype=np.float64)
+    return _Calibrated(payload, point, terrain, frame, constants, model)
 
 
 def _check_metadata(reader: TrialReader) -> None:

@@ -208,7 +208,7 @@ def _fit_around_tustin(
 
 def _fit_with_chosen_noise(training: Training, options: FitOptions) -> FittedModel:
     choice = choose_noise(training, options.gp_points, options.seed)
-    noise = LogLinearNoise() if choice.chosen == "loglinear" else ConstantNoise()
+    noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
     process = fit_gp(training.subset.inputs, training.subset.F_t, None, noise)
     tails = None
     if choice.chosen == "student":

@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.series import Array
 
+_START = 0.8  # sn / sd(y) that the search starts with
 _REACH = 2.0  # standard deviations beyond which the noise changes no more
 
 
@@ -33,8 +34,8 @@ class Noise(Protocol):
         """Return what the search adds to the likelihood, and its slope in theta."""
         ...
 
-    def start(self, sd_y: float, share: float) -> Array:
-        """Return a start of the search: a standard deviation of `share` sd(y)."""
+    def start(self, sd_y: float) -> Array:
+        """Return a start of the search: a constant of 0.8 sd(y)."""
         ...
 
     def bounds(self, sd_y: float) -> Array:
@@ -66,9 +67,9 @@ class ConstantNoise:
         """Return nothing: every sn is as good before the data."""
         return 0.0, np.zeros(theta.size)
 
-    def start(self, sd_y: float, share: float) -> Array:
-        """Return sn = share sd(y)."""
-        return np.log(np.array([share * sd_y]))
+    def start(self, sd_y: float) -> Array:
+        """Return sn = 0.8 sd(y)."""
+        return np.log(np.array([_START * sd_y]))
 
     def bounds(self, sd_y: float) -> Array:
         """Return log sn in log sd(y) + [-6, 2]."""
@@ -111,9 +112,9 @@ class LogLinearNoise:
         slope[0] = 0.0
         return 0.5 * float(slope @ theta), slope
 
-    def start(self, sd_y: float, share: float) -> Array:
-        """Return a constant sn = share sd(y)."""
-        return np.concatenate([[np.log(share * sd_y)], np.zeros(self.dimensions)])
+    def start(self, sd_y: float) -> Array:
+        """Return a constant sn = 0.8 sd(y)."""
+        return np.concatenate([[np.log(_START * sd_y)], np.zeros(self.dimensions)])
 
     def bounds(self, sd_y: float) -> Array:
         """Return w_0 in log sd(y) + [-6, 2] and the slopes within +-3."""

@@ -1,5 +1,6 @@
-"""Which noise a terrain needs: constant, changing with the inputs, or heavy-tailed.
+"""Which noise a terrain needs: constant, changing with the inputs, or heavy-tailed too.
 
+"student" is Student's t whose scale changes with the inputs like that of "loglinear".
 Chosen among the training trials only, by the log density of trials that were left out
 of an inner fit; the simplest wins unless another is clearly better.
 """
@@ -122,7 +123,7 @@ def _left_out(training: Training, group: int, points: int, seed: int) -> Array:
         fit_gp(subset.inputs, subset.F_t, None, ConstantNoise()),
         fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise()),
     )
-    tails = TailedNoise.of(processes[0], inner)
+    tails = TailedNoise.of(processes[1], inner)
     return np.array(
         [
             _nlpds(training.rows.take(np.flatnonzero(trial == k)), processes, tails)
@@ -138,7 +139,7 @@ def _nlpds(
 ) -> list[float]:
     """Return the NLPD of one trial under every noise; without tails a normal's."""
     constant, changing = (predict_normal(process, rows) for process in processes)
-    tailed = constant if tails is None else tails.applied_to(constant)
+    tailed = changing if tails is None else tails.applied_to(changing)
     return [
         -float(np.mean(log_density(rows.F_t, prediction)))
         for prediction in (constant, changing, tailed)

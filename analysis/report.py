@@ -13,10 +13,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.files import write_atomic
-from analysis.findings import Findings, find, findings_rows, plain_findings
+from analysis.findings import Findings, find
 from analysis.fits import to_csv, to_fits, to_plain
 from analysis.gallery import exhibits
 from analysis.jobs import available_cores
+from analysis.plain_findings import findings_rows, plain_findings
 from analysis.report_beyond import beyond_tables
 from analysis.report_content import (
     choices,

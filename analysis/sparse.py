@@ -14,14 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.gp import check_outputs, factorise, split
+from analysis.gp import check_outputs
 from analysis.kernels import Kernel, SquaredExponential
+from analysis.likelihood import split
 from analysis.noise import ConstantNoise, Noise
-from analysis.search import Start, maximise, spread
+from analysis.search import Objective, Start, maximise, spread
 from analysis.series import Array, Indices
+from analysis.sparse_bound import JITTER, bound, jittered, project
 
 INDUCING = 32
-JITTER = 1e-8  # on K_uu, times its mean variance
 
 _LENGTH = 0.5  # of the kernel that chooses inducing points, in standard deviations
 
@@ -89,24 +90,6 @@ class SparseProcess:
         return self.offset + cross @ self.alpha, variance
 
 
-class _Projection(NamedTuple):
-    """The parts of a bound that its value, slope and prediction share.
-
-    Attributes:
-        L_u: Cholesky factor of K_uu, (m, m).
-        A: L_u^-1 K_uf S^-1/2, (m, n).
-        L_b: Cholesky factor of B = I + A A', (m, m).
-        a: (Q + S)^-1 r, (n,).
-        quadratic: r' a.
-    """
-
-    L_u: Array
-    A: Array
-    L_b: Array
-    a: Array
-    quadratic: float
-
-
 def choose_inducing(X: Array, count: int) -> Indices:
     """Return the rows of X (n, d) that explain the others best, one after the other.
 
@@ -129,45 +112,6 @@ def choose_inducing(X: Array, count: int) -> Indices:
         left[pivot] = 0.0
         chosen.append(pivot)
     return np.array(chosen, dtype=np.intp)
-
-
-def bound(
-    model: tuple[Kernel, Noise],
-    theta: Array,
-    X: tuple[Array, Array],
-    r: Array,
-    jitter: float = JITTER,
-) -> tuple[float, Array]:
-    """Return the bound on the log marginal likelihood of r and its slope in theta.
-
-    With M = (a a' - (Q + S)^-1 + S^-1)/2 the slope is tr(M dQ) - 1/2 sum dk_ii/S_ii
-    and, for the noise, 1/2 sum_i [a_i^2 - (Q + S)^-1_ii + (k_ii - Q_ii)/S_ii^2] dS_ii.
-
-    Args:
-        model: kernel and noise.
-        theta: the kernel's, then the noise's hyperparameters.
-        X: inputs (n, d) and inducing inputs (m, d).
-        r: outputs with the mean function taken off, shape (n,).
-        jitter: share of the mean variance added to K_uu.
-    """
-    kernel, noise = model
-    theta_kernel, theta_noise = split(kernel, theta)
-    inputs, inducing = X
-    K_uu, contract_uu = kernel.evaluate(theta_kernel, inducing, inducing)
-    K_fu, contract_fu = kernel.evaluate(theta_kernel, inputs, inducing)
-    S, contract_noise = noise.evaluate(theta_noise, inputs)
-    part = _project(_jittered(K_uu, jitter), K_fu, S, r)
-    gap = kernel.diagonal(theta_kernel, inputs) - S * np.einsum(
-        "mn,mn->n", part.A, part.A
-    )
-    value = -0.5 * (part.quadratic + float(np.sum(np.log(S) + gap / S)))
-    value -= float(np.sum(np.log(np.diagonal(part.L_b))))
-    value -= 0.5 * r.size * np.log(2.0 * np.pi)
-    W_fu, W_uu, of_noise = _weights(part, S, gap)
-    W_uu[np.diag_indices_from(W_uu)] *= 1.0 + jitter
-    slope = contract_fu(W_fu) + contract_uu(W_uu)
-    slope += kernel.diagonal_slope(theta_kernel, inputs, -0.5 / S)
-    return value, np.concatenate([slope, contract_noise(of_noise)])
 
 
 def fit_sparse(
@@ -196,87 +140,65 @@ def fit_sparse(
     X, offset = (inputs - centre) / scale, float(y.mean())
     U, r = X[choose_inducing(X, inducing)], y - offset
 
-    def objective(theta: Array) -> tuple[float, Array]:
-        value, slope = bound((kernel, noise), theta, (X, U), r)
-        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
-        slope[-prior_slope.size :] += prior_slope
-        return value + prior, slope
-
-    optimum = maximise((kernel, noise), objective, X, float(np.std(r)))
-    theta, theta_noise = split(kernel, optimum.theta)
-    K_uu = kernel.matrix(theta, U, U)
-    S = noise.variance(theta_noise, X)
-    part = _project(_jittered(K_uu, JITTER), kernel.matrix(theta, X, U), S, r)
-    alpha, root = _memory(part, r / np.sqrt(S))
+    model = (kernel, noise)
+    optimum = maximise(model, _posterior(model, (X, U), r), X, float(np.std(r)))
+    memory = _memorise(model, optimum.theta, (X, U), r)
     return SparseProcess(
         kernel=kernel,
         noise=noise,
         theta=optimum.theta,
         X=U,
-        alpha=alpha,
-        root=root,
+        alpha=memory.alpha,
+        root=memory.root,
         offset=offset,
         centre=centre,
         scale=scale,
         lml=optimum.lml,
         starts=optimum.starts,
-        jitter=JITTER * float(np.mean(np.diagonal(K_uu))),
+        jitter=memory.jitter,
         at_bound=optimum.at_bound,
     )
 
 
-def _jittered(K_uu: Array, jitter: float) -> Array:
-    return K_uu + np.diag(jitter * np.diagonal(K_uu))
+def _posterior(
+    model: tuple[Kernel, Noise], X: tuple[Array, Array], r: Array
+) -> Objective:
+    kernel, noise = model
+
+    def objective(theta: Array) -> tuple[float, Array]:
+        value, slope = bound(model, theta, X, r)
+        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
+        slope[-prior_slope.size :] += prior_slope
+        return value + prior, slope
+
+    return objective
 
 
-def _project(K_uu: Array, K_fu: Array, S: Array, r: Array) -> _Projection:
+class _Memory(NamedTuple):
+    """What a process remembers: see `SparseProcess`."""
+
+    alpha: Array
+    root: Array
+    jitter: float
+
+
+def _memorise(
+    model: tuple[Kernel, Noise], theta: Array, X: tuple[Array, Array], r: Array
+) -> _Memory:
+    """Return weights of the mean (m,), root of the known variance (m, m), jitter."""
     from scipy.linalg import solve_triangular
 
-    sd = np.sqrt(S)
-    L_u = factorise(K_uu, np.zeros(K_uu.shape[0])).L
-    A = solve_triangular(L_u, (K_fu / sd[:, None]).T, lower=True, check_finite=False)
-    L_b = factorise(A @ A.T, np.ones(A.shape[0])).L
-    white = r / sd
-    half = solve_triangular(L_b, A @ white, lower=True, check_finite=False)
-    back = solve_triangular(L_b, half, lower=True, trans=1, check_finite=False)
-    a = (white - A.T @ back) / sd
-    return _Projection(L_u, A, L_b, a, float(white @ white - half @ half))
-
-
-def _weights(part: _Projection, S: Array, gap: Array) -> tuple[Array, Array, Array]:
-    """Return the weights of dK_fu (n, m), dK_uu (m, m) and 2 dS (n,) in the slope.
-
-    With P = K_uu^-1 K_uf they are 2 M P' and -P M P'.
-    """
-    from scipy.linalg import solve_triangular
-
-    def solve(L: Array, right: Array, trans: int = 0) -> Array:
-        return solve_triangular(L, right, lower=True, trans=trans, check_finite=False)
-
-    sd, eye = np.sqrt(S), np.eye(part.L_u.shape[0])
-    of_b = solve(part.L_b, eye)
-    B_inverse = of_b.T @ of_b
-    L_inverse = solve(part.L_u, eye)
-    p_a = L_inverse.T @ (part.A @ (sd * part.a))
-    inner = (eye - B_inverse) @ L_inverse
-    W_fu = np.outer(part.a, p_a) + (part.A / sd).T @ inner
-    BB = part.L_b @ part.L_b.T
-    W_uu = -0.5 * (
-        np.outer(p_a, p_a) + L_inverse.T @ (BB - 2.0 * eye + B_inverse) @ L_inverse
-    )
-    half = of_b @ part.A
-    inverse_diagonal = (1.0 - np.einsum("mn,mn->n", half, half)) / S
-    return W_fu, W_uu, part.a**2 - inverse_diagonal + gap / S**2
-
-
-def _memory(part: _Projection, white: Array) -> tuple[Array, Array]:
-    """Return the weights of the mean (m,) and the root of the known variance (m, m)."""
-    from scipy.linalg import solve_triangular
-
+    (kernel, noise), (inputs, inducing) = model, X
+    theta_kernel, theta_noise = split(kernel, theta)
+    K_uu = kernel.matrix(theta_kernel, inducing, inducing)
+    K_fu = kernel.matrix(theta_kernel, inputs, inducing)
+    S = noise.variance(theta_noise, inputs)
+    part = project(jittered(K_uu, JITTER), K_fu, S, r)
     eye = np.eye(part.L_u.shape[0])
     L_inverse = solve_triangular(part.L_u, eye, lower=True, check_finite=False)
     of_b = solve_triangular(part.L_b, eye, lower=True, check_finite=False)
-    alpha = L_inverse.T @ (of_b.T @ (of_b @ (part.A @ white)))
+    alpha = L_inverse.T @ (of_b.T @ (of_b @ (part.A @ (r / np.sqrt(S)))))
     # I - B^-1 is positive semidefinite with eigenvalues in [0, 1)
     values, vectors = np.linalg.eigh(eye - of_b.T @ of_b)
-    return alpha, L_inverse.T @ vectors * np.sqrt(np.maximum(values, 0.0))
+    root = L_inverse.T @ vectors * np.sqrt(np.maximum(values, 0.0))
+    return _Memory(alpha, root, JITTER * float(np.mean(np.diagonal(K_uu))))

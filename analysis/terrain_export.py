@@ -90,33 +90,10 @@ def database_of(
     Raises:
         SettingsError: no terrain has kept samples.
     """
-    trials = {
-        name: tuple(trial for trial in result.trials if trial.kept)
-        for name, result in study.terrains.items()
-    }
-    trials = {name: of for name, of in trials.items() if of}
-    if not trials:
-        raise SettingsError("No terrain has kept samples.", hint="Record some trials.")
-    axes = _axes([t for of in trials.values() for t in of], study.options.prepare)
-    options = study.options.fit
-    tasks = [
-        TableTask(name, tuple(Rows.of([trial]) for trial in of), axes, options)
-        for name, of in trials.items()
-    ]
+    axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
-    default = GP_SE if GP_SE in options.models else options.models[0]
-    terrains = {
-        task.terrain: {
-            "kind": kind_of(task.terrain),
-            "trials": len(task.trials),
-            "samples": sum(rows.count for rows in task.trials),
-            "rho": 0.0 if found is None else round(found.rho[task.terrain], 4),
-            "limits": _limits(found, task.terrain),
-            "models": models,
-        }
-        for task, models in zip(tasks, tables, strict=True)
-        if default in models
-    }
+    models = study.options.fit.models
+    default = GP_SE if GP_SE in models else models[0]
     content = {
         "format": FORMAT,
         "version": VERSION,
@@ -125,9 +102,42 @@ def database_of(
         "default": default,
         "units": {"F_n": "N", "v_t": "m/s", "mean": "N", "sd": "N"},
         "axes": {"F_n": axes[0].tolist(), "v_t": axes[1].tolist()},
-        "terrains": terrains,
+        "terrains": {
+            task.terrain: _facts(task, found) | {"models": fitted}
+            for task, fitted in zip(tasks, tables, strict=True)
+            if default in fitted
+        },
     }
     return json.dumps(content, default=str)
+
+
+def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
+    """Return the axes of all tables, and one task per terrain with kept samples."""
+    trials = {
+        name: tuple(trial for trial in result.trials if trial.kept)
+        for name, result in study.terrains.items()
+    }
+    trials = {name: of for name, of in trials.items() if of}
+    if not trials:
+        raise SettingsError("No terrain has kept samples.", hint="Record some trials.")
+    axes = _axes([t for of in trials.values() for t in of], study.options.prepare)
+    return axes, [
+        TableTask(
+            name, tuple(Rows.of([trial]) for trial in of), axes, study.options.fit
+        )
+        for name, of in trials.items()
+    ]
+
+
+def _facts(task: TableTask, found: Identification | None) -> dict[str, Any]:
+    """Return what the database says of a terrain besides its models."""
+    return {
+        "kind": kind_of(task.terrain),
+        "trials": len(task.trials),
+        "samples": sum(rows.count for rows in task.trials),
+        "rho": 0.0 if found is None else round(found.rho[task.terrain], 4),
+        "limits": _limits(found, task.terrain),
+    }
 
 
 def _axes(

@@ -4,6 +4,8 @@ import numpy as np
 
 from analysis.figures import (
     FORCE_LABEL,
+    ONE_COLUMN,
+    WIDTH,
     Axes,
     Figure,
     new_figure,
@@ -81,7 +83,9 @@ def draw_stick_slip(found: Findings) -> Figure | None:
     chosen = representatives(found.study)
     if not chosen:
         return None
-    figure = new_figure(1.35 * len(chosen) + 0.6)
+    figure = new_figure(
+        1.35 * len(chosen) + 0.6, ONE_COLUMN if len(chosen) == 1 else WIDTH
+    )
     axes = figure.subplots(len(chosen), 1, sharex=True, sharey=True, squeeze=False)
     for ax, result in zip(axes[:, 0], chosen, strict=True):
         number = most_slips(result)

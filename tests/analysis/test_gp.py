@@ -6,8 +6,9 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis import gp as gp_module
 from analysis.arcsine import Arcsine
-from analysis.gp import GaussianProcess, factorise, fit_gp, likelihood, posterior_search
+from analysis.gp import GaussianProcess, fit_gp, posterior_search
 from analysis.kernels import SquaredExponential
+from analysis.likelihood import Likelihood, factorise
 from analysis.noise import ConstantNoise
 
 SE = SquaredExponential(2)
@@ -59,7 +60,7 @@ def test_likelihood_and_gradient_have_the_reference_values(vectors, name, case):
     X, y, _, _ = load(vectors, name)
     expected = vectors["sets"][name]["cases"][case]
     model = (KERNELS[case], ConstantNoise())
-    lml, slope = likelihood(model, np.array(expected["th"]), X, y)
+    lml, slope = Likelihood(model, X, y)(np.array(expected["th"]))
     assert lml == pytest.approx(expected["lml"], rel=1e-10)
     np.testing.assert_allclose(slope, expected["grad"], rtol=1e-10, atol=1e-10)
 
@@ -79,7 +80,7 @@ def test_prediction_has_the_reference_values(vectors, name, case):
 def test_another_noise_can_be_put_in_place(vectors, name):
     X, y, _, g = load(vectors, name)
     expected = vectors["sets"][name]["cases"]["se_noise_g"]
-    lml, slope = likelihood((SE, ScaledNoise(g)), np.array(expected["th"]), X, y)
+    lml, slope = Likelihood((SE, ScaledNoise(g)), X, y)(np.array(expected["th"]))
     assert lml == pytest.approx(expected["lml"], rel=1e-10)
     np.testing.assert_allclose(slope, expected["grad"], rtol=1e-8, atol=1e-8)
 
@@ -99,7 +100,7 @@ def test_gradient_agrees_with_differences_for_any_weights(vectors):
     theta, h = np.array([0.3, -0.2, 0.4]), 1e-6
     W = np.random.default_rng(0).normal(size=(12, 12))
     W = W + W.T
-    slope = SE.evaluate(theta, X, X)[1](W)
+    slope = SE.over(X, X)(theta)[1](W.copy())
     for k, step in enumerate(h * np.eye(3)):
         change = SE.matrix(theta + step, X, X) - SE.matrix(theta - step, X, X)
         # central difference: error of order h^2, rounding 1e-16/h
@@ -131,7 +132,7 @@ def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
         optimizer=None,
     ).fit(X, y)
     theta = np.log([sf, *lengths, sn])
-    lml, slope = likelihood((SE, ConstantNoise()), theta, X, y)
+    lml, slope = Likelihood((SE, ConstantNoise()), X, y)(theta)
     value, gradient = theirs.log_marginal_likelihood(
         theirs.kernel_.theta, eval_gradient=True
     )
@@ -142,6 +143,43 @@ def test_likelihood_and_prediction_agree_with_scikit_learn(vectors):
     ours, variance = process(X, y, theta, ConstantNoise()).predict(Xt)
     np.testing.assert_allclose(ours, mean, rtol=1e-9)
     np.testing.assert_allclose(np.sqrt(variance), sd, rtol=1e-9)
+
+
+@pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
+def test_gradient_of_many_rows_agrees_with_differences(kernel):
+    X, y = draw(np.random.default_rng(2), 190)  # inverted block by block
+    likelihood = Likelihood((kernel, ConstantNoise()), X, y)
+    theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
+    _, slope = likelihood(theta)
+    for k, step in enumerate(1e-5 * np.eye(theta.size)):
+        change = likelihood(theta + step)[0] - likelihood(theta - step)[0]
+        # error of order h^2 and rounding 1e-12/h
+        assert slope[k] == pytest.approx(change / 2e-5, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize("kernel", [SE, Arcsine(2), SE + Arcsine(2), SE * SE])
+def test_an_evaluation_leaves_nothing_behind(kernel):
+    X, y = draw(np.random.default_rng(2), 100)
+    rng = np.random.default_rng(6)
+    here, there = rng.normal(0, 0.3, (2, len(kernel.names) + 1))
+    kept = Likelihood((kernel, ConstantNoise()), X, y)
+    kept(there)
+    lml, slope = kept(here)
+    kept(there)
+    expected, fresh = Likelihood((kernel, ConstantNoise()), X, y)(here)
+    assert lml == expected
+    np.testing.assert_array_equal(slope, fresh)
+
+
+def test_a_start_is_left_just_below_a_known_top():
+    X, y = draw(np.random.default_rng(4), 100)
+    starts = posterior_search((SE, ConstantNoise()), X, y - y.mean()).starts
+    first, *others = starts
+    for start in others:
+        # this likelihood has one top, which the first start has reached
+        assert first.lml - 0.1 < start.lml <= first.lml + 1e-4
+        assert np.abs(np.subtract(start.theta, first.theta)).max() < 0.2
+    assert min(start.lml for start in others) < first.lml - 1e-5
 
 
 def draw(rng, n):
@@ -183,8 +221,8 @@ def test_likelihood_does_not_depend_on_the_order_of_rows():
     X, y = draw(np.random.default_rng(3), 50)
     theta = np.log([2.0, 0.8, 1.5, 0.5])
     order = np.random.default_rng(1).permutation(50)
-    straight = likelihood((SE, ConstantNoise()), theta, X, y)[0]
-    mixed = likelihood((SE, ConstantNoise()), theta, X[order], y[order])[0]
+    straight = Likelihood((SE, ConstantNoise()), X, y)(theta)[0]
+    mixed = Likelihood((SE, ConstantNoise()), X[order], y[order])(theta)[0]
     assert mixed == pytest.approx(straight, rel=1e-12)
 
 

@@ -25,8 +25,9 @@ from analysis.prepare import PrepareOptions, prepare
 from analysis.recognition import recognise
 from analysis.series import TractionSeries
 from analysis.study import StudyOptions, run_study
-from analysis.terrain_db import Table, load
+from analysis.terrain_db import load
 from analysis.terrain_export import database_of
+from analysis.terrain_table import Table
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
 

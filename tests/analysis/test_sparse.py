@@ -3,10 +3,12 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.arcsine import Arcsine
-from analysis.gp import fit_gp, likelihood
+from analysis.gp import fit_gp
 from analysis.kernels import SquaredExponential
+from analysis.likelihood import Likelihood
 from analysis.noise import ConstantNoise, LogLinearNoise
-from analysis.sparse import bound, choose_inducing, fit_sparse
+from analysis.sparse import choose_inducing, fit_sparse
+from analysis.sparse_bound import bound
 
 SE = (SquaredExponential(2), ConstantNoise())
 
@@ -46,7 +48,7 @@ def test_slope_of_the_bound_agrees_with_differences(small, model, theta):
 def test_all_points_inducing_give_the_exact_likelihood_from_below(small):
     X, y = small[0][:20], small[1][:20]
     theta = np.array([0.1, -1.2, -1.0, -1.5])
-    exact, _ = likelihood(SE, theta, X, y)
+    exact, _ = Likelihood(SE, X, y)(theta)
     assert bound(SE, theta, (X, X), y)[0] == pytest.approx(exact, abs=1e-4)
     for count in (1, 5, 15):
         assert bound(SE, theta, (X, X[:count]), y)[0] <= exact
