@@ -56,8 +56,10 @@ def test_recovered_friction_is_near_the_true_one(pair):
     mu_k, b = float(truth["true:mu_k"]), float(truth["true:b"])
     kept = prepare(trial.series(), PrepareOptions())
     loaded = (kept.F_n > 1.0) & (kept.v_t > 0.03)  # beyond Stribeck: F_t = mu F_n + b v
-    ratio = (kept.F_t[loaded] - b * kept.v_t[loaded]) / kept.F_n[loaded]
-    assert np.median(ratio) == pytest.approx(mu_k, rel=0.2)
+    expected = mu_k * kept.F_n[loaded] + b * kept.v_t[loaded]
+    assert np.median(expected) > 1.2
+    # bias and drift of F_t and of mu F_n, 0.3 N each at one standard deviation
+    assert np.median(kept.F_t[loaded] - expected) == pytest.approx(0.0, abs=0.8)
 
 
 def test_sole_is_where_the_simulation_has_it(recorded):
