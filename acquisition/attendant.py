@@ -19,6 +19,9 @@ ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then br
 _FACTS_EVERY = 500  # cycles
 _BELL_EVERY = 500  # cycles
 
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_CONSOLE, _CONTROL, _RECORDER = Role.CONSOLE, Role.CONTROL, Role.RECORDER
+
 Facts = Callable[[], Mapping[str, str]]
 
 
@@ -103,15 +106,12 @@ class Attendant:
     def _watch(self, now_ns: int) -> None:
         """Stop the arm when those who look after it have gone."""
         beats = self._board.beats
-        console_ns = now_ns - beats.last_ns(Role.CONSOLE)
+        console_ns = now_ns - beats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
             self._cycle.report(Verdict(Action.HOLD, "console-silent"))
             if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
                 self._around.ring()
-        if (
-            self._cycle.is_recording
-            and now_ns - beats.last_ns(Role.RECORDER) > SILENT_NS
-        ):
+        if self._cycle.is_recording and now_ns - beats.last_ns(_RECORDER) > SILENT_NS:
             self._cycle.report(Verdict(Action.HOLD, "recorder-silent"))
         if self.is_orphaned:
             self._brake_alone(now_ns)
@@ -134,7 +134,7 @@ class Attendant:
         status.worst_late_ns = stats.worst_late_ns
         self._status_board.write(status)
         now_ns = self._around.now_ns()
-        self._board.beats.beat(Role.CONTROL, now_ns)
+        self._board.beats.beat(_CONTROL, now_ns)
         self._board.timings.write(
             pack_timing(tick, self._cycle.replies_ns, self._arm.sent_ns, now_ns)
         )

@@ -326,8 +326,8 @@ class Cycle:
         sample.flags[0] = bits
         sample.host_ns[0] = reading.host_ns
         sample.arm_ns[0] = reading.arm_ns
-        sample.counts[:] = reading.counts
-        sample.position[:] = reading.q
-        sample.velocity[:] = reading.qd
-        sample.torque_command[:] = sent
-        sample.torque_gravity[:] = tau_gravity
+        sample.counts[...] = reading.counts
+        sample.position[...] = reading.q
+        sample.velocity[...] = reading.qd
+        sample.torque_command[...] = sent
+        sample.torque_gravity[...] = tau_gravity

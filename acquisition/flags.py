@@ -48,5 +48,7 @@ def of_wrench(wrench: WrenchSample | None, *, is_new: bool) -> int:
 
 def is_clipped(sent: Vector, wanted: Vector) -> bool:
     """Return whether torques [N m], shapes (7,), were cut on their way out."""
-    pairs = zip(sent.tolist(), wanted.tolist(), strict=True)
-    return max([abs(a - b) for a, b in pairs]) > _ROUNDING
+    for a, b in zip(sent.tolist(), wanted.tolist(), strict=True):
+        if not -_ROUNDING <= a - b <= _ROUNDING:
+            return True
+    return False

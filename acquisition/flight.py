@@ -1,6 +1,7 @@
 """The flight record: the last two seconds with raw frames, written on a fault."""
 
 import struct
+from collections.abc import Iterable
 from typing import Final
 
 import numpy as np
@@ -22,9 +23,13 @@ class FrameTape:
     def __init__(self, ring: Ring) -> None:
         self._ring = ring
 
-    def add(self, t_ns: int, can_id: int, data: bytes) -> None:
-        """Keep one frame of monotonic time `t_ns` [ns]; the oldest is forgotten."""
-        self._ring.pack(_FRAME, t_ns, can_id, len(data), data)
+    def add(self, frames: Iterable[tuple[int, int, int, bytes]]) -> None:
+        """Keep frames; the oldest are forgotten.
+
+        Args:
+            frames: monotonic time [ns], identifier, length and data of each.
+        """
+        self._ring.pack(_FRAME, frames)
 
 
 def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -97,9 +98,8 @@ class GuardState:
     late: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """What the guard looks at in one cycle.
+class Observation(NamedTuple):
+    """What the guard looks at in one cycle; a tuple, because it is made in each.
 
     Attributes:
         reading: joint positions and velocities.
@@ -136,13 +136,15 @@ def check(
     state = _remember(limits, state, seen, now)
     if not seen.is_powered:
         return state, OK
+    # Plain numbers: seven of them are compared faster than numpy looks at an array.
+    q, qd, tau = seen.reading.q.tolist(), seen.reading.qd.tolist(), seen.tau.tolist()
     verdicts = (
         _check_safety(seen),
         _check_silence(limits, seen),
-        _check_numbers(seen),
-        _check_position(limits, state, seen),
-        _check_speed(limits, seen),
-        _check_torque(limits, seen),
+        _check_numbers(sum(q) + sum(qd) + sum(tau), seen),
+        _check_position(limits, state, q),
+        _check_speed(limits, seen, qd),
+        _check_torque(limits, tau),
         _check_trial(limits, seen),
         _check_cadence(limits, state, now),
     )
@@ -189,19 +191,16 @@ def _check_silence(limits: Limits, seen: Observation) -> Verdict:
     return Verdict(Action.IDLE if is_long else Action.HOLD, "can-silence", facts)
 
 
-def _check_numbers(seen: Observation) -> Verdict:
-    reading = seen.reading
-    q, qd, tau = reading.q, reading.qd, seen.tau
-    # Squares: infinities cannot cancel.
-    total = float(q.dot(q) + qd.dot(qd) + tau.dot(tau))
-    total += abs(seen.foot_speed) + abs(seen.joint7_offset)
+def _check_numbers(total: float, seen: Observation) -> Verdict:
+    """Refuse what is no number; infinities that cancel in `total` leave NaN."""
+    total += seen.foot_speed + seen.joint7_offset
     if total - total != 0.0:  # NaN or infinite
         return Verdict(Action.IDLE, "not-a-number")
     return OK
 
 
-def _check_position(limits: Limits, state: GuardState, seen: Observation) -> Verdict:
-    ranges = zip(seen.reading.q.tolist(), limits.q_lower, limits.q_upper, strict=True)
+def _check_position(limits: Limits, state: GuardState, q: list[float]) -> Verdict:
+    ranges = zip(q, limits.q_lower, limits.q_upper, strict=True)
     for joint, (value, low, high) in enumerate(ranges):
         if not low <= value <= high and state.armed >> joint & 1:
             limit = low if value < low else high
@@ -210,8 +209,8 @@ def _check_position(limits: Limits, state: GuardState, seen: Observation) -> Ver
     return OK
 
 
-def _check_speed(limits: Limits, seen: Observation) -> Verdict:
-    facts = _first_beyond(seen.reading.qd, limits.qd)
+def _check_speed(limits: Limits, seen: Observation, qd: list[float]) -> Verdict:
+    facts = _first_beyond(qd, limits.qd)
     if facts:
         return Verdict(Action.DAMP, "overspeed", facts)
     if seen.foot_speed > limits.foot_speed:
@@ -220,20 +219,17 @@ def _check_speed(limits: Limits, seen: Observation) -> Verdict:
     return OK
 
 
-def _check_torque(limits: Limits, seen: Observation) -> Verdict:
-    facts = _first_beyond(seen.tau, limits.tau)
+def _check_torque(limits: Limits, tau: list[float]) -> Verdict:
+    facts = _first_beyond(tau, limits.tau)
     return Verdict(Action.DAMP, "torque-limit", facts) if facts else OK
 
 
 def _first_beyond(
-    values: Vector, limits: Sequence[float]
+    values: list[float], limits: Sequence[float]
 ) -> tuple[tuple[str, float], ...]:
-    """Return the facts of the first joint beyond its limit; none if all are within.
-
-    Plain numbers: seven of them are compared faster than numpy looks at an array.
-    """
-    for joint, (value, limit) in enumerate(zip(values.tolist(), limits, strict=True)):
-        if abs(value) > limit:
+    """Return the facts of the first joint beyond its limit; none if all are within."""
+    for joint, (value, limit) in enumerate(zip(values, limits, strict=True)):
+        if not -limit <= value <= limit:
             return ("joint", joint + 1.0), ("value", abs(value)), ("limit", limit)
     return ()
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from acquisition.clock import Clock
 
@@ -9,9 +10,8 @@ PERIOD_NS = 2_000_000
 LATE_NS = 500_000  # a cycle that begins later than this missed its deadline
 
 
-@dataclass(frozen=True, slots=True)
-class Tick:
-    """When a cycle runs.
+class Tick(NamedTuple):
+    """When a cycle runs; a tuple is made in half the time of a frozen dataclass.
 
     Attributes:
         number: cycle number; counts the skipped ones too.

@@ -22,6 +22,7 @@ from acquisition.trial_file.writer import (
 
 FLUSH_NS = 250_000_000
 RATE_HZ = 500
+_BATCH_NS = 20_000_000  # of sensor samples or frames in one message
 PRE_ROLL = 1.0  # what is kept from before the trigger [s]
 
 
@@ -175,9 +176,11 @@ class Recorder:
     def _write_new(self, writer: TrialWriter) -> None:
         self.largest_backlog = max(self.largest_backlog, self._cycles.backlog)
         writer.write_cycles(self._cycles.read())
-        writer.write_wrenches(self._wrenches.read())
+        for batch in _batches(self._wrenches.read()):
+            writer.write_wrenches(batch)
         if self._has_frames:
-            writer.write_can(self._frames.read())
+            for batch in _batches(self._frames.read()):
+                writer.write_can(batch)
         writer.counts.lost_in_ring = self._cycles.lost
         if self._clock.now_ns() - self._flushed_ns >= FLUSH_NS:
             writer.flush()
@@ -203,3 +206,11 @@ def seal(writer: TrialWriter, stop_reason: str) -> Verified:
 def _since(records: Record, earliest_ns: int) -> int:
     """Return how many of `records` are not older than `earliest_ns`."""
     return int(np.count_nonzero(records["t_ns"].astype(np.int64) >= earliest_ns))
+
+
+def _batches(records: Record) -> list[Record]:
+    """Return records with a time, oldest first, in pieces of about 20 ms."""
+    if not len(records):
+        return []
+    span_ns = int(records["t_ns"][-1]) - int(records["t_ns"][0])
+    return np.array_split(records, max(1, round(span_ns / _BATCH_NS)))

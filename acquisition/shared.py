@@ -5,6 +5,7 @@ a record that is half written; what the writer has overwritten is counted as los
 """
 
 import struct
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -57,12 +58,18 @@ class Ring:
         self._bytes[start : start + self._size] = payload
         counter[0] = number + 1
 
-    def pack(self, layout: struct.Struct, *values: object) -> None:
-        """Append one record, given as its values; `layout` covers all of its bytes."""
-        counter = self._counter
+    def pack(self, layout: struct.Struct, rows: Iterable[Sequence[object]]) -> None:
+        """Append one record for each of `rows`, one after the other.
+
+        A row has the values of `layout`, which covers all of a record's bytes.
+        """
+        counter, pack_into, memory = self._counter, layout.pack_into, self._bytes
+        slots, stride = self.slots, self._stride
         number = counter[0]
-        layout.pack_into(self._bytes, number % self.slots * self._stride, *values)
-        counter[0] = number + 1
+        for row in rows:
+            pack_into(memory, number % slots * stride, *row)
+            number += 1
+            counter[0] = number
 
     def reader(self) -> "RingReader":
         """Return a reader that starts at the next record."""

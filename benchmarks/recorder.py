@@ -61,8 +61,8 @@ class Load:
         for _ in range(2):
             wrench = WrenchSample(now_ns, number, (1.0,) * 6, 0, True, False)
             self._board.wrenches.write(pack_wrench(wrench))
-        for frame in range(13):
-            self._tape.add(now_ns, 0x400 + frame, number.to_bytes(8, "little"))
+        data = number.to_bytes(8, "little")
+        self._tape.add([(now_ns, 0x400 + frame, 8, data) for frame in range(13)])
         self.cycles += 1
 
 

@@ -2,6 +2,7 @@
 
 import errno
 from collections import deque
+from typing import NoReturn
 
 import can
 
@@ -36,7 +37,8 @@ class FakeCanBus(can.BusABC):
         """
         if self._is_shutdown:
             raise can.CanOperationError("the bus was shut down")
-        self._check_on()
+        if self._faults.is_off:
+            self._refuse()
         now_ns = self._clock.now_ns()
         self.advance(now_ns)
         if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
@@ -71,7 +73,8 @@ class FakeCanBus(can.BusABC):
         Raises:
             can.CanOperationError: the bus is off.
         """
-        self._check_on()
+        if self._faults.is_off:
+            self._refuse()
         clock = self._clock
         if self._filters is None:  # the way that nearly every question takes
             if not self._inbox:
@@ -102,12 +105,11 @@ class FakeCanBus(can.BusABC):
         patience_ns = _PATIENCE_NS if timeout is None else int(timeout * NS_PER_S)
         return self._clock.wait(_Inbox(self), self._clock.now_ns() + patience_ns)
 
-    def _check_on(self) -> None:
-        """Lose what waits, and say so as an adapter does, while the bus is off."""
-        if self._faults.is_off:
-            self._inbox.clear()
-            self._wired.drop_waiting()
-            raise can.CanOperationError("the controller is bus-off", errno.ENETDOWN)
+    def _refuse(self) -> NoReturn:
+        """Lose what waits, and say so as an adapter does while it is off the bus."""
+        self._inbox.clear()
+        self._wired.drop_waiting()
+        raise can.CanOperationError("the controller is bus-off", errno.ENETDOWN)
 
 
 class _Inbox:

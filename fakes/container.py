@@ -34,12 +34,14 @@ class Container:
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the ground by `dt` [s]; return what it and the boards do."""
         contact = self.ground.step(dt, motion)
-        depth = abs(motion.y) - FREE
-        if depth <= 0.0 or motion.z > _RIM:
+        if -FREE <= motion[1] <= FREE:
             return contact
-        side = math.copysign(1.0, motion.y)
-        board = max(0.0, _K * depth + _B * side * motion.vy)
-        rubbing = _MU * board * math.tanh(motion.vx / 0.01)
-        return contact._replace(
-            F_t=contact.F_t + rubbing, F_y=contact.F_y - side * board
-        )
+        _, y, z, vx, vy, _, _, _, _ = motion
+        if z > _RIM:
+            return contact
+        depth = abs(y) - FREE
+        side = math.copysign(1.0, y)
+        board = max(0.0, _K * depth + _B * side * vy)
+        rubbing = _MU * board * math.tanh(vx / 0.01)
+        F_t, F_y, F_n, M_x, M_y, M_z = contact
+        return F_t + rubbing, F_y - side * board, F_n, M_x, M_y, M_z

@@ -11,32 +11,17 @@ from fakes.profile import locate, smooth_profile
 
 _K_TURN = 10.0  # N m/rad, about each axis
 _ARM = 0.03  # torsional friction limit per newton of normal force [m]
+_TURN_PER_N = _ARM / _K_TURN  # stretch of a torsional bristle at its limit [rad/N]
 
 
-class Bristle:
-    """Elastic-plastic bristle: stiffness in the unit asked for, a limit at each step.
+def stretched(stretch: float, moved: float, most: float) -> float:
+    """Return the stretch of an elastic-plastic bristle that has `moved` on.
 
-    Its stored energy never grows by a change of the limit.
+    It slips at `most`, a limit that may be another at every step; the stored energy
+    never grows by a change of it.
     """
-
-    def __init__(self, stiffness: float) -> None:
-        self._stiffness = stiffness
-        self._stretch = 0.0
-
-    def release(self) -> None:
-        """Lose contact."""
-        self._stretch = 0.0
-
-    def step(self, moved: float, limit: float) -> float:
-        """Return the force against a displacement of `moved` since the last step."""
-        stretch = self._stretch + moved
-        most = limit / self._stiffness
-        if stretch > most:
-            stretch = most
-        elif stretch < -most:
-            stretch = -most
-        self._stretch = stretch
-        return -self._stiffness * stretch
+    stretch += moved
+    return most if stretch > most else -most if stretch < -most else stretch
 
 
 class Footing:
@@ -55,14 +40,12 @@ class Footing:
         """
         self._cop_x = (spread * smooth_profile(rng, length)).tolist()
         self._cop_y = (spread * smooth_profile(rng, length)).tolist()
-        self._lateral = Bristle(stiffness)
-        self._turns = tuple(Bristle(_K_TURN) for _ in range(3))
+        self._stiffness = stiffness
+        self.release()
 
     def release(self) -> None:
         """Lose contact."""
-        self._lateral.release()
-        for bristle in self._turns:
-            bristle.release()
+        self._aside = self._turn_x = self._turn_y = self._turn_z = 0.0
 
     def centre_of_pressure(self, x: float) -> tuple[float, float]:
         """Return its offset from the sole's centre with the sole at `x` [m]."""
@@ -87,16 +70,20 @@ class Footing:
         """
         if F_n <= 0.0:
             self.release()
-            return Contact(F_t, 0.0, 0.0)
-        limit = _ARM * F_n
-        turn_x, turn_y, turn_z = self._turns
-        x, y = self.centre_of_pressure(motion.x)
-        F_y = self._lateral.step(motion.vy * dt, mu * F_n)
-        return Contact(
+            return F_t, 0.0, 0.0, 0.0, 0.0, 0.0
+        at, _, _, _, vy, _, wx, wy, wz = motion
+        x, y = self.centre_of_pressure(at)
+        k, most = self._stiffness, _TURN_PER_N * F_n
+        self._aside = aside = stretched(self._aside, vy * dt, mu * F_n / k)
+        self._turn_x = turn_x = stretched(self._turn_x, wx * dt, most)
+        self._turn_y = turn_y = stretched(self._turn_y, wy * dt, most)
+        self._turn_z = turn_z = stretched(self._turn_z, wz * dt, most)
+        F_y = -k * aside
+        return (
             F_t,
             F_y,
             F_n,
-            y * F_n + turn_x.step(motion.wx * dt, limit),
-            -x * F_n + turn_y.step(motion.wy * dt, limit),
-            x * F_y + y * F_t + turn_z.step(motion.wz * dt, limit),
+            y * F_n - _K_TURN * turn_x,
+            -x * F_n - _K_TURN * turn_y,
+            x * F_y + y * F_t - _K_TURN * turn_z,
         )

@@ -35,6 +35,10 @@ class Phase(Enum):
     AWAY = auto()
 
 
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_CARRY, _REST, _PUSH, _AWAY = Phase.CARRY, Phase.REST, Phase.PUSH, Phase.AWAY
+
+
 class Hand:
     """Does what it is told, with forces a person could exert."""
 
@@ -58,7 +62,7 @@ class Hand:
     @property
     def is_holding(self) -> bool:
         """Whether the hand is on the arm."""
-        return self.phase is not Phase.AWAY
+        return self.phase is not _AWAY
 
     def carry(self, *points: Vector3) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
@@ -96,12 +100,13 @@ class Hand:
         if self._pending is not None:
             self._push = Push(*self._pending, view, self._dt)
             self._pending = None
-            self.phase = Phase.PUSH
-        if self.phase is Phase.PUSH and self._push is not None:
+            self.phase = _PUSH
+        phase = self.phase
+        if phase is _PUSH and self._push is not None:
             return self._push.step(view)
-        if self.phase is Phase.CARRY:
+        if phase is _CARRY:
             return self._carry_force(view)
-        if self.phase is Phase.REST:
+        if phase is _REST:
             return self._rest_force(view)
         return 0.0, 0.0, 0.0
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fakes.randomness import NormalStream
+from fakes.randomness import DrawnAhead, NormalStream
 from fakes.stone_sizes import StoneParameters
 
 _PHI = math.radians(35.0)  # friction angle of the bed
@@ -52,6 +52,7 @@ class Jams:
         self._strength = strength
         self._rng = rng
         self._normals = NormalStream(rng)
+        self._chances = DrawnAhead(rng)
         self._c_t = _C_T / parameters.N
         self._b_g = _B_G / parameters.N
         self.releases = 0
@@ -70,16 +71,15 @@ class Jams:
         """
         x, vx = motion
         capacity = self._capacity(dt, F_n)
-        creep = self._creep(self._elastic / capacity) * dt
-        skin = _MU_R * F_n / self._weights
-        sign = math.tanh(vx / 0.01)
-        total = elastic = 0.0
-        detached = 0
+        load = self._elastic / capacity
+        creep = _V_C * math.exp((load - 1.0) / _A_C) * dt if 0.3 < load < 1.5 else 0.0
+        skin = _MU_R * F_n / self._weights  # per share of the load
+        elastic = rolling = 0.0
+        pushed = detached = 0
         for stone in self._stones:
-            rest = skin * stone.weight
             anchor = stone.anchor
             if anchor is None:
-                total += rest * sign
+                rolling += stone.weight
                 detached += 1
                 if x > stone.engage_at and F_n > _TOUCH:
                     stone.anchor = x
@@ -88,22 +88,23 @@ class Jams:
             force = stone.k * (x - anchor)
             if force > stone.capacity:
                 self._break(stone, x)
-                total += rest * sign
+                rolling += stone.weight
                 continue
-            if force < -rest:
+            if force > 0.0:
+                pushed += 1
+            elif force < -skin * stone.weight:
                 # the flank separates: only skin friction resists backward motion
-                anchor = x + rest / stone.k
-                force = -rest
+                force = -skin * stone.weight
+                anchor = x - force / stone.k
             stone.anchor = anchor
             elastic += force
-            total += force
-            if force > 0.0:
-                total += self._c_t * vx
-        total += self._b_g * vx * detached
         self._elastic = elastic
         self._is_loaded = detached < len(self._stones)
         if self._is_loaded:
             self._collapse_or_shuffle(dt, x, elastic / capacity, sunk)
+        total = elastic + (self._c_t * pushed + self._b_g * detached) * vx
+        if rolling:
+            total += skin * rolling * math.tanh(vx / 0.01)
         return total
 
     def lose_contact(self) -> None:
@@ -122,32 +123,28 @@ class Jams:
         capacity = strength if strength < grip else grip
         return capacity if capacity > _LITTLE else _LITTLE
 
-    @staticmethod
-    def _creep(load: float) -> float:
-        """Return the speed of the anchors [m/s] under a share `load` of capacity."""
-        if 0.3 < load < 1.5:
-            return _V_C * math.exp((load - 1.0) / _A_C)
-        return 0.0
-
     def _collapse_or_shuffle(
         self, dt: float, x: float, load: float, sunk: float
     ) -> None:
         if load > 1.0:
+            self._chances.give_back()
             p = self._p
             run_out = p.run * p.d50 * float(self._rng.gamma(p.k_run, 1.0 / p.k_run))
             self.releases += 1
             self._form(x + run_out, sunk)
-        elif float(self._rng.random()) < (_LAM0 + _LAM1 * load * load) * dt:
+        elif self._chances.next() < (_LAM0 + _LAM1 * load * load) * dt:
             self._shuffle(x)
 
     def _shuffle(self, x: float) -> None:
         """Let one attached contact lose some of its stretch."""
         attached = [(s, s.anchor) for s in self._stones if s.anchor is not None]
         if attached:
+            self._chances.give_back()
             stone, anchor = attached[int(self._rng.integers(len(attached)))]
             stone.anchor = anchor + float(self._rng.uniform(0.3, 1.0)) * (x - anchor)
 
     def _break(self, stone: _Stone, x: float) -> None:
+        self._chances.give_back()
         p = self._p
         stone.anchor = None
         stone.engage_at = x + p.gap * p.d50 * float(self._rng.gamma(2.0, 0.5))

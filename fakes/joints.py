@@ -54,16 +54,16 @@ class JointResistance:
         inertias: list[float] = []
         torques: list[float] = []
         dt, tanh = self._dt, math.tanh
+        add_inertia, add_torque = inertias.append, torques.append
         for angle, rate, joint in zip(q, qd, self._joints, strict=True):
             drive, dry, damping, lower, upper = joint
-            if dry:
-                speed = (rate if rate > 0.0 else -rate) + _STANDSTILL
-                damping += dry * tanh(speed / _EPSILON) / speed
+            speed = (rate if rate > 0.0 else -rate) + _STANDSTILL
+            damping += dry * tanh(speed / _EPSILON) / speed
             if lower <= angle <= upper:
-                torques.append(-damping * rate)
+                add_torque(-damping * rate)
             else:
                 damping += _STOP_B
                 beyond = angle - (lower if angle < lower else upper)
-                torques.append(-_STOP_K * beyond - damping * rate)
-            inertias.append(drive + dt * damping)
+                add_torque(-_STOP_K * beyond - damping * rate)
+            add_inertia(drive + dt * damping)
         return inertias, torques

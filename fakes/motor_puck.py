@@ -1,7 +1,7 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
 from fakes.network_options import NetworkOptions
-from fakes.puck_life import Power, PuckLife
+from fakes.puck_life import AWAKE, Power, PuckLife
 from wam.frames import position_reply_id
 from wam.pucks import (
     MAGNETIC_ENCODER,
@@ -14,7 +14,6 @@ from wam.pucks import (
 )
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
-_AWAKE = Power.AWAKE
 _DRIVEN = PuckMode.TORQUE
 READ_ONLY = frozenset(
     ("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM", "VBUS")
@@ -61,7 +60,7 @@ class MotorPuck:
     @property
     def is_awake(self) -> bool:
         """Whether its firmware runs."""
-        return self.life.power is _AWAKE
+        return self.life.power is AWAKE
 
     @property
     def is_driven(self) -> bool:
@@ -95,7 +94,9 @@ class MotorPuck:
         properties = self.properties
         if properties["MODE"] == _DRIVEN:
             limit = properties["MT"]
-            self.torque = max(-limit, min(units, limit))
+            self.torque = (
+                limit if units > limit else -limit if units < -limit else units
+            )
 
     def restart(self, power: Power) -> None:
         """Lose what a puck loses with its program."""

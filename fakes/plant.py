@@ -11,12 +11,14 @@ implicit part is an addition to the armature, so one articulated-body pass solve
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor
+from struct import Struct
 
 import numpy as np
 import pinocchio as pin
 
-from fakes.contact import NO_CONTACT, Motion
+from fakes.contact import NO_CONTACT
 from fakes.hand import Hand
+from fakes.joint_state import JointState
 from fakes.joints import JointResistance
 from fakes.push import HandView
 from fakes.terrain import Terrain
@@ -34,6 +36,9 @@ _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
+_new = tuple.__new__
+# Wrench on foot and hand, torques that resist and that drive the joints, inertias.
+_LOADS = Struct("33d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +60,6 @@ class ArmPlant:
     """Implements fakes.puck_bank.MotorSide with the dynamics of the whole arm.
 
     Attributes:
-        q: joint positions [rad], shape (7,).
-        qd: joint velocities [rad/s], shape (7,).
         disturbance: joint torques from outside [N m], shape (7,).
         terrain: the ground; None = the foot hangs above nothing.
         hand: the operator's.
@@ -76,27 +79,27 @@ class ArmPlant:
         options = options or PlantOptions()
         self._constants = constants
         self._model = model = build_pinocchio(constants, (tool.sensor, tool.foot))
+        self._stand_in(frame)
         self._add_forearm(constants)
         self._sole = add_point(model, constants, "sole", tool.sole)
         self._data = model.createData()
-        self._wrist = Wrist(tool, frame.axes(), CYCLE_NS * 1e-9)
+        self._wrist = Wrist(tool, frame.axes()[:, 2], CYCLE_NS * 1e-9)
         self._substeps = options.substeps
         self._substep_ns = CYCLE_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
         self._resistance = JointResistance(constants, options.friction, self._dt)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
-        self._midway = 0.5 * (CYCLE_NS - self._substep_ns) * 1e-9
-        self._R = frame.axes()
-        self._R4 = np.kron(np.eye(4), self._R)
-        self._origin = np.array(frame.far_end)
-        self._up: list[float] = (self._R[:, 2] * FOREARM_MASS * GRAVITY).tolist()
+        midway = 0.5 * (CYCLE_NS - self._substep_ns) * 1e-9
+        self._midway = np.array([1.0, midway, 0.0])
+        up = frame.axes()[:, 2]
+        self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
         # counts of the encoders per joint angle, joint torque per puck unit
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
         self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._tau = np.zeros(7)
+        self._driving = [0.0] * 7
         self._is_held = True
-        self.q, self.qd, self._qdd = q.copy(), np.zeros(7), np.zeros(7)
         self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
         self.hand = Hand(self._dt)
@@ -106,15 +109,31 @@ class ArmPlant:
         self._sum = _NOTHING  # of the ground's wrench over a cycle
         self._ground = [0.0] * 6  # its mean
         self._push = (0.0, 0.0, 0.0)
-        pin.computeJointJacobians(model, self._data, self.q)
-        hand = pin.updateFramePlacement(model, self._data, self._hand)
+        self._joints = JointState(q, self._dt)
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Lay out what every substep uses again; the hand keeps the turn of now."""
+        pin.forwardKinematics(self._model, self._data, self.q)
+        hand = pin.updateFramePlacement(self._model, self._data, self._hand)
         self._wanted = hand.rotation.copy()
-        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn; the joints.
-        self._B = np.vstack((np.zeros((12, 7)), np.eye(7)))
+        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn; the joints,
+        # for the torques that resist and for those of motors and disturbance.
+        self._B = np.vstack((np.zeros((12, 7)), np.eye(7), np.eye(7)))
         self._A = self._B[:12]
         self._rates = [0.0] * 12
+        self._loads = bytearray(_LOADS.size)
+        loads = np.frombuffer(self._loads)
+        self._torques, self._inertias = loads[:26], loads[26:]
         self._linearise()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
+
+    def _stand_in(self, frame: TerrainFrame) -> None:
+        """Let the terrain frame be the world of the model: nothing is to be turned."""
+        model, axes = self._model, frame.axes()
+        base = pin.SE3(axes, -axes.dot(frame.far_end))
+        model.jointPlacements[1] = base * model.jointPlacements[1]
+        model.gravity.linear = axes.dot(model.gravity.linear)
 
     def _add_forearm(self, constants: ArmConstants) -> None:
         """Add the hand's frame on link 6 and the mass of a forearm in it."""
@@ -129,11 +148,26 @@ class ArmPlant:
         arm = pin.Inertia(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
         model.appendBodyToJoint(6, placement.act(arm), pin.SE3.Identity())
 
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], shape (7,); as they are now, also later."""
+        return self._joints.rows[0]
+
+    @q.setter
+    def q(self, q: Array) -> None:
+        self._joints.move(q)
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        return self._joints.rows[1]
+
     # --- what the pucks see -------------------------------------------------------
 
     def advance(self, t_ns: int) -> None:
         """Let the world go on to `t_ns`, in whole substeps."""
-        while self.t_ns + self._substep_ns <= t_ns:
+        last_ns = t_ns - self._substep_ns
+        while self.t_ns <= last_ns:
             self._step()
 
     def counts(self) -> Sequence[int]:
@@ -142,25 +176,28 @@ class ArmPlant:
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        self._tau = self._of_units.dot(units)
+        self._tau = tau = self._of_units.dot(units)
+        self._driving = (tau + self.disturbance).tolist()
 
     def set_braking(self, is_braked: bool, is_powered: bool) -> None:
         """Hold the joints (braked), or let them follow torque or fall."""
         self._is_held = is_braked and is_powered
         if self._is_held:
-            self.qd, self._qdd = np.zeros(7), np.zeros(7)
+            self._joints.rest(self.q)
             self._rates = [0.0] * 12
         if is_braked or not is_powered:
             self._tau = np.zeros(7)
+            self._driving = self.disturbance.tolist()
 
     # --- what the sensor feels ----------------------------------------------------
 
     def sensor_load(self, t_ns: int) -> Wrench:
         """Return the load on the wrist sensor in its own frame [N, N m].
 
-        Its mean over the cycle that ended last.
+        Its mean over the cycle that ended last; the steps after that can wait, for
+        several in one go take less time.
         """
-        self.advance(t_ns)
+        self.advance(t_ns - t_ns % CYCLE_NS)
         return self._wrist.load()
 
     # --- the world ----------------------------------------------------------------
@@ -198,19 +235,20 @@ class ArmPlant:
         x, y, z = self._sole_at
         contact = NO_CONTACT
         if self.terrain is not None:
-            motion = Motion(x, y, z, sx, sy, sz, fx, fy, fz)
-            contact = self.terrain.step(self._dt, motion)
-        view = HandView((x, y, z), (sx, sy, sz), self._hand_at, (hx, hy, hz))
+            contact = self.terrain.step(self._dt, (x, y, z, sx, sy, sz, fx, fy, fz))
+        # What HandView(...) does, without a call of Python.
+        view = _new(HandView, ((x, y, z), (sx, sy, sz), self._hand_at, (hx, hy, hz)))
         self._push = push = self.hand.step(view)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
         a, b, c, d, e, f = self._sum
         self._sum = (a - F_t, b + F_y, c + F_n, d + M_x, e + M_y, f + M_z)
         if not self._is_held:
             k, b = _GRIP if self.hand.is_holding else _NO_GRIP
+            px, py, pz = push
             ux, uy, uz = self._up
             ex, ey, ez = self._tilt
             ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
-            held = (push[0] + ux, push[1] + uy, push[2] + uz)
+            held = (px + ux, py + uy, pz + uz)
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
             self._integrate((*ground, *held, *turned))
         if self.t_ns % CYCLE_NS == 0:
@@ -222,42 +260,37 @@ class ArmPlant:
         Within the 2 ms sole and hand move along them; the joints themselves and their
         dynamics are never linearised. Everything is in the terrain frame.
         """
-        model, data, R, A = self._model, self._data, self._R, self._A
-        pin.computeJointJacobians(model, data, self.q)
+        model, data, A = self._model, self._data, self._A
+        pin.forwardKinematics(model, data, self.q)
         sole = pin.updateFramePlacement(model, data, self._sole)
         hand = pin.updateFramePlacement(model, data, self._hand)
         self._foot_rotation = sole.rotation.copy()
-        sole_at, hand_at = sole.translation.copy(), hand.translation.copy()
-        E = self._wanted @ hand.rotation.T
-        pin.computeJointJacobians(model, data, self.q + self._midway * self.qd)
+        x, y, z = sole.translation.tolist()
+        self._sole_at = (x, y, z)
+        x, y, z = hand.translation.tolist()
+        self._hand_at = (x, y, z)
+        E = self._wanted.dot(hand.rotation.T)
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = E.tolist()
+        self._tilt = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
+        pin.computeJointJacobians(model, data, self._midway.dot(self._joints.rows))
         pin.updateFramePlacement(model, data, self._sole)
         pin.updateFramePlacement(model, data, self._hand)
-        J_s = pin.getFrameJacobian(model, data, self._sole, _AXES)
-        J_h = pin.getFrameJacobian(model, data, self._hand, _AXES)
-        np.dot(self._R4, np.concatenate((J_s, J_h)), out=A)
+        A[:6] = pin.getFrameJacobian(model, data, self._sole, _AXES)
+        A[6:] = pin.getFrameJacobian(model, data, self._hand, _AXES)
         self._rates = A.dot(self.qd).tolist()
-        x, y, z = R.dot(sole_at - self._origin).tolist()
-        self._sole_at = (x, y, z)
-        x, y, z = R.dot(hand_at - self._origin).tolist()
-        self._hand_at = (x, y, z)
-        turn = (E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1])
-        x, y, z = R.dot(turn).tolist()
-        self._tilt = (0.5 * x, 0.5 * y, 0.5 * z)
+        self._driving = (self._tau + self.disturbance).tolist()
 
     def _integrate(self, wrench: tuple[float, ...]) -> None:
         """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
-        q, qd, dt, model = self.q, self.qd, self._dt, self._model
-        inertias, resistance = self._resistance.at(q.tolist(), qd.tolist())
-        model.armature = np.array(inertias)
-        from_outside = np.array((*wrench, *resistance)).dot(self._B)
-        tau = self._tau + self.disturbance + from_outside
-        # Velocities stand half a step behind positions; the speed-dependent part of
-        # the dynamics takes them where the positions are, or a free swing loses energy.
-        now = qd + 0.5 * dt * self._qdd
-        self._qdd = qdd = pin.aba(model, self._data, q, now, tau)
-        self.qd = qd + dt * qdd
-        self.q = q + dt * self.qd
-        self._rates = rates = self._A.dot(self.qd).tolist()
+        dt, model, state = self._dt, self._model, self._joints.rows
+        q, qd, _ = state.tolist()
+        inertias, resistance = self._resistance.at(q, qd)
+        loads = (*wrench, *resistance, *self._driving, *inertias)
+        _LOADS.pack_into(self._loads, 0, *loads)
+        model.armature = self._inertias
+        tau = self._torques.dot(self._B)
+        qdd = pin.aba(model, self._data, state[0], state[2], tau)
+        self._rates = rates = self._A.dot(self._joints.step(qdd)[1]).tolist()
         sx, sy, sz, _, _, _, hx, hy, hz, wx, wy, wz = rates
         x, y, z = self._sole_at
         self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
@@ -270,10 +303,11 @@ class ArmPlant:
         self._ground = ground = [total / self._substeps for total in self._sum]
         self._sum = _NOTHING
         # The hand that holds the arm gives way to nothing that small.
-        felt = [force + more for force, more in zip(ground, self.finger, strict=False)]
-        felt += ground[3:]
+        fx, fy, fz = self.finger
+        x, y, z, *moment = ground
+        felt = (x + fx, y + fy, z + fz, *moment)
         self._wrist.end_cycle(self._foot_rotation, felt, self._rates[:6])
         if self.truth is not None:
-            force = (-ground[0], ground[1], ground[2])
             foot = (*self._sole_at, *self._rates[:3])
-            self.truth.add(self.t_ns, (*self.q.tolist(), *foot, *force, *self._push))
+            row = (*self.q.tolist(), *foot, -x, y, z, *self._push)
+            self.truth.add(self.t_ns, row)

@@ -68,13 +68,13 @@ class Plate:
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bristle by `dt` and return the force."""
         p = self._p
-        if motion.z >= 0.0:
+        x, _, z, v, _, vz, _, _, _ = motion
+        if z >= 0.0:
             self._bristle = self._pressed = 0.0
             self._footing.release()
             return NO_CONTACT
-        F_n = max(0.0, -p.k_n * motion.z - self._c_n * motion.vz)
-        v = motion.vx
-        m = self._level * value_at(self._texture, motion.x)
+        F_n = max(0.0, -p.k_n * z - self._c_n * vz)
+        m = self._level * value_at(self._texture, x)
         g = (p.mu_k + (p.mu_s - p.mu_k) * math.exp(-((v / p.v_S) ** 2))) * m
         before = self._bristle
         if F_n > self._pressed:
@@ -83,10 +83,9 @@ class Plate:
             before *= self._pressed / F_n
         self._pressed = F_n
         # backward Euler in z: the bristle is stiff at high speed
-        z = (before + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
+        bristle = (before + dt * v) / (1.0 + dt * p.s0 * abs(v) / g)
         limit = p.mu_s * m / p.s0
-        z = min(max(z, -limit), limit)
-        dz = (z - before) / dt
-        self._bristle = z
-        F_t = F_n * (p.s0 * z + p.s1 * dz) + p.b * v * min(1.0, F_n)
+        self._bristle = bristle = min(max(bristle, -limit), limit)
+        rate = (bristle - before) / dt
+        F_t = F_n * (p.s0 * bristle + p.s1 * rate) + p.b * v * min(1.0, F_n)
         return self._footing.step(dt, motion, F_t, F_n, p.mu_k)

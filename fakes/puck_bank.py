@@ -7,7 +7,7 @@ from typing import Protocol
 from acquisition.devices import SafetyMode
 from fakes.motor_puck import READ_ONLY, MotorPuck
 from fakes.network_options import NetworkOptions
-from fakes.puck_life import Power, PuckLife, power_after, power_at_start
+from fakes.puck_life import AWAKE, Power, PuckLife, power_after, power_at_start
 from fakes.safety_module import puck_mode_in
 from fakes.schedule import Schedule
 from wam.frames import (
@@ -124,7 +124,7 @@ class PuckBank:
             for puck in pucks:
                 self._tell(puck, number, request.value)
             return
-        feedback = [p for p in pucks if p.p_number == number and p.is_awake]
+        feedback = [p for p in pucks if p.p_number == number and p.life.power is AWAKE]
         if feedback:
             self._schedule.after(self._options.latch_ns, lambda: self._report(feedback))
             return
@@ -140,7 +140,8 @@ class PuckBank:
         counts = self._encoder_counts()
         reported: dict[int, int] = {}
         for puck in pucks:
-            if puck.is_awake and not puck.life.is_mute:
+            life = puck.life
+            if life.power is AWAKE and not life.is_mute:
                 node = puck.node
                 position = wrap_position(counts[node - 1] + puck.offset)
                 self._schedule.emit(puck.position_id, encode_position(position))

@@ -22,6 +22,11 @@ class Power(Enum):
     AWAKE = "running"
 
 
+# Named once: to look a member of an Enum up takes longer than to compare it.
+AWAKE = Power.AWAKE
+_LISTENING = (Power.AWAKE, Power.MONITOR)
+
+
 def power_at_start(options: NetworkOptions) -> Power:
     """Return how the pucks are found."""
     if not options.has_power:
@@ -56,7 +61,7 @@ class PuckLife:
     @property
     def is_listening(self) -> bool:
         """Whether it takes frames at all."""
-        return self.power in (Power.AWAKE, Power.MONITOR)
+        return self.power in _LISTENING
 
     def enter(self, power: Power) -> None:
         """Begin another life; what was planned in the last one is void."""

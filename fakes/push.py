@@ -83,11 +83,11 @@ class Push:
         self._K = pace.stiffness * math.exp(0.15 * n.next())
         self._speed = pace.speed * math.exp(0.22 * n.next())
         self._beta = math.radians(4.0 + 6.0 * n.next())
-        self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n)
-        self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n)
-        self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n)
-        self._press = OrnsteinUhlenbeck(0.8, 0.8, dt, n)
-        self._tremor = Tremor(dt, n)
+        self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n).step
+        self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n).step
+        self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n).step
+        self._press = OrnsteinUhlenbeck(0.8, 0.8, dt, n).step
+        self._tremor = Tremor(dt, n).step
         self._wait = float(rng.uniform(0.6, 1.0))
         self._age = 0.0
         self._x0 = view.hand[0]
@@ -107,15 +107,23 @@ class Push:
         x, y, _ = view.hand
         vx, vy, _ = view.hand_v
         self._watch(view.sole[0], view.sole_v[0])
-        begun = _between(0.0, (self._age - self._wait) / _RAMP, 1.0)
-        v_e = begun * self._speed * max(0.0, 1.0 + self._wander.step())
-        spring = self._K * (self._xe - (x - self._x0))
+        begun = (self._age - self._wait) / _RAMP
+        begun = 0.0 if begun < 0.0 else begun if begun < 1.0 else 1.0
+        pace = 1.0 + self._wander()
+        v_e = begun * self._speed * pace if pace > 0.0 else 0.0
+        moved = x - self._x0
+        spring = self._K * (self._xe - moved)
         room = (self._strongest - spring) / (0.3 * self._strongest)
-        self._xe += dt * v_e * _between(0.0, room, 1.0)
-        self._react(x - self._x0, spring)
-        force = max(spring + PUSH_B * (v_e - vx), _WEAKEST)
-        unsteady = force * self._effort.step()
-        force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor.step()
+        if room > 0.0:
+            self._xe += dt * v_e * (room if room < 1.0 else 1.0)
+        if self._react_in is None:
+            self._react_force = spring
+        else:
+            self._react(self._react_in - dt, moved)
+        force = spring + PUSH_B * (v_e - vx)
+        force = force if force > _WEAKEST else _WEAKEST
+        unsteady = force * self._effort()
+        force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor()
         aside, lift = _ON_THE_WAY
         if self._pace.mishaps is not NO_MISHAPS:
             aside, lift = self._pace.mishaps.at(view.sole[0])
@@ -124,8 +132,9 @@ class Push:
 
     def _upward(self, push: float, view: HandView, begun: float, lift: float) -> float:
         dt, z, vz = self._dt, view.hand[2], view.hand_v[2]
-        tilt = _between(_FLATTEST, self._beta + self._tilt.step(), _STEEPEST)
-        wander = self._press.step() * begun
+        tilt = self._beta + self._tilt()
+        tilt = _FLATTEST if tilt < _FLATTEST else min(tilt, _STEEPEST)
+        wander = self._press() * begun
         self._z_ref += dt * (z - self._z_ref) / _Z_TIME
         if lift > 0.0:
             if self._z_rest is None:
@@ -151,19 +160,11 @@ class Push:
             reaction = _REACTION + _REACTION_SPREAD * self._n.next()
             self._react_in = max(_FASTEST_REACTION, reaction)
 
-    def _react(self, x: float, spring: float) -> None:
-        """After a slip, and a reaction time, let the target go back."""
-        if self._react_in is None:
-            self._react_force = spring
-            return
-        self._react_in -= self._dt
-        if self._react_in <= 0.0:
+    def _react(self, left: float, x: float) -> None:
+        """When nothing is `left` [s] of the reaction time, let the target go back."""
+        self._react_in = left
+        if left <= 0.0:
             share = float(self._rng.uniform(0.1, 0.5))
             self._xe = x + share * max(self._react_force, 0.0) / self._K
             self._react_in = None
             self._deaf = _DEAF
-
-
-def _between(least: float, value: float, most: float) -> float:
-    """Return `value` within its limits; quicker than two built-in functions."""
-    return least if value < least else most if value > most else value

@@ -3,6 +3,8 @@
 import math
 import zlib
 from collections.abc import Callable, Iterator
+from itertools import chain
+from operator import length_hint
 from typing import NamedTuple
 
 import numpy as np
@@ -29,8 +31,9 @@ def trial_generators(seed: int, terrain: str, trial: int) -> TrialGenerators:
     return TrialGenerators(*trial_generator(seed, terrain, trial).spawn(3))
 
 
-# The processes below step up to 40 times per cycle of 2 ms. As generators they keep
-# their frame between steps, which costs a third of a method's call.
+# Streams and processes below step up to 50 times per cycle of 2 ms. A chain hands the
+# numbers of a block out at half the cost of a generator, and a generator keeps its
+# frame between steps, which costs a third of a method's call.
 
 
 class NormalStream:
@@ -41,45 +44,88 @@ class NormalStream:
     """
 
     def __init__(self, generator: np.random.Generator, block: int = 4096) -> None:
-        self.next: Callable[[], float] = _normals(generator, block).__next__
+        blocks = _blocks(generator, block)
+        self.next: Callable[[], float] = chain.from_iterable(blocks).__next__
 
 
-def _normals(generator: np.random.Generator, block: int) -> Iterator[float]:
+def _blocks(generator: np.random.Generator, block: int) -> Iterator[list[float]]:
     while True:
-        yield from generator.standard_normal(block).tolist()
+        yield generator.standard_normal(block).tolist()
+
+
+def _nothing() -> Iterator[float]:
+    empty: list[float] = []
+    return iter(empty)
+
+
+class DrawnAhead:
+    """Numbers from 0 to below 1, drawn in blocks of which the rest can be given back.
+
+    Whoever draws from the generator after `give_back` draws what he would have drawn
+    if the numbers had been taken one by one.
+    """
+
+    def __init__(self, generator: np.random.Generator, block: int = 64) -> None:
+        self._generator = generator
+        self._block = block
+        self._state = generator.bit_generator.state
+        self._rest = _nothing()
+
+    def next(self) -> float:
+        """Return the next number."""
+        for number in self._rest:
+            return number
+        self._state = self._generator.bit_generator.state
+        self._rest = iter(self._generator.random(self._block).tolist())
+        return next(self._rest)
+
+    def give_back(self) -> None:
+        """Let the generator stand right behind the last number that was taken."""
+        left = length_hint(self._rest)
+        if left:
+            self._generator.bit_generator.state = self._state
+            self._generator.random(self._block - left)
+            self._rest = _nothing()
+
+
+def exact_step(sd: float, time: float, dt: float) -> tuple[float, float]:
+    """Return (a, b) of a step x <- a x + b n of an Ornstein-Uhlenbeck process.
+
+    a = exp(-dt / time), b = sd sqrt(1 - a^2): exact for any length of step.
+
+    Args:
+        sd: standard deviation of the process.
+        time: over which it forgets [s].
+        dt: length of the step [s].
+    """
+    keep = math.exp(-dt / time)
+    return keep, sd * math.sqrt(1.0 - keep**2)
 
 
 class OrnsteinUhlenbeck:
     """Zero-mean Ornstein-Uhlenbeck process of standard deviation `sd`.
 
-    It begins anywhere in its stationary distribution and steps exactly:
-    x <- a x + sd sqrt(1 - a^2) n with a = exp(-dt / time).
+    It begins anywhere in its stationary distribution; see `exact_step`.
 
     Attributes:
         step: advances by one time step and returns the value.
-        value: the value now.
     """
 
     def __init__(
         self, sd: float, time: float, dt: float, normals: NormalStream
     ) -> None:
-        self._sd = sd
-        self._time = time
-        self._normals = normals
-        self.value = sd * normals.next()
-        self.set_dt(dt)
-        self.step: Callable[[], float] = self._walk().__next__
+        start = sd * normals.next()
+        walk = _walk(start, *exact_step(sd, time, dt), normals)
+        self.step: Callable[[], float] = walk.__next__
 
-    def set_dt(self, dt: float) -> None:
-        """Let every step from now on be `dt` [s] long."""
-        self._keep = math.exp(-dt / self._time)
-        self._kick = self._sd * math.sqrt(1.0 - self._keep**2)
 
-    def _walk(self) -> Iterator[float]:
-        next_normal = self._normals.next
-        while True:
-            self.value = value = self._keep * self.value + self._kick * next_normal()
-            yield value
+def _walk(
+    value: float, keep: float, kick: float, normals: NormalStream
+) -> Iterator[float]:
+    next_normal = normals.next
+    while True:
+        value = keep * value + kick * next_normal()
+        yield value
 
 
 class Tremor:
@@ -96,12 +142,12 @@ class Tremor:
 def _resonance(dt: float, normals: NormalStream) -> Iterator[float]:
     """Yield the resonator's values; semi-implicit Euler."""
     omega, zeta = 2.0 * math.pi * 9.5, 0.15
-    square, damping = omega * omega, 2.0 * zeta * omega
+    spring, keep = -dt * omega * omega, 1.0 - dt * 2.0 * zeta * omega
     # white input of this intensity gives unit variance: S = 4 zeta omega^3
     intensity = math.sqrt(4.0 * zeta * omega**3 * dt)
-    x, v = normals.next(), omega * normals.next()
+    next_normal = normals.next
+    x, v = next_normal(), omega * next_normal()
     while True:
-        kick = intensity * normals.next()
-        v += dt * (-square * x - damping * v) + kick
+        v = keep * v + spring * x + intensity * next_normal()
         x += dt * v
         yield x

@@ -29,6 +29,9 @@ _POWER_UP_LIMITS = {
 _FAULT_LIMITS = {"velocity": "VL2", "torque": "TL2"}
 NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
 _PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_ACTIVE = SafetyMode.ACTIVE
+_SAFE, _WARNING, _FAULT = Level.SAFE, Level.WARNING, Level.FAULT
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
 
 
@@ -58,9 +61,9 @@ class FakeSafetyModule:
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
-        self._levels: dict[str, Level] = dict.fromkeys(MONITORS, Level.SAFE)
+        self._levels: dict[str, Level] = dict.fromkeys(MONITORS, _SAFE)
         if not options.has_power:
-            self._levels["other"] = Level.FAULT
+            self._levels["other"] = _FAULT
         self._speeds = SpeedWatch(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
@@ -88,22 +91,22 @@ class FakeSafetyModule:
             **self._levels,
             segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
             is_idle_lit=self.mode is SafetyMode.IDLE,
-            is_active_lit=self.mode is SafetyMode.ACTIVE,
+            is_active_lit=self.mode is _ACTIVE,
             button=Button.E_STOP if is_stopped else Button.NONE,
         )
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant."""
         if action == "estop":
-            self._levels["other"] = Level.FAULT
+            self._levels["other"] = _FAULT
             self._enter(SafetyMode.E_STOP)
         elif action == "idle":
-            self._levels = dict.fromkeys(self._levels, Level.SAFE)
+            self._levels = dict.fromkeys(self._levels, _SAFE)
             self._enter(SafetyMode.IDLE)
             self._judge_torque()
             self._judge_voltage()
         elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
-            self._enter(SafetyMode.ACTIVE)
+            self._enter(_ACTIVE)
 
     def forget_positions(self) -> None:
         """Know no longer where the joints are, as after power-up."""
@@ -160,7 +163,7 @@ class FakeSafetyModule:
 
     def _feel_beat(self) -> None:
         """Wait for the next position until the heartbeat is over, while ACTIVE."""
-        is_active = self.mode is SafetyMode.ACTIVE
+        is_active = self.mode is _ACTIVE
         due_ns = self._schedule.now_ns + self._options.heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
@@ -212,7 +215,7 @@ class FakeSafetyModule:
         if self.mode is SafetyMode.E_STOP:
             return  # the bus has no power, and nothing to judge
         if not limits["VOLTL2"] <= voltage <= limits["VOLTH2"]:
-            self._levels["voltage"] = Level.FAULT
+            self._levels["voltage"] = _FAULT
             self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
         else:
             is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
@@ -220,20 +223,20 @@ class FakeSafetyModule:
 
     def _warn(self, monitor: str, is_warning: bool) -> None:
         """Light or put out a warning; a fault stays until Shift-idle."""
-        if self._levels[monitor] is not Level.FAULT:
-            self._levels[monitor] = Level.WARNING if is_warning else Level.SAFE
+        if self._levels[monitor] is not _FAULT:
+            self._levels[monitor] = _WARNING if is_warning else _SAFE
 
     def _judge_torque(self) -> None:
         largest = max(self._largest_command.values())
-        if self.mode is SafetyMode.ACTIVE and largest > self._properties["TL2"]:
+        if self.mode is _ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
             self._warn("torque", largest > self._properties["TL1"])
 
     def _fault(self, monitor: str) -> None:
         """Note a fault until Shift-idle and stop the arm."""
-        self._levels[monitor] = Level.FAULT
-        if self.mode is SafetyMode.ACTIVE:
+        self._levels[monitor] = _FAULT
+        if self.mode is _ACTIVE:
             self._enter(SafetyMode.IDLE)
 
     def _enter(self, mode: SafetyMode) -> None:

@@ -39,12 +39,6 @@ class Schedule:
         self._plan_count = 0
         self.outbox: list[OutFrame] = []
 
-    def go_to(self, t_ns: int) -> None:
-        """Let it be `t_ns`, if it is not later already."""
-        if t_ns <= self.now_ns:
-            return
-        self.now_ns = t_ns
-
     def after(self, delay_ns: int, action: Callable[[], None]) -> None:
         """Plan `action` for `delay_ns` from now."""
         self._plan_count += 1  # keeps plans for one instant in their order
@@ -59,8 +53,8 @@ class Schedule:
 
     def advance(self, t_ns: int) -> None:
         """Carry out all that is due until `t_ns`, in order of time; let it be then."""
-        while self.next_ns <= t_ns:
-            self.go_to(self.next_ns)
+        while (next_ns := self.next_ns) <= t_ns:
+            self.now_ns = max(self.now_ns, next_ns)
             # At one instant plans come first: what they do may put the alarm off.
             if self._plans and self._plans[0][0] <= self.now_ns:
                 action = heappop(self._plans)[2]
@@ -68,7 +62,7 @@ class Schedule:
                 action()
             else:
                 self.on_alarm()
-        self.go_to(t_ns)
+        self.now_ns = max(self.now_ns, t_ns)
 
     def put(self, can_id: int, data: bytes) -> None:
         """Hand a frame to the wire now."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fakes.randomness import NormalStream, OrnsteinUhlenbeck
+from fakes.randomness import NormalStream, exact_step
 from ft_sensor.reading import Wrench
 
 
@@ -51,19 +51,17 @@ class SensorErrors:
         self._scales = (force,) * 3 + (torque,) * 3
         self._offset = [0.0] * 6
         self.new_trial(rng)
-        self._offset, self._bias = _within(self._bias, force.bias), [0.0] * 6
+        self._offset = self._level = _within(self._level, force.bias)
 
     def new_trial(self, rng: np.random.Generator) -> None:
         """Draw bias and drift from `rng`, and everything after from it too."""
         self._normals = NormalStream(rng)
-        self._bias = [s.bias * self._normals.next() for s in self._scales]
-        self._drifts = [
-            OrnsteinUhlenbeck(s.drift, s.drift_time, 0.0, self._normals)
-            for s in self._scales
-        ]
+        pairs = zip(self._offset, self._scales, strict=True)
+        self._level = [o + s.bias * self._normals.next() for o, s in pairs]
+        self._drifts = [s.drift * self._normals.next() for s in self._scales]
         self._is_settled = False
-        self._step_ns = 0
         self._t_ns: int | None = None
+        self._pace_drifts(0)
 
     def settle(self) -> None:
         """Show offset, noise and steps only, until the next trial.
@@ -71,35 +69,37 @@ class SensorErrors:
         The error of a trial is what remains after its tare. A tare that saw the bias
         of the trial before would add it to the next one's.
         """
+        self._level, self._drifts = self._offset, [0.0] * 6
         self._is_settled = True
+        self._pace_drifts(self._step_ns)
 
     def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
         """Return what is shown at `t_ns` under `wrench` [N, N m], shape (6,)."""
-        self._pace_drifts(0 if self._t_ns is None else max(t_ns - self._t_ns, 0))
-        self._t_ns = t_ns
+        before_ns, self._t_ns = self._t_ns, t_ns
+        step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
+        if step_ns != self._step_ns:  # samples come at an almost even pace
+            self._pace_drifts(step_ns)
         next_normal = self._normals.next
         shown: list[float] = []
-        rows = zip(wrench, self._scales, self._offset, self._slow(), strict=True)
-        for load, scale, offset, slow in rows:
-            value = load + offset + slow + scale.white * next_normal()
-            step = scale.resolution
+        drifts: list[float] = []
+        rows = zip(wrench, self._level, self._drifts, self._steps, strict=True)
+        for load, level, drift, (keep, kick, white, step) in rows:
+            moved = keep * drift + kick * next_normal()
+            value = load + level + moved + white * next_normal()
+            drifts.append(moved)
             shown.append(round(value / step) * step if step else value)
+        self._drifts = drifts
         fx, fy, fz, tx, ty, tz = shown
         return fx, fy, fz, tx, ty, tz
 
-    def _slow(self) -> list[float]:
-        """Return what the last tare has left: bias and drift [N, N m]."""
-        if self._is_settled:
-            return [0.0] * 6
-        pairs = zip(self._bias, self._drifts, strict=True)
-        return [bias + drift.step() for bias, drift in pairs]
-
     def _pace_drifts(self, step_ns: int) -> None:
-        """Let the drifts step by `step_ns`; samples come at an almost even pace."""
-        if step_ns != self._step_ns:
-            self._step_ns = step_ns
-            for drift in self._drifts:
-                drift.set_dt(step_ns * 1e-9)
+        """Let the drifts step by `step_ns` from now on."""
+        self._step_ns, dt = step_ns, step_ns * 1e-9
+        steps = [exact_step(s.drift, s.drift_time, dt) for s in self._scales]
+        if self._is_settled:
+            steps = [(0.0, 0.0)] * 6
+        pairs = zip(steps, self._scales, strict=True)
+        self._steps = [(*step, s.white, s.resolution) for step, s in pairs]
 
 
 def _within(offset: list[float], scale: float) -> list[float]:

@@ -192,8 +192,9 @@ class SensorStream:
         self._send(t_ns, self.faults.carry(data))
 
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
-        warmth = self.warming * (t_ns - self._on_since_ns) * 1e-9
-        if warmth:
+        warmth = 0.0
+        if self.warming:
+            warmth = self.warming * (t_ns - self._on_since_ns) * 1e-9
             pairs = zip(wrench, _PER_DEGREE, strict=True)
             wrench = [value + warmth * gain for value, gain in pairs]
         saturated = ALL_AXES if self._is_saturated else 0
@@ -218,8 +219,9 @@ class SensorStream:
         if self._is_silent:
             return
         wire_ns = wire_time_ns(len(data), self._firmware.baudrate)
-        self._wire_free_ns = max(self._wire_free_ns, t_ns) + wire_ns
-        self._pending.append((self._wire_free_ns, data))
+        begin_ns = t_ns if t_ns > self._wire_free_ns else self._wire_free_ns
+        self._wire_free_ns = end_ns = begin_ns + wire_ns
+        self._pending.append((end_ns, data))
 
 
 def _clipped(wrench: Sequence[float], ranges: Wrench) -> tuple[list[float], int]:

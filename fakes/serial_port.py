@@ -79,9 +79,11 @@ class FakeSerialPort:
 
     def read(self, size: int = 1, /) -> bytes:
         """Return at most `size` of the bytes that have arrived."""
-        taken = min(size, self.in_waiting)
-        data = bytes(self._buffer[:taken])
-        del self._buffer[:taken]
+        self._require()
+        if len(self._buffer) < size:
+            self.advance(self._clock.now_ns())
+        data = bytes(self._buffer[:size])
+        del self._buffer[:size]
         return data
 
     def write(self, data: bytes, /) -> int:

@@ -33,6 +33,7 @@ class StoneBed:
         p = parameters
         self._p = p
         self._bed = math.exp(0.12 * float(rng.standard_normal()))
+        self._k_n = p.k_n
         self._c_n = 2.0 * p.zeta * math.sqrt(p.k_n * DAMPING_MASS)
         profile = _S_H * p.d50 * smooth_profile(rng, _L_H * p.d50)
         self._slope = np.gradient(profile, GRID).tolist()
@@ -67,21 +68,22 @@ class StoneBed:
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bed by `dt` [s] and return what it does to the foot."""
-        p = self._p
-        x, vx, sink = motion.x, motion.vx, self._sink
+        x, _, z, vx, _, vz, _, _, _ = motion
+        sink = self._sink
         row, share = locate(x)
         h, s = self._profile, self._slope
-        depth = h[row] + share * (h[row + 1] - h[row]) - sink - motion.z
+        depth = h[row] + share * (h[row + 1] - h[row]) - sink - z
         if depth <= 0.0:
             self._footing.release()
             self._jams.lose_contact()
             return NO_CONTACT
         slope = s[row] + share * (s[row + 1] - s[row])
-        F_n = max(0.0, p.k_n * depth + self._c_n * (slope * vx - motion.vz))
+        F_n = self._k_n * depth + self._c_n * (slope * vx - vz)
+        F_n = F_n if F_n > 0.0 else 0.0
         sunk = sink / self._sink_limit
         if vx > 0.0:
             rate = vx * (self._sink_limit - sink) / _L_S
-            self._sink = sink + dt * rate * min(1.0, F_n / _FIRM)
+            self._sink = sink + dt * rate * (F_n / _FIRM if F_n < _FIRM else 1.0)
         F_t = self._jams.step(dt, (x, vx), F_n, sunk)
         if not -_STEEPEST <= slope <= _STEEPEST:
             slope = math.copysign(_STEEPEST, slope)

@@ -33,7 +33,9 @@ class WiredNetwork:
 
     def send(self, t_ns: int, can_id: int, data: Payload) -> None:
         """Queue a host's frame at `t_ns`, the time of the last `advance`."""
-        self._queue(t_ns, can_id, bytes(data), True)
+        self._begin_at(t_ns)
+        self._order += 1
+        heappush(self._waiting, (can_id, self._order, bytes(data), True))
 
     def drop_waiting(self) -> None:
         """Lose the frames that wait for the wire."""
@@ -53,7 +55,7 @@ class WiredNetwork:
         """
         schedule = self._schedule
         if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
-            schedule.go_to(t_ns)
+            schedule.now_ns = max(schedule.now_ns, t_ns)
             return []
         while True:
             # At one instant the network is first: its frame may win the arbitration.
@@ -70,22 +72,32 @@ class WiredNetwork:
         return sent
 
     def _take_due(self, t_ns: int) -> None:
-        for ready_ns, can_id, data in self.network.due(t_ns):
-            self._queue(ready_ns, can_id, data, False)
+        due = self.network.due(t_ns)
+        if not due:
+            return
+        self._begin_at(due[0][0])
+        waiting, order = self._waiting, self._order
+        for _, can_id, data in due:
+            order += 1
+            heappush(waiting, (can_id, order, data, False))
+        self._order = order
 
-    def _queue(self, ready_ns: int, can_id: int, data: bytes, is_of_host: bool) -> None:
-        self._order += 1
+    def _begin_at(self, ready_ns: int) -> None:
+        """Let a frame that is ready at `ready_ns` have a wire for which none waits."""
         if not self._waiting and self._on_wire is None:
             self._next_ns = max(self._free_ns, ready_ns)
-        heappush(self._waiting, (can_id, self._order, data, is_of_host))
 
     def _carry(self, until_ns: int) -> None:
         """Carry frames until `until_ns`, or until the network has got one of a host."""
+        waiting, is_far, sent = self._waiting, self._is_far, self._sent
         while (t_ns := self._next_ns) <= until_ns:
             frame = self._on_wire
             if frame is None:
-                frame = heappop(self._waiting)
-                t_ns = self._start(t_ns, frame)
+                frame = heappop(waiting)
+                if is_far:
+                    t_ns = self._start(t_ns, frame)
+                else:
+                    t_ns += FRAME_NS[len(frame[2])]
                 if t_ns > until_ns:  # its end is of a later call
                     self._on_wire, self._next_ns = frame, t_ns
                     return
@@ -93,18 +105,16 @@ class WiredNetwork:
             self._on_wire = None
             self._free_ns = t_ns
             # Whoever waits by now has been ready for a while.
-            self._next_ns = t_ns if self._waiting else NEVER
+            self._next_ns = t_ns if waiting else NEVER
             if is_of_host:
                 self.network.receive(t_ns, can_id, data)
                 return
-            if not self._is_far:
-                self._sent.append((t_ns, can_id, data))
+            if not is_far:
+                sent.append((t_ns, can_id, data))
 
     def _start(self, t_ns: int, frame: _Waiting) -> int:
-        """Begin a frame at `t_ns`; return when it ends."""
+        """Begin a frame of far hosts at `t_ns`; return when it ends."""
         can_id, _, data, is_of_host = frame
-        if not self._is_far:
-            return t_ns + FRAME_NS[len(data)]
         if is_of_host:
             return t_ns
         self._sent.append((t_ns, can_id, data))

@@ -1,6 +1,7 @@
 """What the gauges in the wrist feel: ground, weight and inertia of the foot."""
 
 from collections.abc import Sequence
+from struct import Struct
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from wam.constants import GRAVITY, Array
 from wam.tool import Tool
 
 Wrench = tuple[float, float, float, float, float, float]
+_FELT = Struct("15d")  # ground's wrench, change of the foot's rates, its turning rate
 
 
 class Wrist:
@@ -22,8 +24,8 @@ class Wrist:
     the foot over the cycle, m, c and I those of everything below the gauges.
     """
 
-    def __init__(self, tool: Tool, axes: Array, period: float) -> None:
-        """Take the tool, the terrain's axes as rows (3, 3) and the cycle [s]."""
+    def __init__(self, tool: Tool, up: Array, period: float) -> None:
+        """Take the tool, what is up in the terrain frame, (3,), and the cycle [s]."""
         payload = payload_of(tool)
         turn = payload.rotation
         origin = np.array([0.0, 0.0, tool.sensor_height])
@@ -33,13 +35,15 @@ class Wrist:
         self._com_from_sole = _vector(turn.T @ (tool.foot.com - tool.sole))
         self._inertia = turn.T @ tool.foot.inertia @ turn
         self._turn = turn
-        self._axes = axes
         self._period = period
         self._rotation = np.eye(3)
         self._ground: Sequence[float] = (0.0,) * 6
         self._rates: Sequence[float] = (0.0,) * 6
         self._before: Sequence[float] = (0.0,) * 6
         self._load: Wrench | None = None
+        # The rows of _FELT, and below them what is up, which stays.
+        self._buffer = bytearray(_FELT.size) + up.tobytes()
+        self._felt = np.frombuffer(self._buffer).reshape(6, 3)
 
     def end_cycle(
         self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
@@ -47,7 +51,7 @@ class Wrist:
         """Take what happened in a cycle.
 
         Args:
-            rotation: frame 7 to base, shape (3, 3).
+            rotation: frame 7 to terrain, shape (3, 3).
             ground: mean force [N] and moment at the sole [N m], terrain frame.
             rates: velocity of the sole [m/s] and turning rate [rad/s] at its end.
         """
@@ -63,18 +67,17 @@ class Wrist:
 
     def _compute(self) -> Wrench:
         """Work in plain numbers: for three of them numpy takes ten times as long."""
-        to_base = self._rotation.dot(self._turn)
         before, now, period = self._before, self._rates, self._period
         change = [(v - u) / period for u, v in zip(before, now, strict=True)]
-        felt = np.array((*self._ground, *change, *now[3:])).reshape(5, 3)
-        force, moment, a, alpha, w = felt.dot(self._axes.dot(to_base)).tolist()
-        angular = self._inertia.dot(np.array((alpha, w)).T)
-        (ix, jx), (iy, jy), (iz, jz) = angular.tolist()
+        _FELT.pack_into(self._buffer, 0, *self._ground, *change, *now[3:])
+        felt = self._felt.dot(self._rotation.dot(self._turn))
+        force, moment, a, alpha, w, (gx, gy, gz) = felt.tolist()
+        # The inertia is symmetric: rows of its products are I alpha and I w.
+        (ix, iy, iz), (jx, jy, jz) = felt[3:5].dot(self._inertia).tolist()
         spin = _cross(w, (jx, jy, jz))
         euler = _cross(alpha, self._com_from_sole)
         inward = _cross(w, _cross(w, self._com_from_sole))
         m, s = self._mass, self._sign
-        gx, gy, gz = to_base[2].tolist()
         weight = (
             -m * (GRAVITY * gx + a[0] + euler[0] + inward[0]),
             -m * (GRAVITY * gy + a[1] + euler[1] + inward[1]),

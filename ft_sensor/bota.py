@@ -11,6 +11,7 @@ import struct
 from binascii import crc_hqx
 from dataclasses import dataclass
 from enum import IntFlag
+from typing import NamedTuple
 
 from ft_sensor.framing import FrameScanner
 from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
@@ -67,9 +68,8 @@ def status_words(status: int) -> tuple[str, ...]:
     return tuple(words)
 
 
-@dataclass(frozen=True, slots=True)
-class BotaFrame:
-    """One measurement as it was on the wire.
+class BotaFrame(NamedTuple):
+    """One measurement as it was on the wire; a tuple, because there are many.
 
     Attributes:
         status: status bits, see `BotaStatus`.
@@ -129,14 +129,14 @@ def scanner(ranges: Wrench) -> FrameScanner[Reading]:
         frame = decode_frame(data, start)
         if frame is None:
             return None
-        status, wrench = frame.status, frame.wrench
+        status, wrench, device_us, _ = frame
         if not status:
-            return Reading(frame.device_us, wrench, 0, True, 0)
+            return Reading(device_us, wrench, 0, True, 0)
         beyond = 0
         if status & _OVER_RANGE:  # which axis it is, the device does not say
             beyond = axes_beyond(wrench, ranges) or ALL_AXES
         is_trusted = not status & _UNTRUSTED
-        return Reading(frame.device_us, wrench, status, is_trusted, beyond)
+        return Reading(device_us, wrench, status, is_trusted, beyond)
 
     return FrameScanner(b"\xaa", FRAME_SIZE, read)
 

@@ -42,11 +42,6 @@ class ShownClock:
         waited_ns, self._arrival_ns = arrival_ns - self._arrival_ns, arrival_ns
         return [self._step(reading.ticks, waited_ns) for reading in readings]
 
-    def correct(self, excess_ns: int, device_ns: int) -> int:
-        """Return what has to be added to the count: nothing, it is the device's."""
-        del excess_ns, device_ns
-        return 0
-
     def _step(self, ticks: int, waited_ns: int) -> int:
         timing, last = self._timing, self._ticks
         if last is None:
@@ -187,11 +182,13 @@ class FrameDating:
         if not 0 < step_ns < LONGEST_STEP_NS:
             self._fit.restart()
         self._device_ns += max(step_ns, 0)
-        if self._fit.has_line:
-            excess_ns = latest_ns - self._fit.host_ns(self._device_ns)
-            self._device_ns += self._device.correct(excess_ns, self._device_ns)
-        self._fit.offer(self._device_ns, latest_ns)
-        return min(latest_ns, self._fit.host_ns(self._device_ns))
+        fit = self._fit
+        device = self._device
+        if isinstance(device, CountedClock) and fit.has_line:
+            excess_ns = latest_ns - fit.host_ns(self._device_ns)
+            self._device_ns += device.correct(excess_ns, self._device_ns)
+        fit.offer(self._device_ns, latest_ns)
+        return min(latest_ns, fit.host_ns(self._device_ns))
 
     def _sample(self, reading: Reading, t_ns: int, is_running: bool) -> WrenchSample:
         t_ns = max(t_ns, self._t_ns + 1)
@@ -206,11 +203,13 @@ class FrameDating:
             and t_ns - self._unchanged_since_ns < self._timing.frozen_ns
         )
         self.frozen += not is_live
+        # Of six numbers of 32 bits no sum overflows: it is finite if all of them are.
+        is_number = math.isfinite(sum(wrench))
         return WrenchSample(
             t_ns=t_ns,
             counter=reading.ticks,
             wrench=wrench,
             status=reading.status,
-            is_valid=is_live and reading.is_trusted and all(map(math.isfinite, wrench)),
+            is_valid=is_live and reading.is_trusted and is_number,
             saturated=reading.saturated,
         )

@@ -9,7 +9,7 @@ import numpy as np
 from acquisition.devices import ArmReading, WrenchSample
 from acquisition.sample import Sample
 from ft_sensor.payload import Payload, TerrainFrame
-from wam.model import ArmModel, quaternion
+from wam.model import ArmModel
 
 
 class LiveFoot:
@@ -20,7 +20,8 @@ class LiveFoot:
     ) -> None:
         self._model = model
         self.payload = payload
-        self._x_T, _, self._z_T = terrain.axes()
+        self._x_T, _, z_T = terrain.axes()
+        self._of_force = np.stack((-self._x_T, z_T))  # F_t and F_n
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
@@ -33,18 +34,17 @@ class LiveFoot:
 
         Without a fresh wrench the last forces are repeated.
         """
-        position, rotation, twist = self._model.sole_motion(reading.q, reading.qd)
-        sample.foot_position[:] = position
-        sample.foot_orientation[:] = quaternion(rotation)
-        sample.foot_velocity[:] = twist
+        pose, rotation, twist = self._model.sole_motion(reading.q, reading.qd)
+        sample.foot_position[...] = pose[:3]
+        sample.foot_orientation[...] = pose[3:]
+        sample.foot_velocity[...] = twist
         if wrench is not None:
             payload = self.payload
-            sample.wrench_raw[:] = wrench.wrench
+            sample.wrench_raw[...] = wrench.wrench
             contact = payload.contact(sample.wrench_raw, rotation)
-            sample.wrench[:] = contact
+            sample.wrench[...] = contact
             force = payload.to_base(contact, rotation)
-            sample.traction[1] = -self._x_T.dot(force)
-            sample.traction[2] = self._z_T.dot(force)
+            sample.traction[1:] = self._of_force.dot(force)
         velocity = twist[:3]
         sample.traction[0] = self._x_T.dot(velocity)
         return sqrt(velocity.dot(velocity))

@@ -81,6 +81,8 @@ class Payload:
     def to_base(self, wrench: Floats, rotation_base_7: Floats) -> Floats:
         """Return the force part of `wrench` (..., 6) in the base frame, (..., 3)."""
         force_7 = wrench[..., :3].dot(self.rotation.T)
+        if force_7.ndim == 1:  # live: one reading at a time
+            return rotation_base_7.dot(force_7)
         return np.matmul(rotation_base_7, force_7[..., None])[..., 0]
 
 

@@ -1,34 +1,33 @@
 """The one door to python-can: a bus that is sent to and drained, never waited on."""
 
 import errno
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import can
 
 from acquisition.errors import LinkError
-from wam.frames import SAFETY_NODE, SENDER_MASK, Group, Payload, compose_id
+from wam.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
 
 
-# identifier, payload, time by the bus's own clock [s] or 0.0
-Tap = Callable[[int, bytes, float], None]
-
-
 class Frame(NamedTuple):
-    """A frame as received.
+    """A frame as received or sent.
 
     Attributes:
         can_id: 11-bit identifier.
         data: payload.
-        stamp: time of arrival by the bus's own clock [s], 0.0 = the bus has none.
+        stamp: time of arrival by the bus's own clock [s], 0.0 = it has none.
     """
 
     can_id: int
-    data: Payload
+    data: bytes
     stamp: float
+
+
+Tap = Callable[[Sequence[tuple[int, bytes, float]]], None]  # each like a Frame
 
 
 class Link(Protocol):
@@ -92,7 +91,8 @@ class CanLink:
     Attributes:
         mode_hints: broadcasts of the safety module so far.
         error_frames: error frames of the controller so far.
-        tap: told of every data frame with an 11-bit identifier, sent or received.
+        tap: told of every data frame with an 11-bit identifier, sent or received;
+            of all that are found at once together.
     """
 
     def __init__(self, bus: can.BusABC) -> None:
@@ -115,13 +115,14 @@ class CanLink:
         """
         if not self._is_open:
             raise LinkError("The CAN bus is closed.", hint="Start again.")
-        message = can.Message(arbitration_id=can_id, is_extended_id=False, data=data)
+        # positionally: stamp, identifier, is it an extended one
+        message = can.Message(0.0, can_id, False, data=data)
         try:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
         if self.tap is not None:
-            self.tap(can_id, data, 0.0)
+            self.tap(((can_id, data, 0.0),))
 
     def receive(self) -> list[Frame]:
         """Return the device frames that have arrived, oldest first.
@@ -155,30 +156,34 @@ class CanLink:
     def _drain(self) -> None:
         if not self._is_open:
             return
-        receive, sort = self._bus.recv, self._sort
+        receive = self._bus.recv
+        found: list[Frame] = []
         try:
             for _ in range(_DRAIN_AT_MOST):
                 message = receive(0)
                 if message is None:
-                    return
-                sort(message)
+                    break
+                if message.is_error_frame:
+                    self.error_frames += 1
+                elif not (message.is_extended_id or message.is_remote_frame):
+                    data, stamp = bytes(message.data), message.timestamp
+                    found.append(Frame(message.arbitration_id, data, stamp))
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
+        finally:
+            if found:
+                self._sort(found)
 
-    def _sort(self, message: can.Message) -> None:
-        if message.is_error_frame:
-            self.error_frames += 1
-            return
-        if message.is_extended_id or message.is_remote_frame:
-            return
-        can_id, stamp = message.arbitration_id, message.timestamp
-        data = bytes(message.data)
+    def _sort(self, found: list[Frame]) -> None:
+        """Show frames to the tap and keep those of devices."""
         if self.tap is not None:
-            self.tap(can_id, data, stamp)
-        if can_id == MODE_BROADCAST_ID:
-            self.mode_hints += 1
-        elif can_id & SENDER_MASK:
-            self._inbox.append(Frame(can_id, data, stamp))
+            self.tap(found)
+        for frame in found:
+            can_id = frame.can_id
+            if can_id == MODE_BROADCAST_ID:
+                self.mode_hints += 1
+            elif can_id & SENDER_MASK:
+                self._inbox.append(frame)
 
 
 def _cannot_open(

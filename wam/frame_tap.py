@@ -1,5 +1,7 @@
 """Puts every frame of the arm's bus on the tape, with the best time there is."""
 
+from collections.abc import Sequence
+
 from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
 from acquisition.flight import FrameTape
 
@@ -18,13 +20,17 @@ class FrameTap:
         self._clock = clock
         self._offset_ns = utc_offset_ns(clock)[0]
 
-    def __call__(self, can_id: int, data: bytes, stamp: float) -> None:
-        """Note a frame."""
-        t_ns = now_ns = self._clock.now_ns()
-        if stamp:
-            stamp_ns = round(stamp * NS_PER_S)
-            if 0 <= now_ns - stamp_ns + self._offset_ns < _PLAUSIBLE_NS:
-                t_ns = stamp_ns - self._offset_ns
-            elif 0 <= now_ns - stamp_ns < _PLAUSIBLE_NS:
-                t_ns = stamp_ns
-        self._tape.add(t_ns, can_id, data)
+    def __call__(self, frames: Sequence[tuple[int, bytes, float]]) -> None:
+        """Note frames that were sent or found just now, oldest first."""
+        now_ns, offset_ns = self._clock.now_ns(), self._offset_ns
+        rows: list[tuple[int, int, int, bytes]] = []
+        for can_id, data, stamp in frames:
+            t_ns = now_ns
+            if stamp:
+                stamp_ns = round(stamp * NS_PER_S)
+                if 0 <= now_ns - stamp_ns + offset_ns < _PLAUSIBLE_NS:
+                    t_ns = stamp_ns - offset_ns
+                elif 0 <= now_ns - stamp_ns < _PLAUSIBLE_NS:
+                    t_ns = stamp_ns
+            rows.append((t_ns, can_id, len(data), data))
+        self._tape.add(rows)

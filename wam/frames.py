@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from math import floor
+from typing import NamedTuple
 
 from acquisition.errors import DeviceFaultError
 
@@ -23,6 +24,7 @@ SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
 _POSITION_MODULUS = 1 << 22
 _POSITION_SIGN = 1 << 21
+_TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
 _FORCE_PER_N = 256.0
 _TORQUE_PER_NM = 4096.0
 _ACCELERATION_SCALE = 1024.0
@@ -100,8 +102,7 @@ def position_reply_id(node: int) -> int:
     return compose_id(node, Group.POSITION, is_group=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Property:
+class Property(NamedTuple):
     """A property number with the value that came with it; a GET has none."""
 
     number: int
@@ -205,7 +206,9 @@ def encode_torques(units: Sequence[float], number: int = 42) -> bytes:
     """
     word = 0x80 | number
     for value in units:
-        clipped = min(max(value, -TORQUE_LIMIT), TORQUE_LIMIT)
+        clipped = value
+        if not -TORQUE_LIMIT <= value <= TORQUE_LIMIT:
+            clipped = min(max(value, -TORQUE_LIMIT), TORQUE_LIMIT)
         word = word << 14 | floor(clipped) & 0x3FFF
     if len(units) == 3:
         word <<= 14
@@ -220,17 +223,13 @@ def decode_torques(data: Payload) -> tuple[int, int, int, int]:
     """
     if len(data) != 8 or not data[0] & 0x80:
         raise FrameError("Not a packed torque frame", data)
-    word = int.from_bytes(data[1:], "big")
+    word = int.from_bytes(data[1:], "big") ^ _TORQUE_SIGNS
     return (
-        _signed14(word >> 42),
-        _signed14(word >> 28),
-        _signed14(word >> 14),
-        _signed14(word),
+        (word >> 42 & 0x3FFF) - 0x2000,
+        (word >> 28 & 0x3FFF) - 0x2000,
+        (word >> 14 & 0x3FFF) - 0x2000,
+        (word & 0x3FFF) - 0x2000,
     )
-
-
-def _signed14(field: int) -> int:
-    return ((field & 0x3FFF) ^ 0x2000) - 0x2000
 
 
 Triple = tuple[float, float, float]

@@ -148,11 +148,17 @@ class ArmModel:
         return self._jacobian(q, self._sole)
 
     def sole_motion(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
-        """Return (position (3,), rotation (3, 3), twist (6,)) of the sole at once."""
+        """Return (pose (7,), rotation (3, 3), twist (6,)) of the sole at once.
+
+        The pose is the position [m] and the quaternion x y z w of the rotation, w >= 0.
+        """
         pin.forwardKinematics(self._model, self._data, q, qd)
         placement = pin.updateFramePlacement(self._model, self._data, self._sole)
         velocity = pin.getFrameVelocity(self._model, self._data, self._sole, _AXES)
-        return placement.translation, placement.rotation, velocity.vector
+        pose = pin.SE3ToXYZQUAT(placement)
+        if pose[6] < 0.0:
+            pose[3:] *= -1.0
+        return pose, placement.rotation, velocity.vector
 
     def sole_path(self, q: NDArray[np.float64]) -> FootPath:
         """Return the sole along joint positions `q` [rad], shape (n, 7)."""
@@ -173,9 +179,3 @@ class ArmModel:
 
     def _jacobian(self, q: Array, frame: int) -> Array:
         return pin.computeFrameJacobian(self._model, self._data, q, frame, _AXES).copy()
-
-
-def quaternion(rotation: Array) -> Array:
-    """Return x y z w of a rotation matrix, w >= 0."""
-    coefficients = pin.Quaternion(rotation).coeffs()
-    return coefficients if coefficients[3] >= 0 else -coefficients

@@ -53,16 +53,20 @@ class Motion:
         is_resumed = step > _PAUSE
         fresh = 0
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
+        known, jump = self.counts, self._jump
         for i, counts in enumerate(received):
             elapsed = (t_ns - times_ns[i]) * 1e-9
-            last, rate = self.counts[i], rates[i]
-            guess = last + rate * min(elapsed, _LONGEST_GUESS)
-            if counts is None or (abs(counts - guess) > self._jump and not is_resumed):
+            last, rate = known[i], rates[i]
+            ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
+            guess = last + rate * ahead
+            if counts is None or (
+                not -jump <= counts - guess <= jump and not is_resumed
+            ):
                 positions[i] = guess
                 continue
             if elapsed > 0.0:
                 rates[i] = rate + share * ((counts - last) / elapsed - rate)
-            self.counts[i] = counts
+            known[i] = counts
             positions[i] = counts
             times_ns[i] = t_ns
             fresh |= 1 << i

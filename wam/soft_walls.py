@@ -38,6 +38,8 @@ class SoftWalls:
 
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
+        pairs = zip(walls.lower, walls.upper, strict=True)
+        self._free = [(lower + DEPTH, upper - DEPTH) for lower, upper in pairs]
         self._armed = 0
 
     @property
@@ -50,14 +52,14 @@ class SoftWalls:
 
         Never so much that a joint would get more than its torque limit in all.
         """
-        walls = self._walls
-        rows = zip(reading.q.tolist(), walls.lower, walls.upper, strict=True)
-        for joint, (angle, lower, upper) in enumerate(rows):
-            if lower + DEPTH <= angle <= upper - DEPTH:
-                if reading.is_complete:  # an extrapolated position arms nothing
+        may_arm = reading.is_complete  # an extrapolated position arms nothing
+        rows = zip(reading.q.tolist(), self._free, strict=True)
+        for joint, (angle, (lower, upper)) in enumerate(rows):
+            if lower <= angle <= upper:
+                if may_arm:
                     self._armed |= 1 << joint
                 continue
-            depth = max(lower + DEPTH - angle, 0.0) - max(angle - upper + DEPTH, 0.0)
+            depth = max(lower - angle, 0.0) - max(angle - upper, 0.0)
             if self._armed >> joint & 1:
                 push = self._push(joint, depth, float(reading.qd[joint]))
                 tau[joint] = self._bounded(joint, float(tau[joint]), push)

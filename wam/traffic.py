@@ -192,15 +192,15 @@ class CycleTraffic:
 
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
-        found = 0
+        found, received = 0, self.received
         for can_id, data, _ in self._link.receive():
             index = _POSITION_INDEX.get(can_id)
             try:
                 if index is not None:
                     counts = decode_position(data)
-                    if self.received[index] is not None:
+                    if received[index] is not None:
                         self._owed &= ~(1 << index)
-                    self.received[index] = counts
+                    received[index] = counts
                     found += 1
                 else:
                     if self.companion is not None:

@@ -8,6 +8,7 @@ properties of each puck and must be read from it.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import floor, inf, isfinite, pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +23,8 @@ HOST_TORQUE_LIMITS = (4257, 4257, 4257, 4257, 3900, 3900, 1600)
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class TorqueCommand:
-    """What the pucks are told.
+class TorqueCommand(NamedTuple):
+    """What the pucks are told; a tuple, because it is made in every cycle.
 
     Attributes:
         units: torque of each motor [puck units], whole numbers.
@@ -163,8 +163,8 @@ def coupled_ratios(
 
 def _is_beyond(values: Sequence[float], limits: Sequence[float]) -> bool:
     """Return whether any of `values` is beyond its limit."""
-    for value, limit in zip(values, limits, strict=True):  # noqa: SIM110
-        if abs(value) > limit:
+    for value, limit in zip(values, limits, strict=True):
+        if not -limit <= value <= limit:
             return True
     return False
 

@@ -18,8 +18,7 @@ def ring():
 
 def tape_of(ring, times_ns):
     tape = FrameTape(ring)
-    for t_ns in times_ns:
-        tape.add(t_ns, 1, b"")
+    tape.add((t_ns, 1, 0, b"") for t_ns in times_ns)
 
 
 def times(frames):
@@ -47,9 +46,7 @@ def test_the_tape_does_not_grow(ring):
 
 def frames_of(*frames):
     ring = Ring(memoryview(bytearray(Ring.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9)
-    tape = FrameTape(ring)
-    for frame in frames:
-        tape.add(*frame)
+    FrameTape(ring).add((*frame[:2], len(frame[2]), frame[2]) for frame in frames)
     return ring.last(9)
 
 

@@ -1,4 +1,3 @@
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,9 +54,9 @@ QUIET = Observation(
 
 def seen(**changes):
     """Return a quiet cycle with `changes` to it or to its reading."""
-    own = {k: v for k, v in changes.items() if k in Observation.__dataclass_fields__}
+    own = {k: v for k, v in changes.items() if k in Observation._fields}
     rest = {k: v for k, v in changes.items() if k not in own}
-    return replace(QUIET, reading=reading(**rest), **own)
+    return QUIET._replace(reading=reading(**rest), **own)
 
 
 def judge(**changes: Any):

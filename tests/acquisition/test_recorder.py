@@ -133,6 +133,16 @@ def test_draining_writes_what_is_new(desk):
     assert verified.cycles == 17
 
 
+def test_forces_are_in_the_file_in_batches_of_20_ms(desk):
+    desk.start()
+    for _ in range(400):
+        desk.clock.sleep_until(desk.clock.now_ns() + 1_250_000)
+        publish([desk.wrench()], desk.board.wrenches)
+    desk.run(2)
+    desk.recorder.finish("end")
+    assert [len(batch) for batch in batches(desk)] == [16] * 25  # at 800 Hz
+
+
 def test_draining_without_a_trial_does_nothing(desk):
     desk.run(10)
     desk.recorder.drain()
@@ -176,9 +186,9 @@ def test_a_long_wait_before_the_trigger_is_not_a_loss(desk):
 
 def test_raw_frames_are_recorded_when_the_header_asks(desk):
     tape = FrameTape(desk.board.frames)
-    tape.add(desk.clock.now_ns() - 1001 * MS, 1, b"")
+    tape.add([(desk.clock.now_ns() - 1001 * MS, 1, 0, b"")])
     desk.recorder.start(desk.path, replace(make_header(), has_frames=True))
-    tape.add(desk.clock.now_ns(), 0x404, b"\x30")
+    tape.add([(desk.clock.now_ns(), 0x404, 1, b"\x30")])
     desk.run(5)
     desk.recorder.finish("end")
     ((_, payload),) = messages_of(desk.path)["/can/raw"]

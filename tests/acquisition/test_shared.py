@@ -48,7 +48,7 @@ def test_a_record_packed_in_place_replaces_all_of_the_one_before():
     reader = ring.reader()
     ring.write(b"\xff" * dtype.itemsize)
     ring.write(b"\xff" * dtype.itemsize)
-    ring.pack(struct.Struct("<Q4xI"), 1, 2)
+    ring.pack(struct.Struct("<Q4xI"), [(1, 2)])
     assert reader.read().tobytes() == struct.pack("<Q4xI", 1, 2)
     assert reader.lost == 2
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from analysis.prepare import foot_velocity
 from analysis.series import TractionSeries
-from fakes.contact import Motion
 from fakes.profile import smooth_profile, value_at
 from fakes.push import HandView, Pace, Push
 from fakes.randomness import trial_generators
@@ -67,18 +66,18 @@ class PointFoot:
     def substep(self) -> tuple[float, float]:
         """Advance by half a millisecond and return (F_t, F_n)."""
         along, _, upward = self.push.step(self.view())
-        motion = Motion(self.x, 0.0, self.z, self.vx, 0.0, self.vz)
-        contact = self.ground.step(DT, motion)
+        motion = (self.x, 0.0, self.z, self.vx, 0.0, self.vz, 0.0, 0.0, 0.0)
+        F_t, _, F_n, *_ = self.ground.step(DT, motion)
         drag_x = COULOMB * math.tanh(self.vx / 0.01) + VISCOUS * self.vx
         drag_z = COULOMB * math.tanh(self.vz / 0.01) + VISCOUS * self.vz
         left_x, left_z = (value_at(table, self.x) for table in self.residual)
-        force_x = along + self.pull + left_x - contact.F_t - drag_x
-        force_z = upward - self.weight + left_z + contact.F_n - drag_z
+        force_x = along + self.pull + left_x - F_t - drag_x
+        force_z = upward - self.weight + left_z + F_n - drag_z
         self.vx += DT * force_x / MASS_X
         self.vz += DT * force_z / MASS_Z
         self.x += DT * self.vx
         self.z += DT * self.vz
-        return contact.F_t, contact.F_n
+        return F_t, F_n
 
     def cycle(self) -> None:
         """Advance by 2 ms and note what encoders and sensor show."""

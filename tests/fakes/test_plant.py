@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.contact import Contact
+from fakes.joint_state import JointState
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -211,7 +211,7 @@ def test_the_sensor_feels_force_and_moment_of_the_ground(component):
     before = np.concatenate(felt_in_base(plant))
     wrench = np.zeros(6)
     wrench[component] = 1.5
-    plant.terrain = Pusher(Contact(-wrench[0], *wrench[1:]))  # F_t is against x
+    plant.terrain = Pusher((-wrench[0], *wrench[1:]))  # F_t is against x
     plant.advance(2 * CYCLE_NS)
     change = np.concatenate(felt_in_base(plant)) - before
     axes = FRAME.axes()
@@ -227,7 +227,7 @@ def test_the_ground_moves_the_joints_through_the_jacobian_of_the_sole(component)
     plant.hand.let_go()
     wrench = np.zeros(6)
     wrench[component] = 1.0 if component < 3 else 0.1
-    plant.terrain = Pusher(Contact(-wrench[0], *wrench[1:]))
+    plant.terrain = Pusher((-wrench[0], *wrench[1:]))
     axes, J = FRAME.axes(), MODEL.sole_jacobian(plant.q)
     tau = J[:3].T @ (axes.T @ wrench[:3]) + J[3:].T @ (axes.T @ wrench[3:])
     send(plant, MODEL.gravity(plant.q))
@@ -287,3 +287,33 @@ def test_smaller_steps_give_the_same_motion():
         plant.advance(S // 10)
         ends.append(plant.q)
     assert ends[0] == pytest.approx(ends[1], abs=2e-3)
+
+
+def test_joints_go_on_with_their_new_velocity_and_old_arrays_stay_as_they_were():
+    q, qdd, dt = np.linspace(0.0, 1.0, 7), np.linspace(3.0, -3.0, 7), 0.0005
+    joints = JointState(q, dt)
+    before = joints.rows[0]
+    joints.step(qdd)
+    now = joints.step(qdd)
+    # semi-implicit Euler from rest: dt^2 qdd (1 + 2) after two steps
+    assert now[0] == pytest.approx(q + 3.0 * dt * dt * qdd, rel=1e-14)
+    assert now[1] == pytest.approx(2.0 * dt * qdd, rel=1e-14)
+    assert now[2] == pytest.approx(2.5 * dt * qdd, rel=1e-14)  # where positions are
+    assert before.tolist() == q.tolist()
+
+
+def test_a_joint_that_is_moved_keeps_its_velocity_and_one_that_rests_loses_it():
+    joints = JointState(np.zeros(7), 0.001)
+    rate = joints.step(np.ones(7))[1]
+    joints.move(np.full(7, 0.5))
+    assert joints.rows[0].tolist() == [0.5] * 7
+    assert joints.rows[1].tolist() == rate.tolist()
+    joints.rest(joints.rows[0])
+    assert joints.step(np.zeros(7))[0].tolist() == [0.5] * 7
+
+
+def test_a_sensor_that_is_read_within_a_cycle_does_not_drive_the_arm_on():
+    plant = make_plant()
+    release(plant)
+    plant.sensor_load(CYCLE_NS + CYCLE_NS // 2)
+    assert plant.t_ns == CYCLE_NS  # the load is that of the cycle that has ended

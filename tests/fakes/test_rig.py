@@ -8,6 +8,7 @@ from fakes.hand import Phase
 from fakes.network_options import NetworkOptions
 from fakes.push import PACES
 from fakes.randomness import (
+    DrawnAhead,
     NormalStream,
     OrnsteinUhlenbeck,
     Tremor,
@@ -233,6 +234,24 @@ def test_parameters_of_the_ground_are_told_as_text(rig_and_clock):
 
 
 # --- randomness -----------------------------------------------------------------------
+
+
+def test_a_stream_hands_out_what_its_generator_draws_across_its_blocks():
+    normals = NormalStream(np.random.default_rng(1), block=3)
+    drawn = np.random.default_rng(1).standard_normal(9).tolist()
+    assert [normals.next() for _ in range(9)] == drawn
+
+
+def test_numbers_drawn_ahead_leave_the_generator_to_others_where_it_would_be():
+    ahead, plain = np.random.default_rng(3), np.random.default_rng(3)
+    uniforms = DrawnAhead(ahead, block=4)
+    for count in (1, 0, 4, 7):  # within a block, none, all of it, across two
+        drawn = [uniforms.next() for _ in range(count)]
+        assert drawn == [plain.random() for _ in range(count)]
+        uniforms.give_back()
+        uniforms.give_back()
+        assert ahead.integers(1000) == plain.integers(1000)
+        assert ahead.gamma(2.0) == plain.gamma(2.0)
 
 
 def test_an_ornstein_uhlenbeck_process_has_its_spread_and_memory():

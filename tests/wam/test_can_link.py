@@ -179,9 +179,25 @@ def test_a_tap_hears_all_plain_frames_sent_and_received():
         )
     )
     heard = []
-    link.tap = lambda can_id, data, stamp: heard.append((can_id, data, stamp))
+    link.tap = heard.extend
     link.send(1, b"\x05")
     assert [frame.can_id for frame in link.receive()] == [0x426]
     assert [can_id for can_id, _, _ in heard] == [1, 0x426, 0x540, 0x404]
     assert heard[0] == (1, b"\x05", 0.0)
+    link.close()
+
+
+def test_a_tap_hears_what_came_before_the_bus_broke():
+    class Breaking(ScriptedBus):
+        def _recv_internal(self, timeout):
+            if not self.messages:
+                raise can.CanOperationError("gone", errno.ENETDOWN)
+            return super()._recv_internal(timeout)
+
+    link = CanLink(Breaking([message(0x426)]))
+    heard = []
+    link.tap = heard.extend
+    with pytest.raises(LinkError):
+        link.receive()
+    assert [can_id for can_id, _, _ in heard] == [0x426]
     link.close()
