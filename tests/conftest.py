@@ -1,12 +1,23 @@
 """Options and fixtures of the whole suite."""
 
 import json
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 DATA = Path(__file__).parent / "data"
+
+
+def pytest_configure() -> None:
+    """Hear the signals that the tests send.
+
+    A shell that starts the suite in the background, or nohup, has it ignore them, and
+    every program that a test starts would inherit that.
+    """
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
