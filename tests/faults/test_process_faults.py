@@ -73,7 +73,8 @@ def waiting(keys, asked):
             return ""
     return answer(keys, asked)
 def idle(hand, asked):
-    if asked.prompt.value != prompt or prompt != "support":
+    is_held = prompt == "support" and asked.prompt.value == prompt
+    if not is_held or marker.with_suffix(".over").exists():
         follow(hand, asked)
 AutoKeys.answer, RehearsedHand.follow = waiting, idle
 from experiments.cli import main
