@@ -11,13 +11,13 @@ implicit part is an addition to the armature, so one articulated-body pass solve
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import floor
-from struct import Struct
 
 import numpy as np
 import pinocchio as pin
 
 from fakes.contact import NO_CONTACT
 from fakes.hand import Hand
+from fakes.joint_loads import JointLoads
 from fakes.joint_state import JointState
 from fakes.joints import JointResistance
 from fakes.push import HandView
@@ -37,8 +37,6 @@ _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
 _new = tuple.__new__
-# Wrench on foot and hand, torques that resist and that drive the joints, inertias.
-_LOADS = Struct("33d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +87,7 @@ class ArmPlant:
         self._dt = self._substep_ns * 1e-9
         self._resistance = JointResistance(constants, options.friction, self._dt)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
-        midway = 0.5 * (CYCLE_NS - self._substep_ns) * 1e-9
-        self._midway = np.array([1.0, midway, 0.0])
+        self._midway = np.array([1.0, 5e-10 * (CYCLE_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
         # counts of the encoders per joint angle, joint torque per puck unit
@@ -117,14 +114,8 @@ class ArmPlant:
         pin.forwardKinematics(self._model, self._data, self.q)
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
         self._wanted = hand.rotation.copy()
-        # Rows: sole's velocity, foot's turn, hand's velocity, hand's turn; the joints,
-        # for the torques that resist and for those of motors and disturbance.
-        self._B = np.vstack((np.zeros((12, 7)), np.eye(7), np.eye(7)))
-        self._A = self._B[:12]
+        self._loads = JointLoads()
         self._rates = [0.0] * 12
-        self._loads = bytearray(_LOADS.size)
-        loads = np.frombuffer(self._loads)
-        self._torques, self._inertias = loads[:26], loads[26:]
         self._linearise()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
 
@@ -194,8 +185,7 @@ class ArmPlant:
     def sensor_load(self, t_ns: int) -> Wrench:
         """Return the load on the wrist sensor in its own frame [N, N m].
 
-        Its mean over the cycle that ended last; the steps after that can wait, for
-        several in one go take less time.
+        Its mean over the cycle that ended last; the steps after that can wait.
         """
         self.advance(t_ns - t_ns % CYCLE_NS)
         return self._wrist.load()
@@ -260,7 +250,7 @@ class ArmPlant:
         Within the 2 ms sole and hand move along them; the joints themselves and their
         dynamics are never linearised. Everything is in the terrain frame.
         """
-        model, data, A = self._model, self._data, self._A
+        model, data, A = self._model, self._data, self._loads.A
         pin.forwardKinematics(model, data, self.q)
         sole = pin.updateFramePlacement(model, data, self._sole)
         hand = pin.updateFramePlacement(model, data, self._hand)
@@ -269,8 +259,9 @@ class ArmPlant:
         self._sole_at = (x, y, z)
         x, y, z = hand.translation.tolist()
         self._hand_at = (x, y, z)
-        E = self._wanted.dot(hand.rotation.T)
-        (_, xy, xz), (yx, _, yz), (zx, zy, _) = E.tolist()
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = self._wanted.dot(
+            hand.rotation.T
+        ).tolist()
         self._tilt = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
         pin.computeJointJacobians(model, data, self._midway.dot(self._joints.rows))
         pin.updateFramePlacement(model, data, self._sole)
@@ -285,12 +276,10 @@ class ArmPlant:
         dt, model, state = self._dt, self._model, self._joints.rows
         q, qd, _ = state.tolist()
         inertias, resistance = self._resistance.at(q, qd)
-        loads = (*wrench, *resistance, *self._driving, *inertias)
-        _LOADS.pack_into(self._loads, 0, *loads)
-        model.armature = self._inertias
-        tau = self._torques.dot(self._B)
+        tau = self._loads.torques(wrench, (resistance, self._driving), inertias)
+        model.armature = self._loads.inertias
         qdd = pin.aba(model, self._data, state[0], state[2], tau)
-        self._rates = rates = self._A.dot(self._joints.step(qdd)[1]).tolist()
+        self._rates = rates = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
         sx, sy, sz, _, _, _, hx, hy, hz, wx, wy, wz = rates
         x, y, z = self._sole_at
         self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)

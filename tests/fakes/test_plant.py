@@ -4,6 +4,7 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
+from fakes.joint_loads import JointLoads
 from fakes.joint_state import JointState
 from tests.fakes.scenes import (
     CONSTANTS,
@@ -317,3 +318,14 @@ def test_a_sensor_that_is_read_within_a_cycle_does_not_drive_the_arm_on():
     release(plant)
     plant.sensor_load(CYCLE_NS + CYCLE_NS // 2)
     assert plant.t_ns == CYCLE_NS  # the load is that of the cycle that has ended
+
+
+def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
+    rng = np.random.default_rng(1)
+    loads = JointLoads()
+    loads.A[...] = rng.standard_normal((12, 7))
+    wrench, resisting, driving = (rng.standard_normal(n) for n in (12, 7, 7))
+    inertias = [0.1 * i for i in range(7)]
+    found = loads.torques(wrench, (resisting, driving), inertias)
+    assert found == pytest.approx(loads.A.T @ wrench + resisting + driving)
+    assert loads.inertias.tolist() == inertias
