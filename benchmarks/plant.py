@@ -53,7 +53,7 @@ class Part:
 
 @dataclass(slots=True)
 class Notes:
-    """What the parts were given, one entry per substep; states per cycle."""
+    """What the parts were given: motions per substep, everything else per cycle."""
 
     motions: list[Motion] = field(default_factory=list)
     views: list[HandView] = field(default_factory=list)
@@ -209,12 +209,10 @@ def _contact(notes: Notes) -> Callable[[int], None]:
 
 
 def _hand(notes: Notes) -> Callable[[int], None]:
-    dt = CYCLE_NS * 1e-9 / SUBSTEPS
-    push = Push(Pace(), _random().hand, notes.views[0], dt)
+    push = Push(Pace(), _random().hand, notes.views[0], CYCLE_NS * 1e-9)
 
     def run(cycle: int) -> None:
-        for view in notes.views[SUBSTEPS * cycle : SUBSTEPS * (cycle + 1)]:
-            push.step(view)
+        push.step(notes.views[cycle])
 
     return run
 
@@ -224,7 +222,7 @@ def _truth(notes: Notes) -> Callable[[int], None]:
 
     def run(cycle: int) -> None:
         q = notes.states[cycle][0]
-        view = notes.views[SUBSTEPS * cycle]
+        view = notes.views[cycle]
         row = (*q.tolist(), *view.sole, *view.sole_v, *view.hand, *view.hand_v)
         truth.add(cycle, row)
 

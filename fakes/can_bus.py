@@ -27,6 +27,7 @@ class FakeCanBus(can.BusABC):
         self._clock = clock
         self._inbox: deque[can.Message] = deque()
         self._wired = WiredNetwork(network)
+        self._t_ns = -1  # how far it has gone on
         super().__init__(channel="fake")
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -40,7 +41,7 @@ class FakeCanBus(can.BusABC):
         if self._faults.is_off:
             self._refuse()
         now_ns = self._clock.now_ns()
-        self.advance(now_ns)
+        self.advance(now_ns)  # what was sent before takes the wire first
         if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
             self._wired.send(now_ns, msg.arbitration_id, bytes(msg.data))
 
@@ -60,6 +61,7 @@ class FakeCanBus(can.BusABC):
 
     def advance(self, t_ns: int) -> None:
         """Let wire and network go on to `t_ns`."""
+        self._t_ns = t_ns
         for last_bit_ns, can_id, data in self._wired.advance(t_ns):
             # positionally: stamp, identifier, is it an extended one
             message = can.Message(last_bit_ns / NS_PER_S, can_id, False, data=data)
@@ -77,10 +79,12 @@ class FakeCanBus(can.BusABC):
             self._refuse()
         clock = self._clock
         if self._filters is None:  # the way that nearly every question takes
-            if not self._inbox:
-                self.advance(clock.now_ns())
-            if self._inbox:
-                return self._inbox.popleft()
+            inbox = self._inbox
+            # What is sent is on the wire for a while: at one instant nothing new comes.
+            if not inbox and (now_ns := clock.now_ns()) != self._t_ns:
+                self.advance(now_ns)
+            if inbox:
+                return inbox.popleft()
             if timeout == 0:
                 return None
         patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)

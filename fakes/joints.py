@@ -11,6 +11,7 @@ from wam.model import drive_inertia_matrix
 _STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 _EPSILON = 0.01  # rad/s, where Coulomb friction saturates
 _STANDSTILL = 1e-9  # rad/s, keeps the secant finite
+_NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
 
 
 class JointResistance:
@@ -18,6 +19,9 @@ class JointResistance:
 
     D = diag(c tanh(|qd| / 0.01) / |qd| + viscous) is the secant of dry friction. Taken
     explicitly it is beyond stability for joint 7; so would be the damping of its stop.
+
+    Attributes:
+        is_near_stop: a joint was so near a stop that it may be there within a cycle.
     """
 
     def __init__(self, constants: ArmConstants, friction: float, dt: float) -> None:
@@ -28,6 +32,7 @@ class JointResistance:
             friction: share of the figures identified on another arm.
             dt: length of a step [s].
         """
+        self.is_near_stop = False
         self._dt = dt
         self._joints: list[tuple[float, float, float, float, float]] = list(
             zip(
@@ -42,28 +47,29 @@ class JointResistance:
 
     def at(
         self, q: Sequence[float], qd: Sequence[float]
-    ) -> tuple[list[float], list[float]]:
-        """Return (drive inertia + dt D [kg m^2], torques [N m]), seven each.
+    ) -> tuple[list[float], list[float], list[float]]:
+        """Return drive inertia + dt D [kg m^2], D [N m s/rad] and the stops' springs.
 
-        The torques are those of the stops and -D qd.
+        Seven of each; the springs push back with so much torque [N m].
 
         Args:
             q: joint positions [rad].
             qd: joint velocities [rad/s].
         """
         inertias: list[float] = []
-        torques: list[float] = []
-        dt, tanh = self._dt, math.tanh
-        add_inertia, add_torque = inertias.append, torques.append
-        for angle, rate, joint in zip(q, qd, self._joints, strict=True):
+        dampings: list[float] = []
+        springs = [0.0] * 7
+        is_near_stop = False
+        for i, (angle, rate, joint) in enumerate(zip(q, qd, self._joints, strict=True)):
             drive, dry, damping, lower, upper = joint
-            speed = (rate if rate > 0.0 else -rate) + _STANDSTILL
-            damping += dry * tanh(speed / _EPSILON) / speed
-            if lower <= angle <= upper:
-                add_torque(-damping * rate)
-            else:
-                damping += _STOP_B
-                beyond = angle - (lower if angle < lower else upper)
-                add_torque(-_STOP_K * beyond - damping * rate)
-            add_inertia(drive + dt * damping)
-        return inertias, torques
+            speed = abs(rate) + _STANDSTILL
+            damping += dry * math.tanh(speed / _EPSILON) / speed
+            if not lower + _NEAR <= angle <= upper - _NEAR:
+                is_near_stop = True
+                beyond = max(angle - upper, 0.0) - max(lower - angle, 0.0)
+                springs[i] = -_STOP_K * beyond
+                damping += _STOP_B if beyond else 0.0
+            dampings.append(damping)
+            inertias.append(drive + self._dt * damping)
+        self.is_near_stop = is_near_stop
+        return inertias, dampings, springs

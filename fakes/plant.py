@@ -6,6 +6,9 @@
 nle at q and qd + dt qdd / 2, M with drive inertia, D the resistance of the joints taken
 implicitly, w_s the ground's wrench at the sole, w_h the hand's at the forearm. The
 implicit part is an addition to the armature, so one articulated-body pass solves it.
+
+Ground and dynamics go on in substeps. What changes more slowly is taken anew once in a
+cycle of 2 ms: the Jacobians, D, and the force of the hand, which has 10 Hz at most.
 """
 
 from collections.abc import Sequence
@@ -20,23 +23,20 @@ from fakes.hand import Hand
 from fakes.joint_loads import JointLoads
 from fakes.joint_state import JointState
 from fakes.joints import JointResistance
+from fakes.plant_model import FOREARM_MASS, arm_and_hand
 from fakes.push import HandView
 from fakes.terrain import Terrain
 from fakes.truth import Truth
 from fakes.wrist import Wrench, Wrist
 from ft_sensor.payload import TerrainFrame
 from wam.constants import GRAVITY, ArmConstants, Array
-from wam.model import add_point, build_pinocchio
 from wam.tool import Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 CYCLE_NS = 2_000_000
-FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
-_HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
-_new = tuple.__new__
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +76,8 @@ class ArmPlant:
     ) -> None:
         options = options or PlantOptions()
         self._constants = constants
-        self._model = model = build_pinocchio(constants, (tool.sensor, tool.foot))
-        self._stand_in(frame)
-        self._add_forearm(constants)
-        self._sole = add_point(model, constants, "sole", tool.sole)
-        self._data = model.createData()
+        self._model, self._sole, self._hand = arm_and_hand(constants, tool, frame)
+        self._data = self._model.createData()
         self._wrist = Wrist(tool, frame.axes()[:, 2], CYCLE_NS * 1e-9)
         self._substeps = options.substeps
         self._substep_ns = CYCLE_NS // options.substeps
@@ -95,17 +92,19 @@ class ArmPlant:
         self._to_counts = turns[:, None] * constants.j2mp
         self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._tau = np.zeros(7)
+        self._stops = np.zeros(7)
         self._driving = [0.0] * 7
         self._is_held = True
         self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
-        self.hand = Hand(self._dt)
+        self.hand = Hand(CYCLE_NS * 1e-9)
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
         self._sum = _NOTHING  # of the ground's wrench over a cycle
         self._ground = [0.0] * 6  # its mean
         self._push = (0.0, 0.0, 0.0)
+        self._held = (0.0, 0.0, 0.0)  # that and the weight the person carries
         self._joints = JointState(q, self._dt)
         self._prepare()
 
@@ -118,26 +117,6 @@ class ArmPlant:
         self._rates = [0.0] * 12
         self._linearise()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
-
-    def _stand_in(self, frame: TerrainFrame) -> None:
-        """Let the terrain frame be the world of the model: nothing is to be turned."""
-        model, axes = self._model, frame.axes()
-        base = pin.SE3(axes, -axes.dot(frame.far_end))
-        model.jointPlacements[1] = base * model.jointPlacements[1]
-        model.gravity.linear = axes.dot(model.gravity.linear)
-
-    def _add_forearm(self, constants: ArmConstants) -> None:
-        """Add the hand's frame on link 6 and the mass of a forearm in it."""
-        model = self._model
-        alpha, height = constants.alpha[5], constants.d[6] - _HAND_ABOVE_PLATE
-        c, s = np.cos(alpha), np.sin(alpha)
-        tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-        link = pin.SE3(tilt, np.array([constants.a[5], 0.0, constants.d[5]]))
-        placement = link * pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
-        frame = pin.Frame("hand", 6, 0, placement, pin.FrameType.OP_FRAME)
-        self._hand = model.addFrame(frame)
-        arm = pin.Inertia(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
-        model.appendBodyToJoint(6, placement.act(arm), pin.SE3.Identity())
 
     @property
     def q(self) -> Array:
@@ -167,8 +146,8 @@ class ArmPlant:
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        self._tau = tau = self._of_units.dot(units)
-        self._driving = (tau + self.disturbance).tolist()
+        self._tau = self._of_units.dot(units)
+        self._drive()
 
     def set_braking(self, is_braked: bool, is_powered: bool) -> None:
         """Hold the joints (braked), or let them follow torque or fall."""
@@ -178,7 +157,7 @@ class ArmPlant:
             self._rates = [0.0] * 12
         if is_braked or not is_powered:
             self._tau = np.zeros(7)
-            self._driving = self.disturbance.tolist()
+            self._drive()
 
     # --- what the sensor feels ----------------------------------------------------
 
@@ -219,30 +198,48 @@ class ArmPlant:
 
     def _step(self) -> None:
         if self.t_ns % CYCLE_NS == 0:
-            self._linearise()
+            self._begin_cycle()
         self.t_ns += self._substep_ns
-        sx, sy, sz, fx, fy, fz, hx, hy, hz, wx, wy, wz = self._rates
-        x, y, z = self._sole_at
+        sx, sy, sz, fx, fy, fz, _, _, _, wx, wy, wz = self._rates
         contact = NO_CONTACT
         if self.terrain is not None:
-            contact = self.terrain.step(self._dt, (x, y, z, sx, sy, sz, fx, fy, fz))
-        # What HandView(...) does, without a call of Python.
-        view = _new(HandView, ((x, y, z), (sx, sy, sz), self._hand_at, (hx, hy, hz)))
-        self._push = push = self.hand.step(view)
+            motion = (*self._sole_at, sx, sy, sz, fx, fy, fz)
+            contact = self.terrain.step(self._dt, motion)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
         a, b, c, d, e, f = self._sum
         self._sum = (a - F_t, b + F_y, c + F_n, d + M_x, e + M_y, f + M_z)
         if not self._is_held:
             k, b = _GRIP if self.hand.is_holding else _NO_GRIP
-            px, py, pz = push
-            ux, uy, uz = self._up
             ex, ey, ez = self._tilt
             ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
-            held = (px + ux, py + uy, pz + uz)
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
-            self._integrate((*ground, *held, *turned))
+            self._integrate((*ground, *self._held, *turned))
         if self.t_ns % CYCLE_NS == 0:
             self._end_cycle()
+
+    def _begin_cycle(self) -> None:
+        """Take anew what stays as it is for 2 ms."""
+        self._linearise()
+        rates, hand_at = self._rates, self._hand_at
+        sx, sy, sz, _, _, _, hx, hy, hz, _, _, _ = rates
+        view = HandView(self._sole_at, (sx, sy, sz), hand_at, (hx, hy, hz))
+        self._push = x, y, z = self.hand.step(view)
+        ux, uy, uz = self._up
+        self._held = (x + ux, y + uy, z + uz)
+        if not self._is_held:
+            self._resist(*self._joints.rows[:2].tolist())
+
+    def _resist(self, q: list[float], qd: list[float]) -> None:
+        """Take friction and stops as they are at `q` [rad] and `qd` [rad/s]."""
+        inertias, dampings, springs = self._resistance.at(q, qd)
+        self._model.armature = np.array(inertias)
+        self._loads.resist(dampings)
+        self._stops = np.array(springs)
+        self._drive()
+
+    def _drive(self) -> None:
+        """Add up what drives the joints, whatever they do in a substep."""
+        self._driving = (self._tau + self.disturbance + self._stops).tolist()
 
     def _linearise(self) -> None:
         """Take positions and Jacobians anew, once per cycle.
@@ -269,22 +266,18 @@ class ArmPlant:
         A[:6] = pin.getFrameJacobian(model, data, self._sole, _AXES)
         A[6:] = pin.getFrameJacobian(model, data, self._hand, _AXES)
         self._rates = A.dot(self.qd).tolist()
-        self._driving = (self._tau + self.disturbance).tolist()
 
     def _integrate(self, wrench: tuple[float, ...]) -> None:
         """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
-        dt, model, state = self._dt, self._model, self._joints.rows
-        q, qd, _ = state.tolist()
-        inertias, resistance = self._resistance.at(q, qd)
-        tau = self._loads.torques(wrench, (resistance, self._driving), inertias)
-        model.armature = self._loads.inertias
-        qdd = pin.aba(model, self._data, state[0], state[2], tau)
+        dt, state = self._dt, self._joints.rows
+        if self._resistance.is_near_stop:
+            self._resist(*state[:2].tolist())
+        tau = self._loads.torques(wrench, state[1].tolist(), self._driving)
+        qdd = pin.aba(self._model, self._data, state[0], state[2], tau)
         self._rates = rates = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
-        sx, sy, sz, _, _, _, hx, hy, hz, wx, wy, wz = rates
+        sx, sy, sz, _, _, _, _, _, _, wx, wy, wz = rates
         x, y, z = self._sole_at
         self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
-        x, y, z = self._hand_at
-        self._hand_at = (x + dt * hx, y + dt * hy, z + dt * hz)
         x, y, z = self._tilt
         self._tilt = (x - dt * wx, y - dt * wy, z - dt * wz)
 

@@ -166,6 +166,14 @@ class ArmConstants:
     text: str
 
 
+def _reason(error: Exception) -> str:
+    """Return in a line what is wrong with the file."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False)[0]
+    return f"{'.'.join(map(str, first['loc']))}: {first['msg'].lower()}"
+
+
 def load_constants(text: str | None = None) -> ArmConstants:
     """Return the constants in `text` (TOML), by default those shipped.
 
@@ -178,7 +186,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
         file = _File.model_validate(tomllib.loads(text))
     except (tomllib.TOMLDecodeError, ValidationError, RecursionError) as error:
         raise SettingsError(
-            f"The arm model cannot be read: {error}.",
+            f"The arm model cannot be read: {_reason(error)}.",
             hint="Use the model shipped with Traction as a pattern.",
         ) from error
     links = tuple(

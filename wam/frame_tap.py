@@ -27,10 +27,10 @@ class FrameTap:
         for can_id, data, stamp in frames:
             t_ns = now_ns
             if stamp:
-                stamp_ns = round(stamp * NS_PER_S)
-                if 0 <= now_ns - stamp_ns + offset_ns < _PLAUSIBLE_NS:
-                    t_ns = stamp_ns - offset_ns
-                elif 0 <= now_ns - stamp_ns < _PLAUSIBLE_NS:
-                    t_ns = stamp_ns
+                t_ns = round(stamp * NS_PER_S)
+                if not 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
+                    t_ns -= offset_ns
+                    if not 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
+                        t_ns = now_ns
             rows.append((t_ns, can_id, len(data), data))
         self._tape.add(rows)

@@ -22,6 +22,7 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
+_POSITION_SIZES = frozenset({3, 6})  # without and with a joint encoder's
 _POSITION_MODULUS = 1 << 22
 _POSITION_SIGN = 1 << 21
 _TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
@@ -175,11 +176,9 @@ def decode_position(data: Payload) -> int:
     Raises:
         FrameError: not 3 or 6 bytes, or the two spare bits are set.
     """
-    length = len(data)
-    high = data[0] if length else 0
-    if (length not in (3, 6)) or high > 0x3F:
+    counts = int.from_bytes(data[:3], "big")
+    if len(data) not in _POSITION_SIZES or counts >= _POSITION_MODULUS:
         raise FrameError("Not a position reply", data)
-    counts = high << 16 | data[1] << 8 | data[2]
     return counts - _POSITION_MODULUS if counts & _POSITION_SIGN else counts
 
 

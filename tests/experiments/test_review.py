@@ -90,19 +90,22 @@ def test_a_sensor_in_trouble_is_marked(
     assert review.lines()[1] == (WARNING, words)
 
 
+def test_less_than_three_trials_before_say_nothing(first_trial):
+    review = review_trial(first_trial)
+    for earlier in ([], [0.1, 0.1]):
+        found, text = review.lines(earlier)[4]
+        assert found == GOOD
+        assert "before" not in text
+
+
 @pytest.mark.parametrize(
-    ("earlier", "mark", "words"),
-    [
-        ([], GOOD, ""),
-        ([0.1, 0.1], GOOD, ""),
-        ([0.75, 0.80, 0.85], GOOD, "(3 before: 0.80 ± 0.05)"),
-        ([0.1, 0.11, 0.12], WARNING, "(3 before: 0.11 ± 0.01)"),
-    ],
+    ("off", "mark"),
+    [(0.0, GOOD), (0.29, GOOD), (0.31, WARNING), (-0.29, GOOD), (-0.31, WARNING)],
 )
-def test_the_quick_fit_is_held_against_the_trials_before(
-    first_trial, earlier, mark, words
-):
-    found, text = review_trial(first_trial).lines(earlier)[4]
+def test_the_quick_fit_is_held_against_the_trials_before(first_trial, off, mark):
+    """Three standard deviations, 0.1 each, are the limit."""
+    review = review_trial(first_trial)
+    middle = review.ratio + off
+    found, text = review.lines([middle - 0.1, middle, middle + 0.1])[4]
     assert found == mark
-    assert text.endswith(words)
-    assert ("before" in text) is bool(words)
+    assert text.endswith(f"(3 before: {middle:.2f} ± 0.10)")

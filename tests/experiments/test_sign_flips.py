@@ -21,7 +21,8 @@ from wam.transmission import Transmission
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
-LARGEST_V, LARGEST_F = 1.5e-3, 1.5  # m/s rms, N mean: drift and bias of one trial
+# m/s rms; N mean: three standard deviations of drift and bias of one trial
+LARGEST_V, LARGEST_F = 1.5e-3, 1.0
 
 
 class ReadingRig(fakes.rig.FakeRig):

@@ -324,8 +324,8 @@ def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
     rng = np.random.default_rng(1)
     loads = JointLoads()
     loads.A[...] = rng.standard_normal((12, 7))
-    wrench, resisting, driving = (rng.standard_normal(n) for n in (12, 7, 7))
-    inertias = [0.1 * i for i in range(7)]
-    found = loads.torques(wrench, (resisting, driving), inertias)
-    assert found == pytest.approx(loads.A.T @ wrench + resisting + driving)
-    assert loads.inertias.tolist() == inertias
+    damping = rng.random(7)
+    loads.resist(damping.tolist())
+    wrench, qd, driving = (rng.standard_normal(n) for n in (12, 7, 7))
+    found = loads.torques(wrench, qd, driving)
+    assert found == pytest.approx(loads.A.T @ wrench - damping * qd + driving)

@@ -72,3 +72,13 @@ def test_a_malformed_model_is_a_settings_error(name):
     with pytest.raises(SettingsError, match="arm model cannot be read") as caught:
         load_constants(MALFORMED[name])
     assert caught.value.hint
+
+
+def test_what_is_missing_in_an_arm_model_is_named_in_a_line():
+    text = load_constants().text.replace("[gravity]", "[weight]")
+    with pytest.raises(SettingsError) as caught:
+        load_constants(text)
+    message = str(caught.value)
+    assert "gravity: field required" in message
+    assert "\n" not in message
+    assert "http" not in message
