@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from acquisition.board import Board, Role
-from acquisition.cycle import ArmState, Cycle
+from acquisition.control import ArmState
+from acquisition.cycle import Cycle
 from acquisition.devices import Arm
 from acquisition.guard import Action, Verdict
 from acquisition.loop import LoopStats, Tick

@@ -1,13 +1,12 @@
 """One cycle: read, check, command, sample. It has no waiting of its own."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from enum import IntEnum
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 
 from acquisition import flags
+from acquisition.control import ArmState, ControlLaw, ControlStatus, FootObserver
 from acquisition.devices import (
     Arm,
     ArmReading,
@@ -25,17 +24,6 @@ _ZERO = np.zeros(7)
 _OF_CIRCUIT = frozenset({"estop", "pendant-idle"})  # verdicts that may have a cause
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 
-
-class ArmState(IntEnum):
-    """What the arm is doing (architecture: safety states)."""
-
-    IDLE = 0
-    FLOAT = 1
-    HOLD = 2
-    DAMP = 3
-    UNKNOWN = 4
-
-
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _UNKNOWN = ArmState.UNKNOWN
@@ -43,63 +31,6 @@ _ACTIVE = SafetyMode.ACTIVE
 _E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
-
-
-class ControlLaw(Protocol):
-    """Torques from positions."""
-
-    def enter(self, state: ArmState, reading: ArmReading) -> None:
-        """Begin `state` without a jump in torque."""
-        ...
-
-    def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
-        """Return (joint torques, their gravity part) [N m], shapes (7,)."""
-        ...
-
-    def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
-        """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
-
-        No joint is faster than `speed` [rad/s].
-
-        Raises:
-            ValueError: the arm is not in hold, or `goal` cannot be reached so.
-        """
-        ...
-
-    def joint7_offset(self, reading: ArmReading) -> float:
-        """Return how far joint 7 is from where it was locked [rad]."""
-        ...
-
-
-class FootObserver(Protocol):
-    """Fills in what follows from joints and wrench: foot and traction."""
-
-    def observe(
-        self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
-    ) -> float:
-        """Write foot pose, twist, wrench and traction; return the sole's speed."""
-        ...
-
-    def set_bias(self, bias: Sequence[float]) -> None:
-        """Take the sensor's reading without load [N, N m], six numbers."""
-        ...
-
-
-@dataclass(slots=True)
-class ControlStatus:
-    """What the console sees of the loop.
-
-    Attributes:
-        state: what the arm is doing.
-        safety: what the safety circuit says.
-        verdict: the worst the guard has said since the last request; None = nothing.
-        ft_age_ns: age of the force sample [ns].
-    """
-
-    state: ArmState = ArmState.IDLE
-    safety: SafetyMode = SafetyMode.UNKNOWN
-    verdict: Verdict | None = None
-    ft_age_ns: int = 0
 
 
 class Cycle:

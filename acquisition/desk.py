@@ -6,7 +6,7 @@ from typing import Protocol
 
 from acquisition.board import Board, Role
 from acquisition.clock import NS_PER_S, Clock
-from acquisition.cycle import ArmState, ControlStatus
+from acquisition.control import ArmState, ControlStatus
 from acquisition.loop import PERIOD_NS, Loop
 from acquisition.mailbox import Kind, LoopStatus, Mailbox, StatusBoard
 from acquisition.recorder import Recorder

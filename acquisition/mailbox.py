@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from acquisition.cycle import ArmState, ControlStatus
+from acquisition.control import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.guard import Action, Verdict
 from acquisition.shared import Ring, Slot

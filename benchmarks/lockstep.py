@@ -16,7 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.trial_file.writer import TrialHeader
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import load_settings

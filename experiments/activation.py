@@ -1,6 +1,6 @@
 """The pendant activates the arm: torques are ready before, a person says when."""
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.sample import MOTOR_FRESH_SHIFT
 from experiments.messages import preflight_error, pucks_have

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition.board import TIMING_DTYPE
 from acquisition.clock import NS_PER_S
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import Record

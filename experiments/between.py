@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.errors import SessionError
 from experiments.company import FaultedError
 from experiments.foot_keys import FootKeys

@@ -1,6 +1,6 @@
 """One trial on the loop: started, followed, ended, sealed, and what it is worth."""
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.errors import TractionError, TrialFileError
 from acquisition.processes import ProcessLostError
 from acquisition.trial_file.writer import TrialHeader

@@ -2,7 +2,7 @@
 
 import traceback
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.errors import TractionError
 from experiments.activation import activate
 from experiments.archive import Archive

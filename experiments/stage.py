@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.desk import Desk
 from acquisition.guard import Verdict
 from experiments.company import Company, FaultedError, StopAskedError

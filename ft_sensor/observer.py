@@ -13,7 +13,7 @@ from wam.model import ArmModel
 
 
 class LiveFoot:
-    """Implements acquisition.cycle.FootObserver with model, payload and terrain."""
+    """Implements acquisition.control.FootObserver with model, payload and terrain."""
 
     def __init__(
         self, model: ArmModel, payload: Payload, terrain: TerrainFrame

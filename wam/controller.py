@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import ArmReading, Vector
 from wam.gravity import VirtualMass, compensation
 from wam.joint_lock import JointLock, LockGains
@@ -15,7 +15,7 @@ MOVE_SHARE = 0.9  # of the torque limits that a move may use, gravity included
 
 
 class FootController:
-    """Torques of float, hold and damp (implements acquisition.cycle.ControlLaw).
+    """Torques of float, hold and damp (implements acquisition.control.ControlLaw).
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
     their bounce. hold and damp: gravity plus joint damping, virtual mass ramped to 0.

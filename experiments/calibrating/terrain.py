@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.errors import PreflightError
 from experiments.activation import activate
 from experiments.operator import Prompt

@@ -4,7 +4,7 @@ import pytest
 
 from acquisition.attendant import Attendant, Surroundings
 from acquisition.board import Board, Role
-from acquisition.cycle import ArmState, ControlStatus
+from acquisition.control import ArmState, ControlStatus
 from acquisition.guard import Action
 from acquisition.loop import PERIOD_NS, Tick
 from acquisition.mailbox import Kind, Mailbox, StatusBoard

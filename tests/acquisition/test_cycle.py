@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.cycle import ArmState, Cycle
+from acquisition.control import ArmState
+from acquisition.cycle import Cycle
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
 from acquisition.guard import Limits

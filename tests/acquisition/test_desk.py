@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.board import Board, Role
-from acquisition.cycle import ArmState, ControlStatus
+from acquisition.control import ArmState, ControlStatus
 from acquisition.desk import Desk
 from acquisition.guard import Action, Verdict
 from acquisition.loop import PERIOD_NS

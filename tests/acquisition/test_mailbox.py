@@ -1,7 +1,7 @@
 import pytest
 
 from acquisition.board import Board
-from acquisition.cycle import ArmState, ControlStatus
+from acquisition.control import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.guard import Action, Verdict
 from acquisition.mailbox import Kind, LoopStatus, Mailbox, StatusBoard

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.guard import Action
 from experiments.rigs import FakeOptions, build_rig

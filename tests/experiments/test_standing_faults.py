@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from experiments import simulated
 from experiments.operator import Prompt
 from experiments.session import replay

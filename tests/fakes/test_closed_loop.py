@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from fakes.clock import SteppedClock
 from fakes.plant import PlantOptions
 from fakes.rig import FakeRig, Scene, solve_start

@@ -10,7 +10,8 @@ import pytest
 import experiments.conduct
 import experiments.runner
 import fakes.rig
-from acquisition.cycle import ArmState, Cycle
+from acquisition.control import ArmState
+from acquisition.cycle import Cycle
 from acquisition.devices import SafetyMode
 from acquisition.guard import Limits
 from acquisition.trial_file.verify import verify

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import SafetyMode
 from tests.experiments.program import traction, write_config
 from tests.faults.expected import End

@@ -8,7 +8,7 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 
 from acquisition.clock import NS_PER_S
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.messages import CYCLE
 from tests.processes.watching import is_running, session, until, wait

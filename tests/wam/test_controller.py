@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 
-from acquisition.cycle import ArmState
+from acquisition.control import ArmState
 from acquisition.devices import ArmReading
 from wam.controller import FootController
 from wam.gravity import compensation
