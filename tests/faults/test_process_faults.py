@@ -3,7 +3,6 @@
 import contextlib
 import os
 import pty
-import re
 import select
 import signal
 import subprocess
@@ -32,9 +31,6 @@ from tests.processes.watching import (
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(180)]
 TRIES = 3  # a session may stop because the machine stood still
-STALLED = re.compile(
-    "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
-)
 REACTION = 0.6  # s, from the fault to an arm that holds or is braked
 SAFE = {ArmState.HOLD, ArmState.DAMP, ArmState.IDLE}
 BRAKED = {SafetyMode.IDLE, SafetyMode.E_STOP}
@@ -166,11 +162,6 @@ def waiting_in(phase, folder, fault):
         scene.close_terminal()
 
 
-def has_stalled(seen):
-    """Return whether the arm was stopped because the machine stood still."""
-    return STALLED.search(seen.output()) is not None
-
-
 def codes_of(fault, cell):
     """Return the exit codes; a second Ctrl-C may come when the session has ended."""
     return CODES[cell.end] | ({130} if fault == "SIGINT twice" else set())
@@ -186,7 +177,7 @@ def arrive(scene, phase):
         return scene.marker.exists()
 
     if not until(is_there, 60):
-        assert has_stalled(seen), seen.output()
+        assert seen.has_stalled(), seen.output()
         return False
     children = children_of(seen.process.pid)
     seen.pids = {name: children[short] for name, short in NAMES.items()}
@@ -253,7 +244,7 @@ def is_survived(folder, fault, phase, cell):
             scene.go_on()
         assert until(lambda: not is_running(seen.process.pid), 60), seen.output()
         code = seen.process.wait(1)
-        if code not in codes_of(fault, cell) and has_stalled(seen):
+        if code not in codes_of(fault, cell) and seen.has_stalled():
             return False
         assert code in codes_of(fault, cell), seen.output()
         assert "Traceback" not in seen.output()

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -26,11 +27,8 @@ NAMES = {
     "sensor reader": "traction-reader",
     "fake rig": "traction-fake",
 }
-STALLED = (
-    "late cycles",
-    "No reply from the arm",
-    "not answered for",
-    " ms old (limit",
+STALLED = re.compile(
+    "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
 )
 START = "import sys; from experiments.cli import main; sys.exit(main())"
 
@@ -97,7 +95,7 @@ class Session:
 
     def has_stalled(self):
         """Return whether the arm was stopped because the machine stood still."""
-        return any(word in self.output() for word in STALLED)
+        return STALLED.search(self.output()) is not None
 
     def journal(self):
         paths = list(self.data.glob("sessions/*/events.jsonl"))
