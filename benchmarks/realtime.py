@@ -13,7 +13,6 @@ import dataclasses
 import json
 import os
 import shutil
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -21,43 +20,17 @@ from contextlib import closing
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition.loop import LATE_NS, PERIOD_NS
 from acquisition.realtime import choose_cores
 from acquisition.sample import Record
-from experiments.bench import BenchReport, ProcessUse, run_bench
+from benchmarks.realtime_table import Found, Times, Window, table
+from experiments.bench import run_bench
 from experiments.preflight import start_devices
 from experiments.process_crew import ProcessCrew
 from experiments.rigs import FakeOptions, Rig, build_rig
 from experiments.settings import Settings, load_settings
 
 C_FILES = Path(__file__).parent / "c"
-NEAR_NS = 4_000_000
-QUANTILES = (50.0, 99.0, 99.9)
-Times = NDArray[np.int64]
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Row:
-    """One line of the table; `is_met` None = nothing was promised."""
-
-    what: str
-    goal: str
-    measured: str
-    is_met: bool | None
-
-
-@dataclasses.dataclass(frozen=True, slots=True)
-class Window:
-    """Cycles of one window: columns deadline, woke, replies, sent [ns]."""
-
-    cycles: Times
-
-    @property
-    def late(self) -> Times:
-        """Lateness of each wake-up [ns]."""
-        return self.cycles[:, 1] - self.cycles[:, 0]
 
 
 def compiled(folder: Path) -> tuple[Path, Path]:
@@ -83,24 +56,6 @@ def in_c(program: Path, core: int, seconds: float, bus: str = "") -> Window:
     )
 
 
-def missed(cycles: Times) -> Times:
-    """Return when cycles were missed [ns]: begun late, or skipped."""
-    late = cycles[:, 1] - cycles[:, 0] > LATE_NS
-    gaps = np.diff(cycles[:, 0], prepend=cycles[0, 0] - PERIOD_NS) // PERIOD_NS - 1
-    return np.repeat(cycles[:, 1], np.maximum(gaps, 0) + late)
-
-
-def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
-    """Return which of `moments` lie within 4 ms of a witnessed stall."""
-    if not len(stalls):
-        return np.zeros(len(moments), bool)
-    ends, lengths = stalls[:, 0], stalls[:, 1]
-    near = (moments[:, None] >= (ends - lengths - NEAR_NS)[None, :]) & (
-        moments[:, None] <= (ends + NEAR_NS)[None, :]
-    )
-    return near.any(axis=1)
-
-
 def settings_with_bus_sensor() -> Settings:
     """Return the shipped settings with the wrist sensor on the arm's bus."""
     settings = load_settings(None)
@@ -108,29 +63,6 @@ def settings_with_bus_sensor() -> Settings:
     return dataclasses.replace(
         settings, rig=settings.rig.model_copy(update={"ft_sensor": sensor})
     )
-
-
-@dataclasses.dataclass(slots=True)
-class Found:
-    """What the windows gave: loop reports, the loop's cycles, both C programs."""
-
-    reports: list[BenchReport] = dataclasses.field(default_factory=list)
-    loops: list[Window] = dataclasses.field(default_factory=list)
-    wakes: list[Window] = dataclasses.field(default_factory=list)
-    exchanges: list[Window] = dataclasses.field(default_factory=list)
-
-    def cycles(self) -> Times:
-        """Return all cycles of the loop, shape (n, 4)."""
-        return np.concatenate([window.cycles for window in self.loops])
-
-    def cpu(self, process: str) -> float:
-        """Return the median share of a core that `process` used."""
-        return statistics.median(use_of(r, process).cpu for r in self.reports)
-
-
-def use_of(report: BenchReport, process: str) -> ProcessUse:
-    """Return what `process` used."""
-    return next(use for use in report.processes if use.name == process)
 
 
 def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> Found:
@@ -162,118 +94,6 @@ def columns(timings: Record) -> Times:
     return np.column_stack([timings[name].astype(np.int64) for name in names])
 
 
-def quantiles(times: Times) -> str:
-    """Return 50, 99 and 99.9 % and the largest [us] as text."""
-    values = [*np.percentile(times, QUANTILES), times.max()]
-    return " / ".join(f"{value / 1000:.0f}" for value in values) + " us"
-
-
-def cycle_rows(found: Found, stalls: Times) -> list[Row]:
-    """Return the lines on what happens within a cycle."""
-    cycles = found.cycles()
-    whole = (cycles[:, 2] > cycles[:, 1]) & (cycles[:, 3] >= cycles[:, 2])
-    clean = cycles[whole & ~explained(cycles[:, 1], stalls)]
-    compute, out = clean[:, 3] - clean[:, 2], clean[:, 3] - clean[:, 0]
-    c_50, c_999 = np.percentile(compute, (50, 99.9)) / 1000
-    o_50, o_999 = np.percentile(out, (50, 99.9)) / 1000
-    in_c_out = np.concatenate([w.cycles[w.cycles[:, 3] > 0] for w in found.exchanges])
-    return [
-        Row(
-            "compute, last reply to torque, clean: p50, p99.9",
-            "<= 150, 400 us",
-            f"{c_50:.0f}, {c_999:.0f} us",
-            bool(c_50 <= 150 and c_999 <= 400),
-        ),
-        Row(
-            "torque out after release, clean: p50, p99.9",
-            "<= 1400, 1800 us",
-            f"{o_50:.0f}, {o_999:.0f} us",
-            bool(o_50 <= 1400 and o_999 <= 1800),
-        ),
-        Row(
-            "  in C, p50 / p99 / p99.9 / max",
-            "",
-            quantiles(in_c_out[:, 3] - in_c_out[:, 0]),
-            None,
-        ),
-    ]
-
-
-def wake_rows(found: Found) -> list[Row]:
-    """Return the lines on waking up, medians over the windows for the ratios."""
-    ratio = {
-        q: statistics.median(
-            np.percentile(loop.late, q) / np.percentile(wake.late, q)
-            for loop, wake in zip(found.loops, found.wakes, strict=True)
-        )
-        for q in QUANTILES
-    }
-    cycles = found.cycles()
-    return [
-        Row(
-            "wake-up, p50 / p99 / p99.9 / max",
-            "",
-            quantiles(cycles[:, 1] - cycles[:, 0]),
-            None,
-        ),
-        Row(
-            "  in C",
-            "",
-            quantiles(np.concatenate([wake.late for wake in found.wakes])),
-            None,
-        ),
-        Row(
-            "wake-up against C: p50, p99 (p99.9)",
-            "<= 1.5, 1.5",
-            f"{ratio[50.0]:.2f}, {ratio[99.0]:.2f} ({ratio[99.9]:.2f})",
-            bool(ratio[50.0] <= 1.5 and ratio[99.0] <= 1.5),
-        ),
-    ]
-
-
-def miss_rows(found: Found, stalls: Times) -> list[Row]:
-    """Return the lines on missed cycles."""
-    count = len(found.cycles())
-    own = np.concatenate([missed(window.cycles) for window in found.loops])
-    theirs = np.concatenate([missed(window.cycles) for window in found.exchanges])
-    in_c_count = sum(len(window.cycles) for window in found.exchanges)
-    unexplained = int((~explained(own, stalls)).sum())
-    per_million = unexplained / count * 1e6
-    allowed = 1.5 * len(theirs) * count / in_c_count + 5
-    return [
-        Row(
-            "missed, not explained",
-            "<= 100 per million",
-            f"{unexplained} of {count} ({per_million:.0f} per million)",
-            per_million <= 100,
-        ),
-        Row(
-            "missed, all",
-            f"<= {allowed:.0f} (1.5 x C + 5)",
-            f"{len(own)}; C {len(theirs)} of {in_c_count}",
-            len(own) <= allowed,
-        ),
-        Row("stalls seen by the witness", "", str(len(stalls)), None),
-    ]
-
-
-def use_rows(found: Found) -> list[Row]:
-    """Return the lines on processors, memory and the recorder."""
-    loop, recorder = found.cpu("control"), found.cpu("recorder")
-    faults = sum(use_of(r, "control").page_faults for r in found.reports[1:])
-    lost = sum(report.lost for report in found.reports)
-    return [
-        Row(
-            "CPU of a core: loop, recorder",
-            "<= 30, 5 %",
-            f"{loop:.0%}, {recorder:.0%}",
-            loop <= 0.30 and recorder <= 0.05,
-        ),
-        Row("samples lost by the recorder", "0", str(lost), lost == 0),
-        Row("page faults in the loop, warm", "0", str(faults), faults == 0),
-    ]
-
-
 def main() -> None:
     """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -303,12 +123,7 @@ def main() -> None:
                 process.wait()
         text = seen.read_text().split("\n")[:-1]
         stalls = np.array([line.split() for line in text], int).reshape(-1, 2)
-    rows = [
-        *cycle_rows(found, stalls),
-        *wake_rows(found),
-        *miss_rows(found, stalls),
-        *use_rows(found),
-    ]
+    rows = table(found, stalls)
     if args.json:
         print(json.dumps([dataclasses.asdict(row) for row in rows], indent=2))
         return
