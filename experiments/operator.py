@@ -159,3 +159,5 @@ class RehearsedHand:
             self._rehearsal.put_down()
         elif asked.prompt is Prompt.RECORDING:
             self._rehearsal.push()
+        elif asked.prompt is Prompt.REVIEW:
+            self._rehearsal.rest()

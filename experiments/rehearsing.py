@@ -26,6 +26,10 @@ class Rehearsing(Protocol):
         """Let the hand lift the foot above the far end."""
         ...
 
+    def rest(self) -> None:
+        """Let the hand stop pushing and lie on the arm."""
+        ...
+
     def let_go(self) -> None:
         """Let the hand let go of the arm."""
         ...
@@ -77,6 +81,10 @@ class RemoteRehearsal:
     def lift(self) -> None:
         """Let the hand lift the foot above the far end."""
         self._child.ask("lift")
+
+    def rest(self) -> None:
+        """Let the hand stop pushing and lie on the arm."""
+        self._child.ask("rest")
 
     def let_go(self) -> None:
         """Let the hand let go of the arm."""

@@ -91,6 +91,11 @@ class Hand:
         """Push the foot across the container."""
         self._pending = (pace, rng)
 
+    def rest(self) -> None:
+        """Stop where it is and lie on the arm."""
+        self.carry()
+        self._rests_then = True
+
     def let_go(self) -> None:
         """Take the hand away."""
         self.phase = Phase.AWAY

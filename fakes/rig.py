@@ -248,6 +248,10 @@ class Rehearsal:
         self.rig.errors.settle()
         self.rig.plant.hand.lift_to_start()
 
+    def rest(self) -> None:
+        """Let the hand stop pushing and lie on the arm."""
+        self.rig.plant.hand.rest()
+
     def let_go(self) -> None:
         """Let the hand let go of the arm."""
         self.rig.plant.hand.let_go()

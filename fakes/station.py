@@ -147,6 +147,7 @@ def rehearsal_handlers(rehearsal: Rehearsal) -> dict[str, Handler]:
     return {
         "prepare": rehearsal.prepare,
         "lift": lambda _: rehearsal.lift(),
+        "rest": lambda _: rehearsal.rest(),
         "let_go": lambda _: rehearsal.let_go(),
         "put_down": lambda _: rehearsal.put_down(),
         "touch": rehearsal.touch,

@@ -52,7 +52,8 @@ def test_the_hand_does_each_thing_once_per_prompt():
     for prompt in (Prompt.LIFT, Prompt.LIFT, Prompt.READY, Prompt.READY):
         hand.follow(Asked(prompt, 2, 3, False, 0.0))
     hand.follow(Asked(Prompt.RECORDING, 2, 3, False, 0.0))
-    assert done == [("lift",), ("prepare", 2002), ("put_down",), ("push",)]
+    hand.follow(Asked(Prompt.REVIEW, 2, 3, True, 0.0))
+    assert done == [("lift",), ("prepare", 2002), ("put_down",), ("push",), ("rest",)]
 
 
 @pytest.mark.parametrize("stdin", [None, io.StringIO()])

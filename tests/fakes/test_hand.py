@@ -118,6 +118,19 @@ def test_a_stuck_hand_presses_harder_up_to_its_strongest():
     assert 36.0 < force[-2000:].mean() < 46.0
 
 
+def test_a_hand_that_rests_pushes_no_more(plant):
+    x = crossing(plant, Pace(), 2.5)[:, 0]
+    assert x[-1] - x[-250] > 0.005  # it was pushing: 10 mm/s and more
+    plant.hand.rest()
+    for _ in float_for(plant, 1.0, virtual_mass=0.3):
+        pass
+    where = sole(plant)[0]
+    for _ in float_for(plant, 1.0, virtual_mass=0.3):
+        pass
+    assert plant.hand.phase is Phase.REST
+    assert abs(sole(plant)[0] - where) < 1e-3
+
+
 def test_a_hand_that_let_go_does_nothing(plant):
     plant.hand.let_go()
     assert plant.hand.step(AT_REST) == (0.0, 0.0, 0.0)
