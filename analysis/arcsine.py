@@ -15,12 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.kernels import Composable, Contraction, Evaluator
+from analysis.kernels import Composable, Contraction, Evaluator, length_pairs
 from analysis.series import Array
 
 _ROOT_2 = np.sqrt(2.0)
-# l / sd(x) and beta that a search starts with
-_STARTS = (((3.0, 3.0), 0.05), ((3.0, 0.3), 20.0), ((0.1, 0.1), 20.0))
+_BIASES = (20.0, 0.05)  # beta that a search may start with
 
 
 class Augmented(NamedTuple):
@@ -85,20 +84,21 @@ class Arcsine(Composable):
         of_shape = np.exp(2.0 * theta[0]) * ((U**2).T @ (w * share))
         return np.concatenate([[of_sf], -2.0 * of_shape[1:], [of_shape[0]]])
 
-    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return sf = sd(y)/2, and lengths with a bias.
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
 
         Short lengths with a large bias, and long ones with next to none, are optima of
         their own.
         """
         return [
-            np.log(
-                np.concatenate(
-                    [[0.5 * sd_y], np.resize(stretch, sd_x.size) * sd_x, [beta]]
-                )
-            )
-            for stretch, beta in _STARTS
+            np.log(np.concatenate([[0.5 * sd_y], lengths, [bias]]))
+            for bias in _BIASES
+            for lengths in length_pairs(sd_x)
         ]
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return nothing: the bias makes up for a single length that changes."""
+        return []
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""

@@ -12,11 +12,12 @@ from acquisition.errors import SettingsError
 from analysis.kernels import Kernel, SquaredExponential
 from analysis.likelihood import Likelihood, factorise, split
 from analysis.noise import ConstantNoise, Noise
-from analysis.search import Optimum, Start, maximise, spread
+from analysis.search import Optimum, Scores, Start, maximise, spread
 from analysis.series import Array
 
 MINIMUM_ROWS = 20
 
+_ROUGH = 150  # rows by which the first starts are chosen
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
@@ -56,8 +57,9 @@ class GaussianProcess:
         """Return the predictive mean at `inputs`, shape (m, d), in y's unit."""
         theta, _ = split(self.kernel, self.theta)
         Z = (inputs - self.centre) / self.scale
+        # multiplied as in `predict`, so that both agree to the last digit
         blocks = [
-            self.kernel.matrix(theta, Z[i : i + _BLOCK], self.X) @ self.alpha
+            self.alpha @ self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
             for i in range(0, Z.shape[0], _BLOCK)
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
@@ -102,7 +104,10 @@ def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum
         slope[-prior_slope.size :] += prior_slope
         return lml + prior, slope
 
-    return maximise(model, objective, X, float(np.std(r)))
+    every = -(-r.size // _ROUGH)
+    rough = Likelihood(model, X[::every], r[::every])
+    scores = Scores(rough.value, likelihood.value)
+    return maximise(model, objective, X, float(np.std(r)), scores)
 
 
 def fit_gp(

@@ -12,6 +12,7 @@ squared costs as much as what is computed in it, so an `Evaluator` keeps its own
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Protocol
 
 import numpy as np
@@ -24,7 +25,8 @@ Contraction = Callable[[Array], Array]
 Evaluator = Callable[[Array], tuple[Array, Contraction]]
 
 _LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
-_STRETCHES = ((0.3, 3.0), (3.0, 0.3), (0.1, 0.1))  # l / sd(x) that a search starts with
+_STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
+_MOVES = (-2.5, -1.2, 1.2, 2.5, 10.0)  # of log l, to another top; the last: not used
 
 
 class Kernel(Protocol):
@@ -32,7 +34,7 @@ class Kernel(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the hyperparameters in the order of theta."""
+        """Names of the hyperparameters in the order of theta; sizes end in log_sf."""
         ...
 
     def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
@@ -51,8 +53,12 @@ class Kernel(Protocol):
         """Return sum_i w_i dk(x_i, x_i)/dtheta_k, shape (p,)."""
         ...
 
-    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return the three starts of the search, each of shape (p,)."""
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return points that a search may start with, each of shape (p,)."""
+        ...
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return points that may belong to another top than theta, each (p,)."""
         ...
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -107,12 +113,17 @@ class SquaredExponential(Composable):
         slope[0] = 2.0 * float(w @ self.diagonal(theta, X))
         return slope
 
-    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return sf = sd(y)/2 and lengths: one input of two, the other, or both."""
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2 with every pair of lengths."""
         return [
-            np.log(np.concatenate([[0.5 * sd_y], np.resize(stretch, sd_x.size) * sd_x]))
-            for stretch in _STRETCHES
+            np.log(np.concatenate([[0.5 * sd_y], lengths]))
+            for lengths in length_pairs(sd_x)
         ]
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return theta with one length changed: shorter, longer, or not used."""
+        steps = np.eye(theta.size)[1:]
+        return [theta + size * step for step in steps for size in _MOVES]
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return log sf in log sd(y) + [-6, 4], log l_d in log sd(x_d) + [-4, 6]."""
@@ -172,6 +183,12 @@ class _Pair(Composable):
         left = (f"a.{name}" for name in self.left.names)
         return (*left, *(f"b.{name}" for name in self.right.names))
 
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return the moves of one part while the other stays."""
+        a, b = self._split(theta)
+        of_left = [np.concatenate([move, b]) for move in self.left.moves(a)]
+        return of_left + [np.concatenate([a, move]) for move in self.right.moves(b)]
+
     def _split(self, theta: Array) -> tuple[Array, Array]:
         count = len(self.left.names)
         return theta[:count], theta[count:]
@@ -210,10 +227,10 @@ class Sum(_Pair):
         left = self.left.diagonal_slope(a, X, w)
         return np.concatenate([left, self.right.diagonal_slope(b, X, w)])
 
-    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return the starts of both, the right ones with longer lengths."""
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return those of both side by side, the right ones with longer lengths."""
         return _side_by_side(
-            self.left.starts(sd_y, sd_x), self.right.starts(sd_y, _LONGER * sd_x)
+            self.left.design(sd_y, sd_x), self.right.design(sd_y, _LONGER * sd_x)
         )
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -249,10 +266,10 @@ class Product(_Pair):
         right = self.right.diagonal_slope(b, X, w * self.left.diagonal(a, X))
         return np.concatenate([left, right])
 
-    def starts(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
-        """Return the starts of both; the right part is dimensionless with sf = 1."""
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return those of both; the right part is dimensionless with sf = 1."""
         return _side_by_side(
-            self.left.starts(sd_y, sd_x), self.right.starts(2.0, _LONGER * sd_x)
+            self.left.design(sd_y, sd_x), self.right.design(2.0, _LONGER * sd_x)
         )
 
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
@@ -260,5 +277,18 @@ class Product(_Pair):
         return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
 
 
+def length_pairs(sd_x: Array) -> list[Array]:
+    """Return lengths of d inputs, each of shape (d,), from rough to smooth.
+
+    Two inputs get every pair of four lengths; further ones take turns with these two.
+    """
+    return [np.resize(pair, sd_x.size) * sd_x for pair in product(_STRETCHES, repeat=2)]
+
+
 def _side_by_side(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
-    return [np.concatenate(pair) for pair in zip(left, right, strict=True)]
+    """Return pairs of points; those of the shorter list are used again."""
+    count = max(len(left), len(right))
+    return [
+        np.concatenate([left[k % len(left)], right[k % len(right)]])
+        for k in range(count)
+    ]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.kernels import Kernel
+from analysis.kernels import Contraction, Kernel
 from analysis.noise import Noise
 from analysis.series import Array
 
@@ -64,6 +64,24 @@ def factorise(K: Array, S: Array, memory: Array | None = None) -> Factor:
     )
 
 
+class _Solved(NamedTuple):
+    """What a likelihood and its gradient share at one theta.
+
+    Attributes:
+        lml: log marginal likelihood.
+        L: lower Cholesky factor of the covariance, shape (n, n).
+        alpha: C^-1 r, shape (n,).
+        contract: the kernel's contraction.
+        contract_noise: the noise's, which is given the diagonal of the weight.
+    """
+
+    lml: float
+    L: Array
+    alpha: Array
+    contract: Contraction
+    contract_noise: Contraction
+
+
 class Likelihood:
     """The log marginal likelihood of outputs, called with theta as often as needed.
 
@@ -89,6 +107,23 @@ class Likelihood:
         Raises:
             SettingsError: the covariance cannot be factorised.
         """
+        at = self._solved(theta)
+        minus = self._minus_weight(at.L, at.alpha)
+        on_diagonal = -np.diagonal(minus)
+        minus.T.flat[:: at.alpha.size + 1] *= 0.5
+        # K is symmetric: handing the transpose over keeps both in one order of memory
+        slope = -at.contract(minus.T)
+        return at.lml, np.concatenate([slope, at.contract_noise(on_diagonal)])
+
+    def value(self, theta: Array) -> float:
+        """Return the likelihood alone, for a third of the cost.
+
+        Raises:
+            SettingsError: the covariance cannot be factorised.
+        """
+        return self._solved(theta).lml
+
+    def _solved(self, theta: Array) -> "_Solved":
         theta_kernel, theta_noise = split(self._kernel, theta)
         K, contract = self._covariance(theta_kernel)
         S, contract_noise = self._noise.evaluate(theta_noise, self._X)
@@ -96,12 +131,7 @@ class Likelihood:
         alpha = factor.solve(self._r)
         lml = -0.5 * float(self._r @ alpha) - 0.5 * alpha.size * np.log(2.0 * np.pi)
         lml -= float(np.sum(np.log(np.diagonal(factor.L))))
-        minus = self._minus_weight(factor.L, alpha)
-        on_diagonal = -np.diagonal(minus)
-        minus.T.flat[:: alpha.size + 1] *= 0.5
-        # K is symmetric: handing the transpose over keeps both in one order of memory
-        slope = -contract(minus.T)
-        return lml, np.concatenate([slope, contract_noise(on_diagonal)])
+        return _Solved(lml, factor.L, alpha, contract, contract_noise)
 
     def _minus_weight(self, L: Array, alpha: Array) -> Array:
         """Return the lower triangle of C^-1 - alpha alpha', zero above."""

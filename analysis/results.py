@@ -24,7 +24,7 @@ from analysis.rows import Rows
 from analysis.search import Start
 from analysis.terrain_fit import TerrainFit, TerrainTask
 
-VERSION = 2  # of the numbers: higher whenever the same task gives another result
+VERSION = 3  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
     kind.__name__: kind

@@ -1,6 +1,7 @@
 """scikit-learn as an opponent: our kernels, starts and bounds in its own terms."""
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 from sklearn.gaussian_process import GaussianProcessRegressor
@@ -13,6 +14,7 @@ from sklearn.gaussian_process.kernels import (
 )
 
 from analysis.arcsine import Arcsine
+from analysis.gp import posterior_search
 from analysis.kernels import SquaredExponential
 from analysis.noise import ConstantNoise
 
@@ -70,24 +72,33 @@ class NeuralNetwork(Kernel):
 
 def theirs(part: str, start: np.ndarray, sd: float) -> Kernel:
     """Return scikit-learn's kernel at one of our starts, with our bounds."""
-    sf, *lengths = np.exp(start)
+    sf, *lengths, sn = np.exp(start)
     shape: Kernel = (
         RBF(lengths, (np.exp(-4), np.exp(6)))
         if part == "SE fit"
         else NeuralNetwork(tuple(lengths[:2]), lengths[2])
     )
     size = ConstantKernel(sf**2, (sd**2 * np.exp(-12), sd**2 * np.exp(8)))
-    noise = np.exp(2.0 * ConstantNoise().start(sd)[0])
     span = (sd**2 * np.exp(-12), sd**2 * np.exp(4))
-    return size * shape + WhiteKernel(noise, span)
+    return size * shape + WhiteKernel(sn**2, span)
 
 
-def fit_theirs(part: str, X: np.ndarray, y: np.ndarray) -> GaussianProcessRegressor:
-    """Return the likeliest of scikit-learn's models from the same three starts."""
+def our_starts(part: str, X: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the three thetas that our search begins with."""
+    return posterior_search((KERNELS[part], ConstantNoise()), X, y).began
+
+
+def fit_theirs(
+    part: str, X: np.ndarray, y: np.ndarray, starts: Sequence[np.ndarray]
+) -> GaussianProcessRegressor:
+    """Return the likeliest of scikit-learn's models from the same three starts.
+
+    They are given: what their choice costs is ours to bear.
+    """
     reached, sd = [], float(y.std())
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a length at its bound is no error
-        for start in KERNELS[part].starts(sd, np.ones(2)):
+        for start in starts:
             model = GaussianProcessRegressor(theirs(part, start, sd), alpha=1e-10)
             reached.append(model.fit(X, y))
     return max(reached, key=lambda model: model.log_marginal_likelihood_value_)

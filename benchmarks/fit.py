@@ -19,7 +19,6 @@ from threadpoolctl import threadpool_limits
 
 from analysis.arcsine import Arcsine
 from analysis.gp import fit_gp
-from analysis.kernels import SquaredExponential
 from analysis.likelihood import Likelihood
 from analysis.noise import ConstantNoise
 from analysis.prepare import PrepareOptions, prepare
@@ -27,7 +26,7 @@ from analysis.rows import Rows
 from analysis.sparse import fit_sparse
 from analysis.tables import load_tables
 from analysis.tustin import TustinBounds, TustinParameters, fit_tustin, predict
-from benchmarks.beside_sklearn import fit_theirs, theirs
+from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
 from benchmarks.study_race import race
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
@@ -113,19 +112,25 @@ def parts(rounds: int) -> list[Part]:
     """Return what is measured of single fits."""
     rows = load_rows()
     X, y = chosen(rows)
+    starts = {part: our_starts(part, X, y) for part in KERNELS}
     sparse = f"all {rows.count} samples, sparse, beside {_POINTS} exact"
+
+    def likelihood_of_theirs(part: str) -> float:
+        model = fit_theirs(part, X, y, starts[part])
+        return float(model.log_marginal_likelihood_value_)
+
     return [
         evaluation(X, y, 10 * rounds),
         Part(
             "SE fit",
             lambda: fit_gp(X, y).lml,
-            lambda: fit_theirs("SE fit", X, y).log_marginal_likelihood_value_,
+            lambda: likelihood_of_theirs("SE fit"),
             rounds,
         ),
         Part(
             "NN fit",
             lambda: fit_gp(X, y, Arcsine()).lml,
-            lambda: fit_theirs("NN fit", X, y).log_marginal_likelihood_value_,
+            lambda: likelihood_of_theirs("NN fit"),
             rounds,
         ),
         Part(
@@ -145,12 +150,10 @@ def parts(rounds: int) -> list[Part]:
 
 def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> Part:
     """Return one likelihood with its gradient, as a search asks for it."""
-    sd, (kernel, noise) = float(y.std()), (SquaredExponential(), ConstantNoise())
-    start = kernel.starts(sd, np.ones(2))[0]
-    theta = np.concatenate([start, noise.start(sd)])
-    likelihood = Likelihood((kernel, noise), X, y)
+    theta = our_starts("SE fit", X, y)[0]
+    likelihood = Likelihood((KERNELS["SE fit"], ConstantNoise()), X, y)
     model = GaussianProcessRegressor(
-        theirs("SE fit", start, sd), alpha=1e-10, optimizer=None
+        theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
     at = model.kernel_.theta
     return Part(

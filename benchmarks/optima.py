@@ -13,28 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from analysis.arcsine import Arcsine
-from analysis.crossval import FoldTask, choose_rows, plan_folds
+from analysis.crossval import FoldTask
 from analysis.gp import posterior_search
 from analysis.jobs import run_tasks
-from analysis.kernels import Kernel, SquaredExponential
+from analysis.kernels import Kernel
 from analysis.likelihood import Likelihood
-from analysis.models import (
-    FITTERS,
-    GP_NN,
-    GP_NN_TUSTIN,
-    GP_SE,
-    GP_SE_TUSTIN,
-    TUSTIN,
-    FitOptions,
-    tustin_of,
-)
+from analysis.models import FITTERS, TUSTIN
 from analysis.noise import ConstantNoise
-from analysis.prepare import PrepareOptions, prepare
-from analysis.rows import Training
 from analysis.series import Array
-from analysis.tables import load_tables
+from benchmarks.beside_sklearn import KERNELS
 from benchmarks.fit import SLICE, many_starts
+from benchmarks.study_race import FITS, folds_of, given
 
 _STARTS = 20
 _LIKELIHOOD = 1e-3
@@ -63,24 +52,14 @@ class Found(NamedTuple):
 
 def examine(task: FoldTask) -> list[Found]:
     """Return what the five models of one fold reached."""
-    training = Training(task.training, task.lengths, choose_rows(task))
-    curve, subset = tustin_of(training, task.options), training.subset
+    rows = given(task)
+    sse, best = rows.curve.sse, many_starts(task.training)
     place = f"{task.terrain} fold {task.fold + 1}"
-    best = many_starts(task.training)
-    is_as_good = curve.sse <= (1.0 + _SQUARES) * best
-    found = [Found(place, TUSTIN, -curve.sse, -best, is_as_good, 0)]
-    X = (subset.inputs - subset.inputs.mean(axis=0)) / subset.inputs.std(axis=0)
-    plain = subset.F_t - subset.F_t.mean()
-    left = subset.F_t - curve.mean(subset.F_n, subset.v_t)
-    fits = {
-        GP_SE: (SquaredExponential(), plain),
-        GP_NN: (Arcsine(), plain),
-        GP_SE_TUSTIN: (SquaredExponential(), left),
-        GP_NN_TUSTIN: (Arcsine(), left),
-    }
-    for name, (kernel, r) in fits.items():
-        ours = posterior_search((kernel, ConstantNoise()), X, r)
-        best = twenty(kernel, X, r, task.fold)
+    found = [Found(place, TUSTIN, -sse, -best, sse <= (1.0 + _SQUARES) * best, 0)]
+    for name, (part, _) in FITS.items():
+        kernel, r = KERNELS[part], rows.outputs[name]
+        ours = posterior_search((kernel, ConstantNoise()), rows.X, r)
+        best = twenty(kernel, rows.X, r, task.fold)
         is_as_good = ours.lml >= best - _LIKELIHOOD
         spent = sum(start.evaluations for start in ours.starts)
         found.append(Found(place, name, ours.lml, best, is_as_good, spent))
@@ -138,12 +117,7 @@ def main() -> None:
     parser.add_argument("trials", type=Path, nargs="?", default=SLICE, help="npz")
     parser.add_argument("--jobs", type=int, default=1)
     arguments = parser.parse_args()
-    trials = {
-        name: [prepare(series, PrepareOptions()) for series in group]
-        for name, group in load_tables([arguments.trials]).items()
-    }
-    tasks, _ = plan_folds(trials, FitOptions())
-    found = run_tasks(examine, tasks, arguments.jobs)
+    found = run_tasks(examine, folds_of(arguments.trials), arguments.jobs)
     for line in summary([one for fold in found for one in fold]):
         print(line)
 

@@ -1,9 +1,10 @@
 """Folds of a study beside scikit-learn: four Gaussian processes each, and predictions.
 
-Both get the same chosen rows, the same three starts and the same Tustin curve, and
-predict the same rows: means for the training rows and the trials of all other terrains,
-mean and spread for the trial left out. The two take turns, fold by fold; what counts is
-processor time, one thread each, so that other programs do not.
+Both get the same chosen rows and the same Tustin curve; scikit-learn is given the three
+starts that ours chooses in its own time. Both predict the same rows: means for the
+training rows and the trials of all other terrains, mean and spread for the trial left
+out. The two take turns, fold by fold; what counts is processor time, one thread each,
+so that other programs do not.
 """
 
 import statistics
@@ -27,16 +28,42 @@ from analysis.models import (
 )
 from analysis.prepare import PrepareOptions, prepare
 from analysis.rows import Rows, Training
+from analysis.series import Array
 from analysis.tables import load_tables
-from benchmarks.beside_sklearn import fit_theirs
+from analysis.tustin import TustinFit
+from benchmarks.beside_sklearn import fit_theirs, our_starts
 
 _GOAL = 4.0
-_FITS = {
+# model -> its part in `benchmarks.beside_sklearn`, and is it around a Tustin curve?
+FITS = {
     GP_SE: ("SE fit", False),
     GP_NN: ("NN fit", False),
     GP_SE_TUSTIN: ("SE fit", True),
     GP_NN_TUSTIN: ("NN fit", True),
 }
+
+
+class Given(NamedTuple):
+    """What the Gaussian processes of one fold are fitted to.
+
+    Attributes:
+        curve: Tustin fit of all training rows.
+        centre: means of the chosen rows' inputs, shape (2,).
+        scale: their standard deviations, shape (2,).
+        X: standardised inputs of the chosen rows, shape (n, 2).
+        outputs: F_t [N] of the chosen rows without the mean, or without the curve,
+            shape (n,), by the name of the model.
+    """
+
+    curve: TustinFit
+    centre: Array
+    scale: Array
+    X: Array
+    outputs: dict[str, Array]
+
+    def standardised(self, rows: Rows) -> Array:
+        """Return the inputs of other rows in the same terms, shape (m, 2)."""
+        return (rows.inputs - self.centre) / self.scale
 
 
 class Lap(NamedTuple):
@@ -65,11 +92,7 @@ def race(
         rounds: how often every fold is run; medians count.
         is_whole: every fold; else the first one of every terrain.
     """
-    trials = {
-        name: [prepare(series, PrepareOptions()) for series in group]
-        for name, group in load_tables([path]).items()
-    }
-    tasks, _ = plan_folds(trials, FitOptions())
+    tasks = folds_of(path)
     run_fold(tasks[0])  # whatever is loaded or set up at first
     if not is_whole:
         tasks = [task for task in tasks if task.fold == 0]
@@ -83,15 +106,41 @@ def race(
     }
 
 
+def folds_of(path: Path) -> list[FoldTask]:
+    """Return every fold of the trials in a file."""
+    trials = {
+        name: [prepare(series, PrepareOptions()) for series in group]
+        for name, group in load_tables([path]).items()
+    }
+    return plan_folds(trials, FitOptions())[0]
+
+
+def given(task: FoldTask) -> Given:
+    """Return what the Gaussian processes of one fold are fitted to."""
+    training = Training(task.training, task.lengths, choose_rows(task))
+    curve, subset = tustin_of(training, task.options), training.subset
+    plain = subset.F_t - subset.F_t.mean()
+    left = subset.F_t - curve.mean(subset.F_n, subset.v_t)
+    centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
+    return Given(
+        curve=curve,
+        centre=centre,
+        scale=scale,
+        X=(subset.inputs - centre) / scale,
+        outputs={n: left if is_around else plain for n, (_, is_around) in FITS.items()},
+    )
+
+
 def lap(task: FoldTask, rounds: int) -> Lap:
     """Return what both spend on one fold, taking turns."""
     mine, its, models, likelihoods = [], [], {}, {}
+    starts = starts_of(task)
     for _ in range(rounds):
         seconds, models = timed(lambda: run_fold(task).models)
         mine.append(seconds)
-        seconds, likelihoods = timed(lambda: run_theirs(task))
+        seconds, likelihoods = timed(lambda: run_theirs(task, starts))
         its.append(seconds)
-    reached = [(models[name].model.process.lml, likelihoods[name]) for name in _FITS]
+    reached = [(models[name].model.process.lml, likelihoods[name]) for name in FITS]
     return Lap(statistics.median(mine), statistics.median(its), reached)
 
 
@@ -134,19 +183,23 @@ def likelihoods_of(laps: list[Lap]) -> tuple[np.ndarray, np.ndarray]:
     return ours, theirs
 
 
-def run_theirs(task: FoldTask) -> dict[str, float]:
+def starts_of(task: FoldTask) -> dict[str, tuple[Array, ...]]:
+    """Return where the searches of one fold begin, by the name of the model."""
+    rows = given(task)
+    return {n: our_starts(FITS[n][0], rows.X, r) for n, r in rows.outputs.items()}
+
+
+def run_theirs(
+    task: FoldTask, starts: dict[str, tuple[Array, ...]]
+) -> dict[str, float]:
     """Return scikit-learn's likelihoods of one fold, after the same predictions."""
-    chosen = choose_rows(task)
-    training = Training(task.training, task.lengths, chosen)
-    curve, subset = tustin_of(training, task.options), training.subset
-    centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
-    foreign = [rows for trials in task.others.values() for rows in trials]
-    tested = (Rows.joined([task.training, *foreign]).inputs - centre) / scale
-    own = (task.own.inputs - centre) / scale
+    rows = given(task)
+    foreign = [trial for trials in task.others.values() for trial in trials]
+    tested = rows.standardised(Rows.joined([task.training, *foreign]))
+    own = rows.standardised(task.own)
     found = {}
-    for name, (part, is_around) in _FITS.items():
-        mean = curve.mean(subset.F_n, subset.v_t) if is_around else subset.F_t.mean()
-        model = fit_theirs(part, (subset.inputs - centre) / scale, subset.F_t - mean)
+    for name, (part, _) in FITS.items():
+        model = fit_theirs(part, rows.X, rows.outputs[name], starts[name])
         model.predict(tested)
         model.predict(own, return_std=True)
         found[name] = float(model.log_marginal_likelihood_value_)
@@ -161,7 +214,7 @@ def where_time_goes(task: FoldTask) -> list[str]:
     foreign = [rows for trials in task.others.values() for rows in trials]
     tested = Rows.joined([task.training, *foreign])
     predicting = 0.0
-    for name in _FITS:
+    for name in FITS:
         spent, model = timed(lambda name=name: fit_model(name, training, task.options))
         starts = model.process.starts
         count = sum(start.evaluations for start in starts)

@@ -171,6 +171,14 @@ def test_an_evaluation_leaves_nothing_behind(kernel):
     np.testing.assert_array_equal(slope, fresh)
 
 
+@pytest.mark.parametrize("kernel", [SE, Arcsine(2)])
+def test_value_alone_is_that_of_the_likelihood_with_its_gradient(kernel):
+    X, y = draw(np.random.default_rng(2), 100)
+    likelihood = Likelihood((kernel, ConstantNoise()), X, y)
+    theta = np.random.default_rng(5).normal(0, 0.3, len(kernel.names) + 1)
+    assert likelihood.value(theta) == likelihood(theta)[0]
+
+
 def test_a_start_is_left_just_below_a_known_top():
     X, y = draw(np.random.default_rng(4), 100)
     starts = posterior_search((SE, ConstantNoise()), X, y - y.mean()).starts
@@ -245,6 +253,13 @@ def test_noise_is_in_the_variance_only_if_asked_for():
     np.testing.assert_allclose(
         of_measurement - of_function, np.exp(2 * model.theta[-1]), rtol=1e-9
     )
+
+
+def test_mean_and_prediction_agree_to_the_last_digit():
+    X, y = draw(np.random.default_rng(8), 40)
+    model = fit_gp(X, y, Arcsine(2))
+    inputs = np.random.default_rng(9).uniform(-2, 2, (700, 2))  # more than a block
+    np.testing.assert_array_equal(model.mean(inputs), model.predict(inputs)[0])
 
 
 def test_blocks_do_not_change_a_prediction(monkeypatch):
