@@ -38,6 +38,7 @@ _SETTLING = 1000  # cycles in which the foot is put down
 _SEED, _TERRAIN, _TRIAL = 1, "S0", 1
 _FRAME = TerrainFrame(0.0, 0.0, (0.70, 0.0, 0.12), 0.45)
 _START = np.array([0.0, 0.7696, 0.0, 1.1857, 0.0, 1.1863, 0.0])
+_LOCK_KP, _LOCK_KD = 20.0, 0.2  # of joint 7: N m/rad, N m s/rad
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -157,9 +158,10 @@ def _note_views(plant: ArmPlant, notes: Notes) -> None:
 
 
 def _cycle(plant: ArmPlant, model: ArmModel) -> float:
-    """Let one cycle pass under gravity compensation; return what it took [us]."""
+    """Let one cycle pass, weightless and with joint 7 locked; return its time [us]."""
     constants = model.constants
-    tau = compensation(model, plant.q, _EFFECTIVE_MASS)
+    tau = compensation(model, plant.q, _EFFECTIVE_MASS).copy()
+    tau[6] -= _LOCK_KP * plant.q[6] + _LOCK_KD * plant.qd[6]
     motor = np.linalg.solve(constants.j2mp.T, tau)
     plant.set_torques(np.rint(motor * np.array(constants.ipnm)).astype(int).tolist())
     begin = time.perf_counter_ns()
