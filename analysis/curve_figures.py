@@ -86,8 +86,9 @@ def _draw_panels(
     figure.supxlabel(SPEED_LABEL, fontsize=8)
     figure.supylabel(FORCE_LABEL, fontsize=8)
     handles, labels = axes[0].get_legend_handles_labels()
+    columns = len(labels) if len(chosen) > 1 or len(labels) < 4 else 2
     figure.legend(
-        handles, labels, loc="outside upper center", ncols=len(labels), markerscale=3
+        handles, labels, loc="outside upper center", ncols=columns, markerscale=3
     )
     return figure
 

@@ -20,6 +20,7 @@ from analysis.findings import Findings
 from analysis.series import Array
 from analysis.surfaces import Surface, common_range
 
+_MOST_DIGITS = 15
 _LEVELS = 14  # contours
 _MOST_DOTS = 400  # samples shown per panel
 _ROW = 1.75  # inches
@@ -88,8 +89,17 @@ def _draw(
         axes[0].collections[0], ax=axes, label=label, pad=0.01, ticks=ticks
     )
     bar.ax.minorticks_off()
-    bar.ax.set_yticks(ticks, [f"{tick:.2g}" for tick in ticks])
+    bar.ax.set_yticks(ticks, told_apart(ticks.tolist()))
     return figure
+
+
+def told_apart(values: Sequence[float]) -> list[str]:
+    """Return different numbers in so few digits, two at least, that all differ."""
+    for digits in range(2, _MOST_DIGITS):
+        texts = [f"{value:.{digits}g}" for value in values]
+        if len(set(texts)) == len(set(values)):
+            return texts
+    return [repr(float(value)) for value in values]
 
 
 def _dot(ax: Axes, surface: Surface) -> None:

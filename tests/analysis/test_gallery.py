@@ -1,0 +1,48 @@
+import pytest
+
+from analysis.figures import styled
+from analysis.findings import find
+from analysis.gallery import _RECIPES
+from analysis.models import FitOptions
+from analysis.study import StudyOptions, run_study
+from analysis.surface_figures import told_apart
+
+MARGIN = 0.02  # inches: half a line that lies on the edge
+
+
+@pytest.fixture(scope="module")
+def findings(small_study, slice_trials):
+    """Return what is shown of three terrains, and of one alone."""
+    options = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
+    alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
+    return {"three": find(small_study), "one": find(alone)}
+
+
+def is_whole(figure):
+    """Return whether everything drawn lies on the figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn = figure.get_tightbbox(canvas.get_renderer())
+    width, height = figure.get_size_inches()
+    return (
+        min(drawn.x0, drawn.y0) >= -MARGIN
+        and drawn.x1 <= width + MARGIN
+        and drawn.y1 <= height + MARGIN
+    )
+
+
+@pytest.mark.parametrize(("count", "figures"), [("three", 17), ("one", 12)])
+def test_nothing_of_a_figure_is_cut(findings, count, figures):
+    with styled():
+        drawn = {recipe.key: recipe.draw(findings[count]) for recipe in _RECIPES}
+        shown = {key: figure for key, figure in drawn.items() if figure is not None}
+        assert len(shown) >= figures
+        assert [key for key, figure in shown.items() if not is_whole(figure)] == []
+
+
+def test_numbers_that_differ_are_told_apart():
+    assert told_apart([0.171, 0.174, 0.21]) == ["0.171", "0.174", "0.21"]
+    assert told_apart([1.0, 2.0]) == ["1", "2"]
+    assert told_apart([1.0, 1.0]) == ["1", "1"]
