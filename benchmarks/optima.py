@@ -90,7 +90,7 @@ def climb(likelihood: Likelihood, start: Array, box: Array) -> float:
         jac=True,
         method="L-BFGS-B",
         bounds=box,
-        options={"maxiter": 200, "gtol": 1e-5, "ftol": 2e-9},
+        options={"gtol": 1e-5, "ftol": 2e-9},
     )
     return -float(found.fun)
 

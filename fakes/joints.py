@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,14 +15,27 @@ _STANDSTILL = 1e-9  # rad/s, keeps the secant finite
 _NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
 
 
+class Resistance(NamedTuple):
+    """What resists the joints at one place and speed; seven numbers of each.
+
+    Attributes:
+        inertias: drive inertia + dt D [kg m^2].
+        damping: D [N m s/rad].
+        springs: with which the stops push back [N m].
+        is_near_stop: a joint may be at a stop within a cycle.
+    """
+
+    inertias: list[float]
+    damping: list[float]
+    springs: list[float]
+    is_near_stop: bool
+
+
 class JointResistance:
     """Resistance of the seven joints as damping, which an implicit step can take.
 
     D = diag(c tanh(|qd| / 0.01) / |qd| + viscous) is the secant of dry friction. Taken
     explicitly it is beyond stability for joint 7; so would be the damping of its stop.
-
-    Attributes:
-        is_near_stop: a joint was so near a stop that it may be there within a cycle.
     """
 
     def __init__(self, constants: ArmConstants, friction: float, dt: float) -> None:
@@ -32,7 +46,6 @@ class JointResistance:
             friction: share of the figures identified on another arm.
             dt: length of a step [s].
         """
-        self.is_near_stop = False
         self._dt = dt
         self._joints: list[tuple[float, float, float, float, float]] = list(
             zip(
@@ -45,12 +58,8 @@ class JointResistance:
             )
         )
 
-    def at(
-        self, q: Sequence[float], qd: Sequence[float]
-    ) -> tuple[list[float], list[float], list[float]]:
-        """Return drive inertia + dt D [kg m^2], D [N m s/rad] and the stops' springs.
-
-        Seven of each; the springs push back with so much torque [N m].
+    def at(self, q: Sequence[float], qd: Sequence[float]) -> Resistance:
+        """Return what resists the joints.
 
         Args:
             q: joint positions [rad].
@@ -71,5 +80,4 @@ class JointResistance:
                 damping += _STOP_B if beyond else 0.0
             dampings.append(damping)
             inertias.append(drive + self._dt * damping)
-        self.is_near_stop = is_near_stop
-        return inertias, dampings, springs
+        return Resistance(inertias, dampings, springs, is_near_stop)

@@ -116,6 +116,7 @@ class ArmPlant:
         self._loads = JointLoads()
         self._rates = [0.0] * 12
         self._linearise()
+        self._resist(*self._joints.rows[:2].tolist())
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
 
     @property
@@ -226,15 +227,15 @@ class ArmPlant:
         self._push = x, y, z = self.hand.step(view)
         ux, uy, uz = self._up
         self._held = (x + ux, y + uy, z + uz)
-        if not self._is_held:
-            self._resist(*self._joints.rows[:2].tolist())
+        self._resist(*self._joints.rows[:2].tolist())
 
     def _resist(self, q: list[float], qd: list[float]) -> None:
         """Take friction and stops as they are at `q` [rad] and `qd` [rad/s]."""
-        inertias, dampings, springs = self._resistance.at(q, qd)
-        self._model.armature = np.array(inertias)
-        self._loads.resist(dampings)
-        self._stops = np.array(springs)
+        now = self._resistance.at(q, qd)
+        self._model.armature = np.array(now.inertias)
+        self._loads.resist(now.damping)
+        self._stops = np.array(now.springs)
+        self._is_near_stop = now.is_near_stop
         self._drive()
 
     def _drive(self) -> None:
@@ -270,7 +271,7 @@ class ArmPlant:
     def _integrate(self, wrench: tuple[float, ...]) -> None:
         """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
         dt, state = self._dt, self._joints.rows
-        if self._resistance.is_near_stop:
+        if self._is_near_stop:
             self._resist(*state[:2].tolist())
         tau = self._loads.torques(wrench, state[1].tolist(), self._driving)
         qdd = pin.aba(self._model, self._data, state[0], state[2], tau)

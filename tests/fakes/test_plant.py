@@ -329,3 +329,30 @@ def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
     wrench, qd, driving = (rng.standard_normal(n) for n in (12, 7, 7))
     found = loads.torques(wrench, qd, driving)
     assert found == pytest.approx(loads.A.T @ wrench - damping * qd + driving)
+
+
+@pytest.mark.parametrize(("away", "times"), [(0.5, 1), (0.02, 5)])
+def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, times):
+    plant = make_plant()
+    plant.q[6] = CONSTANTS.q_upper[6] - away
+    release(plant)
+    taken = []
+    at = plant._resistance.at
+    monkeypatch.setattr(
+        plant._resistance, "at", lambda *state: taken.append(0) or at(*state)
+    )
+    plant.advance(plant.t_ns + CYCLE_NS)
+    assert len(taken) == times  # at the beginning of the cycle, and in four substeps
+
+
+def test_an_arm_that_is_let_go_within_a_cycle_has_its_drives_from_the_start():
+    turned = []
+    for held_ns in (0, CYCLE_NS // 2):
+        plant = make_plant()
+        plant.hand.let_go()
+        plant.advance(plant.t_ns + held_ns)
+        release(plant)
+        plant.advance(plant.t_ns + CYCLE_NS // 4)
+        turned.append(plant.qd.copy())
+    # without its drives' inertia joint 7 would start several times as fast
+    assert turned[1] == pytest.approx(turned[0], rel=1e-6)

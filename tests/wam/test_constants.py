@@ -79,6 +79,14 @@ def test_what_is_missing_in_an_arm_model_is_named_in_a_line():
     with pytest.raises(SettingsError) as caught:
         load_constants(text)
     message = str(caught.value)
-    assert "gravity: field required" in message
+    assert "gravity: Field required" in message
     assert "\n" not in message
     assert "http" not in message
+
+
+def test_what_is_wrong_between_two_parts_of_an_arm_model_is_said_in_a_line():
+    with pytest.raises(SettingsError) as caught:
+        load_constants(MALFORMED["stops crossed"])
+    message = str(caught.value)
+    assert "read: :" not in message
+    assert "\n" not in message
