@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.messages import ENCAPSULATION
+from acquisition.schema import ENCAPSULATION
 
 NS_PER_S = 1_000_000_000
 

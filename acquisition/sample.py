@@ -6,7 +6,7 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.messages import CYCLE
+from acquisition.schema import CYCLE
 
 Record = NDArray[np.void]
 

@@ -16,10 +16,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.crossval import FoldResult, plan_folds, run_fold
-from analysis.jobs import run_tasks
-from analysis.load import RecordedTrial, load_trial
-from analysis.models import (
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PreparedTrial, PrepareOptions
+from analysis.data.prepare import prepare as prepare_series
+from analysis.data.rows import Rows, Training
+from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables
+from analysis.study.crossval import FoldResult, plan_folds, run_fold
+from analysis.study.jobs import run_tasks
+from analysis.study.models import (
     FITTERS,
     GP_NN,
     GP_NN_TUSTIN,
@@ -33,11 +38,6 @@ from analysis.models import (
     fit_model,
     tustin_of,
 )
-from analysis.prepare import PreparedTrial, PrepareOptions
-from analysis.prepare import prepare as prepare_series
-from analysis.rows import Rows, Training
-from analysis.series import TractionSeries
-from analysis.tables import load_tables
 
 __all__ = [
     "FITTERS",

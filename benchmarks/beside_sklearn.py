@@ -13,10 +13,10 @@ from sklearn.gaussian_process.kernels import (
     WhiteKernel,
 )
 
-from analysis.arcsine import Arcsine
-from analysis.gp import posterior_search
-from analysis.kernels import SquaredExponential
-from analysis.noise import ConstantNoise
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import posterior_search
 
 KERNELS = {"SE fit": SquaredExponential(), "NN fit": Arcsine()}
 

@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass
 
 import can
 
-from wam.frames import (
+from wam.bus.frames import (
     MOTOR_NODES,
     SENSOR_NODE,
     Group,
@@ -32,7 +32,7 @@ from wam.frames import (
     group_id,
     position_reply_id,
 )
-from wam.pucks import MODERN, Device, property_number
+from wam.bus.properties import MODERN, Device, property_number
 
 GOAL_US = 30.0  # of the codec, per cycle
 _WARM_UP = 200  # rounds

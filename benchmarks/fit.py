@@ -17,15 +17,15 @@ from scipy.optimize import least_squares
 from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
-from analysis.arcsine import Arcsine
-from analysis.gp import fit_gp
-from analysis.likelihood import Likelihood
-from analysis.noise import ConstantNoise
-from analysis.prepare import PrepareOptions, prepare
-from analysis.rows import Rows
-from analysis.sparse import fit_sparse
-from analysis.tables import load_tables
-from analysis.tustin import TustinBounds, TustinParameters, fit_tustin, predict
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.rows import Rows
+from analysis.data.tables import load_tables
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import fit_gp
+from analysis.gp.sparse import fit_sparse
+from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
 from benchmarks.study_race import race
 

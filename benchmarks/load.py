@@ -24,10 +24,10 @@ import numpy as np
 from mcap.reader import make_reader
 from numpy.typing import NDArray
 
-from acquisition.board import WRENCH_DTYPE
-from acquisition.messages import CYCLE, schema_text
-from acquisition.recorder import seal
+from acquisition.ipc.layout import WRENCH_DTYPE
+from acquisition.recording.recorder import seal
 from acquisition.sample import Flag, Record
+from acquisition.schema import CYCLE, schema_text
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 

@@ -16,12 +16,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from acquisition.trial_file.writer import TrialHeader
-from experiments.rigs import FakeOptions, Rig, build_rig
-from experiments.settings import load_settings
+from experiments.rig.rig import FakeOptions, Rig, build_rig
+from experiments.settings.load import load_settings
 from fakes.clock import SteppedClock
-from fakes.rig import FakeRig
+from fakes.world.rig import FakeRig
 
 GOAL = 6.0  # times real time, with recorder
 TERRAIN = "S0"

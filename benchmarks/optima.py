@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
-from analysis.crossval import FoldTask
-from analysis.gp import posterior_search
-from analysis.jobs import run_tasks
-from analysis.kernels import Kernel
-from analysis.likelihood import Likelihood
-from analysis.models import FITTERS, TUSTIN
-from analysis.noise import ConstantNoise
-from analysis.series import Array
+from analysis.data.series import Array
+from analysis.gp.kernels import Kernel
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import posterior_search
+from analysis.study.crossval import FoldTask
+from analysis.study.jobs import run_tasks
+from analysis.study.models import FITTERS, TUSTIN
 from benchmarks.beside_sklearn import KERNELS
 from benchmarks.fit import SLICE, many_starts
 from benchmarks.study_race import FITS, folds_of, given

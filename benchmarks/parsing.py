@@ -12,13 +12,13 @@ import math
 import statistics
 
 from acquisition.clock import SystemClock
-from fakes.sensor_kinds import SERIAL_KINDS, SensorChoice, make_stream
-from ft_sensor.bota_device import BotaDevice, BotaSettings
-from ft_sensor.dating import FrameDating
-from ft_sensor.line import Line
-from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
-from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
-from ft_sensor.serial_sensor import SerialDevice
+from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.sensor import SerialDevice
+from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
+from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
+from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
 
 GOAL_US = 20.0
 PIECE_NS = 3_000_000

@@ -18,18 +18,18 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from fakes.contact import Contact, Motion
-from fakes.plant import CYCLE_NS, ArmPlant
-from fakes.push import HandView, Pace, Push, Vector3
+from fakes.ground.contact import Contact, Motion
+from fakes.ground.terrain import Terrain, make_terrain
+from fakes.plant.plant import CYCLE_NS, ArmPlant
+from fakes.plant.push import HandView, Pace, Push, Vector3
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.rig import solve_start
-from fakes.terrain import Terrain, make_terrain
 from fakes.truth import Truth
+from fakes.world.rig import solve_start
 from ft_sensor.payload import TerrainFrame
-from wam.constants import Body, load_constants
-from wam.gravity import compensation
-from wam.model import ArmModel, add_point, build_pinocchio
-from wam.tool import Tool, box_inertia, sensor_body
+from wam.model.arm_model import ArmModel, add_point, build_pinocchio
+from wam.model.constants import Body, load_constants
+from wam.model.gravity import compensation
+from wam.model.tool import Tool, box_inertia, sensor_body
 
 GOAL_US = 160.0  # per cycle of four substeps
 SUBSTEPS = 4

@@ -21,14 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.realtime import choose_cores
+from acquisition.control_loop.realtime import choose_cores
 from acquisition.sample import Record
 from benchmarks.realtime_table import Found, Times, Window, table
-from experiments.bench import run_bench
-from experiments.preflight import start_devices
-from experiments.process_crew import ProcessCrew
-from experiments.rigs import FakeOptions, Rig, build_rig
-from experiments.settings import Settings, load_settings
+from experiments.preflight.preflight import start_devices
+from experiments.rig.processes import ProcessCrew
+from experiments.rig.rig import FakeOptions, Rig, build_rig
+from experiments.settings.load import Settings, load_settings
+from experiments.tools.bench import run_bench
 
 C_FILES = Path(__file__).parent / "c"
 

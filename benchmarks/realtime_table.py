@@ -6,8 +6,8 @@ import statistics
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.loop import LATE_NS, PERIOD_NS
-from experiments.bench import BenchReport, ProcessUse
+from acquisition.control_loop.loop import LATE_NS, PERIOD_NS
+from experiments.tools.bench import BenchReport, ProcessUse
 
 NEAR_NS = 4_000_000
 QUANTILES = (50.0, 99.0, 99.9)

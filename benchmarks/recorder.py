@@ -14,19 +14,19 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.board import Board, pack_wrench
 from acquisition.clock import NS_PER_S, SystemClock
+from acquisition.control_loop.loop import PERIOD_NS
 from acquisition.devices import WrenchSample
-from acquisition.flight import FrameTape
-from acquisition.loop import PERIOD_NS
-from acquisition.messages import CYCLE
-from acquisition.processes import Child
-from acquisition.recorder_process import RemoteRecorder
+from acquisition.ipc.child import Child
+from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.layout import Board, pack_wrench
+from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.sample import Sample
+from acquisition.schema import CYCLE
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader
 
-MAIN = "acquisition.recorder_process:main"
+MAIN = "acquisition.recording.recorder_process:main"
 BURST_NS = 10_000_000
 PAGE_KB = os.sysconf("SC_PAGE_SIZE") / 1024
 HEADER = TrialHeader(

@@ -15,8 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.crossval import FoldTask, choose_rows, plan_folds, run_fold
-from analysis.models import (
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.rows import Rows, Training
+from analysis.data.series import Array
+from analysis.data.tables import load_tables
+from analysis.study.crossval import FoldTask, choose_rows, plan_folds, run_fold
+from analysis.study.models import (
     GP_NN,
     GP_NN_TUSTIN,
     GP_SE,
@@ -26,11 +30,7 @@ from analysis.models import (
     fit_model,
     tustin_of,
 )
-from analysis.prepare import PrepareOptions, prepare
-from analysis.rows import Rows, Training
-from analysis.series import Array
-from analysis.tables import load_tables
-from analysis.tustin import TustinFit
+from analysis.tustin.model import TustinFit
 from benchmarks.beside_sklearn import fit_theirs, our_starts
 
 _GOAL = 4.0

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from importlib import resources
 from string import Formatter
 
+from acquisition.control_loop.guard import Verdict
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
-from acquisition.guard import Verdict
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition.messages import TRUTH
 from acquisition.sample import Record
+from acquisition.schema import TRUTH
 from ft_sensor.payload import TerrainFrame
-from wam.constants import Array
+from wam.model.constants import Array
 
 MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
 

@@ -9,11 +9,11 @@ import numpy as np
 from acquisition.devices import ArmReading, WrenchSample
 from acquisition.sample import Sample
 from ft_sensor.payload import Payload, TerrainFrame
-from wam.model import ArmModel
+from wam.model.arm_model import ArmModel
 
 
 class LiveFoot:
-    """Implements acquisition.control.FootObserver with model, payload and terrain."""
+    """Foot pose and traction of a sample (implements FootObserver)."""
 
     def __init__(
         self, model: ArmModel, payload: Payload, terrain: TerrainFrame

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from wam.constants import GRAVITY, Array
-from wam.tool import Tool
+from wam.model.constants import GRAVITY, Array
+from wam.model.tool import Tool
 
 Floats = NDArray[np.float64]
 

@@ -49,8 +49,8 @@ def arm_vectors():
 @pytest.fixture(scope="session")
 def example_tool(arm_vectors):
     """Return the sensor and the foot that the vectors were computed with."""
-    from wam.constants import Body
-    from wam.tool import Tool
+    from wam.model.constants import Body
+    from wam.model.tool import Tool
 
     tool = arm_vectors["tool"]
     bodies = (
@@ -67,7 +67,7 @@ def example_tool(arm_vectors):
 @pytest.fixture(scope="session")
 def foot_model(example_tool):
     """Return the arm with that sensor and foot on it."""
-    from wam.constants import load_constants
-    from wam.model import ArmModel
+    from wam.model.arm_model import ArmModel
+    from wam.model.constants import load_constants
 
     return ArmModel(load_constants(), example_tool)

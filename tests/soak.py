@@ -27,14 +27,14 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import fakes.rig
+import fakes.world.rig
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
-from experiments.operator import AutoKeys, Prompt
-from experiments.session import replay
-from experiments.store import find_session
+from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.session.reducer import replay
+from experiments.session.store import find_session
 from fakes.clock import START_NS
-from fakes.rig import FakeRig
+from fakes.world.rig import FakeRig
 from tests.experiments.program import (
     Done,
     journal,
@@ -217,7 +217,7 @@ def remove(folder: Path) -> None:
 def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
     """Keep hold of every simulated rig; look at the files before every trial."""
 
-    class Seen(fakes.rig.FakeRig):
+    class Seen(fakes.world.rig.FakeRig):
         def __init__(self, *given: object, **named: object) -> None:
             super().__init__(*given, **named)
             soak.rigs.append(self)
@@ -231,7 +231,7 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
             soak.check_files()
         return press(asked)
 
-    patch.setattr(fakes.rig, "FakeRig", Seen)
+    patch.setattr(fakes.world.rig, "FakeRig", Seen)
     patch.setattr(AutoKeys, "answer", answer)
 
 

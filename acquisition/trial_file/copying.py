@@ -7,8 +7,8 @@ import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
-from acquisition.messages import CYCLE
 from acquisition.sample import Flag
+from acquisition.schema import CYCLE
 from acquisition.trial_file.salvage import Salvage, Salvaged
 from acquisition.trial_file.writer import CHUNK_BYTES
 

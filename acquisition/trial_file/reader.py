@@ -10,8 +10,8 @@ from mcap.records import ChunkIndex
 from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
-from acquisition.messages import CYCLE, TRUTH, Layout, schema_text
 from acquisition.sample import Record
+from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
 

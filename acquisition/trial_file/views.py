@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.cdr import NS_PER_S, CdrWriter
-from acquisition.messages import CYCLE
+from acquisition.schema import CYCLE
 
 JOINT_NAMES = [f"wam_j{joint}" for joint in range(1, 8)]
 VIEW_TOPICS = {
@@ -45,7 +45,7 @@ def encode_views(record: np.void, log_time: int) -> dict[str, bytes]:
     """Return topic to CDR payload of one record of traction_msgs/Cycle.
 
     Args:
-        record: one record in the layout of `acquisition.messages.CYCLE`.
+        record: one record in the layout of `acquisition.schema.CYCLE`.
         log_time: UTC of the cycle [ns].
     """
     cycle = record.tobytes()

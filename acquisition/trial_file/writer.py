@@ -12,9 +12,9 @@ from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.errors import TrialFileError
-from acquisition.flight import encode_can_batch
-from acquisition.messages import CYCLE, TRUTH, schema_text
+from acquisition.ipc.frame_tape import encode_can_batch
 from acquisition.sample import CHANNELS, Flag, Record
+from acquisition.schema import CYCLE, TRUTH, schema_text
 from acquisition.trial_file.publishing import publish_file, sync_directory
 from acquisition.trial_file.views import VIEW_TOPICS, encode_views
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.calibrating.walk import Walk
-from experiments.stage import Stage
-from experiments.store import iso_utc
-from wam.calibration_poses import Halt, choose_poses, plan_halts
-from wam.constants import Array
-from wam.first_moments import MomentFit, check_fit, fit_moments
-from wam.gravity_file import GravityCalibration
+from experiments.calibrating.pose_walk import Walk
+from experiments.run.console_loop import Stage
+from experiments.session.store import iso_utc
+from wam.calibration.gravity_file import GravityCalibration
+from wam.calibration.poses import Halt, choose_poses, plan_halts
+from wam.model.constants import Array
+from wam.model.moments import MomentFit, check_fit, fit_moments
 
 AVERAGE = 0.5  # s of torques that are averaged
 

@@ -4,16 +4,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition.board import WRENCH_SLOTS
 from acquisition.errors import PreflightError
+from acquisition.ipc.layout import WRENCH_SLOTS
 from acquisition.sample import Record
-from experiments.calibrating.walk import Walk
-from experiments.stage import Stage
-from experiments.store import iso_utc
-from ft_sensor.calibration import SensorFit, check_residual, fit_sensor
-from ft_sensor.sensor_calibration import SensorCalibration
-from wam.calibration_poses import Halt, choose_orientations, plan_halts
-from wam.constants import Array
+from experiments.calibrating.pose_walk import Walk
+from experiments.run.console_loop import Stage
+from experiments.session.store import iso_utc
+from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor
+from ft_sensor.calibration.sensor_file import SensorCalibration
+from wam.calibration.poses import Halt, choose_orientations, plan_halts
+from wam.model.constants import Array
 
 AVERAGE = 2.0  # s of readings that are averaged in each orientation
 _FEWEST = 100  # readings in an average

@@ -2,14 +2,19 @@
 
 import numpy as np
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from acquisition.errors import PreflightError
-from experiments.activation import activate
-from experiments.operator import Prompt
-from experiments.stage import Stage
-from experiments.trial import TrialName
-from ft_sensor.terrain_fit import CORNERS, TerrainFit, check_terrain, fit_terrain
-from wam.constants import Array
+from experiments.operator.prompts import Prompt
+from experiments.run.activation import activate
+from experiments.run.console_loop import Stage
+from experiments.trial.header import TrialName
+from ft_sensor.calibration.terrain_fit import (
+    CORNERS,
+    TerrainFit,
+    check_terrain,
+    fit_terrain,
+)
+from wam.model.constants import Array
 
 AVERAGE = 0.3  # s of positions that are averaged
 STILL = 0.003  # m that the sole may move meanwhile

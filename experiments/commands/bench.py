@@ -6,8 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.bench import BenchReport
-    from experiments.console import Console
+    from experiments.operator.console import Console
+    from experiments.tools.bench import BenchReport
 
 EXAMPLES = """\
   traction bench --fake --seconds 60        the loop with simulated devices
@@ -32,12 +32,12 @@ def run(args: argparse.Namespace) -> int:
     from contextlib import closing
 
     from acquisition.errors import SettingsError
-    from experiments.bench import run_bench
-    from experiments.console import Console
-    from experiments.preflight import connect_rig, start_devices
-    from experiments.process_crew import ProcessCrew
-    from experiments.rigs import FakeOptions
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.preflight.preflight import connect_rig, start_devices
+    from experiments.rig.processes import ProcessCrew
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
+    from experiments.tools.bench import run_bench
 
     if not 1.0 <= args.seconds <= _LONGEST:
         raise SettingsError(

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.matrix_settings import TerrainRow
-    from experiments.settings import Settings
-    from experiments.stage import Stage
+    from experiments.run.console_loop import Stage
+    from experiments.settings.load import Settings
+    from experiments.settings.matrix import TerrainRow
 
 EXAMPLES = """\
   traction calibrate terrain --terrain S10  where the container of a terrain stands
@@ -51,17 +51,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.bus_log import logging_bus
-    from experiments.calibrating.guide import guided
-    from experiments.company import Company, StopFlag, signals_ask
-    from experiments.console import Console
-    from experiments.key_choice import choose_keys
-    from experiments.operator import RehearsedHand
-    from experiments.preflight import connect_rig, run_preflight
-    from experiments.rigs import FakeOptions
-    from experiments.settings import load_settings
-    from experiments.stage import Stage
-    from experiments.terminal import keyboard
+    from experiments.calibrating.run import guided
+    from experiments.operator.console import Console
+    from experiments.operator.prompts import RehearsedHand
+    from experiments.operator.select import choose_keys
+    from experiments.operator.terminal import keyboard
+    from experiments.preflight.preflight import connect_rig, run_preflight
+    from experiments.rig.bus_log import logging_bus
+    from experiments.rig.rig import FakeOptions
+    from experiments.run.console_loop import Stage
+    from experiments.run.participants import Company, StopFlag, signals_ask
+    from experiments.settings.load import load_settings
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -85,8 +85,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _gravity(stage: Stage, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.gravity import GravityGuide
-    from experiments.store import write_new_text
-    from wam.gravity_file import gravity_to_toml
+    from experiments.session.store import write_new_text
+    from wam.calibration.gravity_file import gravity_to_toml
 
     found = GravityGuide(stage).run(args.poses, is_forced=args.force)
     write_new_text(out, gravity_to_toml(found))
@@ -95,8 +95,8 @@ def _gravity(stage: Stage, args: argparse.Namespace, out: Path) -> None:
 
 def _sensor(stage: Stage, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.sensor import SensorGuide
-    from experiments.store import write_new_text
-    from ft_sensor.sensor_calibration import sensor_to_toml
+    from experiments.session.store import write_new_text
+    from ft_sensor.calibration.sensor_file import sensor_to_toml
 
     tool = stage.rig.model.tool
     assert tool is not None
@@ -110,8 +110,8 @@ def _sensor(stage: Stage, args: argparse.Namespace, out: Path) -> None:
 
 def _terrain(stage: Stage, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.terrain import TerrainGuide
-    from experiments.store import iso_utc, write_new_text
-    from ft_sensor.calibration_file import terrain_to_toml
+    from experiments.session.store import iso_utc, write_new_text
+    from ft_sensor.calibration.files import terrain_to_toml
 
     rig = stage.rig
     fit, points = TerrainGuide(stage).run(is_forced=args.force)
@@ -149,7 +149,7 @@ def _without_old(
 
 def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
     """Return where the file goes, beside rig.toml; what is simulated is marked."""
-    from experiments.gravity_choice import gravity_path
+    from experiments.rig.gravity import gravity_path
 
     names = {
         "sensor": "ft_sensor.toml",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.console import Console
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction check --fake                     the page with simulated devices
@@ -43,13 +43,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
-    from experiments.bus_log import logging_bus
-    from experiments.console import GOOD, Console
-    from experiments.gravity_choice import read_gravity
-    from experiments.origins import origin_lines
-    from experiments.preflight import connect_rig, run_preflight
-    from experiments.rigs import FakeOptions
-    from experiments.settings import load_settings
+    from experiments.operator.console import GOOD, Console
+    from experiments.preflight.preflight import connect_rig, run_preflight
+    from experiments.rig.bus_log import logging_bus
+    from experiments.rig.gravity import read_gravity
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
+    from experiments.settings.origins import origin_lines
 
     console = Console(color=not args.no_color)
     if args.explain:
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
 def _explain(name: str, console: Console) -> int:
     from acquisition.errors import SettingsError
     from experiments.messages import CATALOGUE, catalogue_table, explanation
-    from experiments.phases import table_lines
+    from experiments.session.states import table_lines
 
     pages = {"states": table_lines, "all": catalogue_table}
     if name not in pages and name not in CATALOGUE:

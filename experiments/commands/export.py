@@ -27,10 +27,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Write the tables and return the exit code."""
     from acquisition.errors import SettingsError
-    from experiments.console import Console
-    from experiments.export import export_sessions
-    from experiments.reporting import Order, choose_sessions, export_terrains
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.report.export import export_sessions
+    from experiments.report.sessions import Order, choose_sessions, export_terrains
+    from experiments.settings.load import load_settings
 
     if (args.to is None) == (args.terrain_db is None):
         raise SettingsError(

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.console import Console
-    from experiments.pendant import Press, Pressable, TimedPress
-    from experiments.settings import Settings
+    from experiments.operator.console import Console
+    from experiments.settings.load import Settings
+    from experiments.tools.pendant import Press, Pressable, TimedPress
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -56,12 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop and return the exit code."""
     from acquisition.clock import SystemClock
-    from experiments.bus_log import open_bus_log
-    from experiments.company import StopFlag, signals_ask
-    from experiments.console import Console
-    from experiments.pendant import PRESSES, Lines, Pendant
-    from experiments.settings import load_settings
-    from experiments.simulated import build_server
+    from experiments.operator.console import Console
+    from experiments.rig.bus_log import open_bus_log
+    from experiments.rig.fake import build_server
+    from experiments.run.participants import StopFlag, signals_ask
+    from experiments.settings.load import load_settings
+    from experiments.tools.pendant import PRESSES, Lines, Pendant
 
     bus = _split(args.can) if args.can else None
     script = _read_script(args.script)
@@ -96,8 +96,8 @@ def _serve_sensor(
 ) -> int:
     """Serve a sensor without an arm until told to stop."""
     from acquisition.errors import SettingsError
-    from experiments.company import StopFlag, signals_ask
-    from experiments.simulated import build_sensor_server
+    from experiments.rig.fake import build_sensor_server
+    from experiments.run.participants import StopFlag, signals_ask
 
     if line is None:
         raise SettingsError(
@@ -139,7 +139,7 @@ def _split(text: str) -> tuple[str, str]:
 
 def _read_script(path: Path | None) -> tuple[TimedPress, ...] | None:
     from acquisition.errors import SettingsError
-    from experiments.pendant import parse_script
+    from experiments.tools.pendant import parse_script
 
     if path is None:
         return None

@@ -28,14 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.clock import SystemClock
-    from analysis.models import FitOptions
-    from analysis.prepare import PrepareOptions
-    from analysis.report import ReportContext, write_report
-    from analysis.study import StudyOptions, run_study
-    from analysis.tables import load_tables, parse_columns
-    from experiments.console import Console
-    from experiments.reporting import REPORTED, fitting
-    from experiments.store import iso_utc
+    from analysis.data.prepare import PrepareOptions
+    from analysis.data.tables import load_tables, parse_columns
+    from analysis.report.page import ReportContext, write_report
+    from analysis.study.models import FitOptions
+    from analysis.study.study import StudyOptions, run_study
+    from experiments.operator.console import Console
+    from experiments.report.sessions import REPORTED, fitting
+    from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
     columns = parse_columns(args.columns) if args.columns else None

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from analysis.recognition import Recognition
-    from analysis.series import TractionSeries
-    from experiments.console import Console
+    from analysis.data.series import TractionSeries
+    from analysis.terrains.recognition import Recognition
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction identify data/sessions/*/trials/T01.mcap --models terrains.json
@@ -50,10 +50,10 @@ def run(args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from analysis.prepare import PrepareOptions, prepare
-    from analysis.recognition import recognise
-    from analysis.terrain_db import load
-    from experiments.console import Console
+    from analysis.data.prepare import PrepareOptions, prepare
+    from analysis.terrains.database import load
+    from analysis.terrains.recognition import recognise
+    from experiments.operator.console import Console
 
     console = Console(color=not args.no_color)
     database = load(args.models)
@@ -74,8 +74,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _series(args: argparse.Namespace) -> list[TractionSeries]:
     """Return the trials of all files, recorded ones and tables."""
-    from analysis.load import load_trial
-    from analysis.tables import load_tables, parse_columns
+    from analysis.data.load import load_trial
+    from analysis.data.tables import load_tables, parse_columns
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]

@@ -22,8 +22,8 @@ def run(args: argparse.Namespace) -> int:
     from importlib import resources
 
     from acquisition.errors import SettingsError
-    from experiments.console import Console
-    from experiments.store import write_new_text
+    from experiments.operator.console import Console
+    from experiments.session.store import write_new_text
 
     folder: Path = args.folder
     there = [str(folder / name) for name in _FILES if (folder / name).exists()]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from acquisition.trial_file.recover import Recovery
-    from experiments.console import Console
+    from experiments.operator.console import Console
 
 EXAMPLES = """\
   traction recover data/sessions/2027-03-14_S012_S10   every .partial below a folder
@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> int:
     """Recover every file and return the exit code."""
     from acquisition.errors import TrialFileError
     from acquisition.trial_file.recover import recover
-    from experiments.console import Console
+    from experiments.operator.console import Console
 
     console = Console(color=not args.no_color)
     sources = find_sources(args.files)
@@ -89,7 +89,7 @@ def _matching(pattern: Path) -> list[Path]:
 
 
 def _tell(recovery: Recovery, console: Console) -> None:
-    from experiments.console import GOOD, WARNING
+    from experiments.operator.console import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
     held = f"{verified.cycles} cycles, {recovery.messages} messages"

@@ -23,9 +23,9 @@ def run(args: argparse.Namespace) -> int:
     """Record the trial and return the exit code."""
     from acquisition.errors import SessionError
     from experiments.commands.resume import reopening
-    from experiments.records import clean_text, parse_trial
-    from experiments.reopening import redo
-    from experiments.store import find_session
+    from experiments.run.resume import redo
+    from experiments.session.annotations import clean_text, parse_trial
+    from experiments.session.store import find_session
 
     folder = find_session(args.data, args.session)
     number, attempt = parse_trial(args.trial)

@@ -11,9 +11,9 @@ from experiments.arguments import FRICTION
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.bands import Finding
-    from experiments.console import Console
-    from experiments.rehearsal import Plan
+    from analysis.validation.bands import Finding
+    from experiments.operator.console import Console
+    from experiments.tools.acceptance import Plan
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
@@ -46,10 +46,10 @@ def run(args: argparse.Namespace) -> int:
     """Record, analyse and judge; return 6 if a band is not met."""
     import json
 
-    from experiments.console import Console
-    from experiments.rehearsal import Plan, analyse, as_plain, record_study
-    from experiments.settings import load_settings
-    from experiments.store import write_text
+    from experiments.operator.console import Console
+    from experiments.session.store import write_text
+    from experiments.settings.load import load_settings
+    from experiments.tools.acceptance import Plan, analyse, as_plain, record_study
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _print(plan: Plan, found: Sequence[Finding], folder: Path, console: Console) -> int:
-    from experiments.console import BAD, GOOD
+    from experiments.operator.console import BAD, GOOD
 
     rows = [
         [

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.console import Console
-    from wam.bus_words import Spoken, Tally
+    from experiments.operator.console import Console
+    from wam.bus.decoder import Spoken, Tally
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
@@ -65,10 +65,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _show_trial(args: argparse.Namespace) -> int:
     from acquisition.clock import SystemClock
-    from experiments.console import Console
-    from experiments.playback import play
-    from experiments.records import trial_path
-    from experiments.store import find_session
+    from experiments.operator.console import Console
+    from experiments.report.playback import play
+    from experiments.session.annotations import trial_path
+    from experiments.session.store import find_session
 
     console = Console(color=not args.no_color)
     path = trial_path(find_session(args.data, args.session), args.trial)
@@ -78,9 +78,9 @@ def _show_trial(args: argparse.Namespace) -> int:
 
 def _show_log(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
-    from experiments.console import Console
-    from wam.bus_words import BusReader
-    from wam.can_log import LONGEST_LINE, parse_log
+    from experiments.operator.console import Console
+    from wam.bus.decoder import BusReader
+    from wam.bus.log import LONGEST_LINE, parse_log
 
     console = Console(color=not args.no_color)
     reader = BusReader()

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from experiments.arguments import add_reopening
 
 if TYPE_CHECKING:
-    from experiments.reopening import Reopening
-    from experiments.store import SessionFolder
+    from experiments.run.resume import Reopening
+    from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
   traction resume                           the only unfinished session
@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record what is missing and return the exit code."""
-    from experiments.reopening import resume
-    from experiments.store import find_session
+    from experiments.run.resume import resume
+    from experiments.session.store import find_session
 
     if args.session is None:
         folder = _only_one(args.data, is_fake=args.fake)
@@ -37,8 +37,8 @@ def run(args: argparse.Namespace) -> int:
 
 def reopening(args: argparse.Namespace) -> "Reopening":
     """Return what the options say about how a session is opened once more."""
-    from experiments.console import Console
-    from experiments.reopening import Reopening
+    from experiments.operator.console import Console
+    from experiments.run.resume import Reopening
 
     return Reopening(
         data=args.data,
@@ -61,7 +61,7 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
         SessionError: there is none, or more than one.
     """
     from acquisition.errors import SessionError
-    from experiments.wreckage import find_unfinished
+    from experiments.session.unfinished import find_unfinished
 
     found = [
         session

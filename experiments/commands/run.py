@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from experiments.arguments import FRICTION, PACES, add_fault, data_option
 
 if TYPE_CHECKING:
-    from experiments.conduct import Request
-    from experiments.reopening import Reopening
-    from experiments.wreckage import Unfinished
+    from experiments.run.resume import Reopening
+    from experiments.run.session import Request
+    from experiments.session.unfinished import Unfinished
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -60,13 +60,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    from experiments.conduct import Opening, Request, conduct
-    from experiments.console import Console
-    from experiments.key_choice import choose_keys
-    from experiments.phases import Event
-    from experiments.reopening import resume
-    from experiments.rigs import FakeOptions
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.operator.select import choose_keys
+    from experiments.rig.rig import FakeOptions
+    from experiments.run.resume import resume
+    from experiments.run.session import Opening, Request, conduct
+    from experiments.session.states import Event
+    from experiments.settings.load import load_settings
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -95,9 +95,9 @@ def run(args: argparse.Namespace) -> int:
 
 def _make_room(request: Request, *, is_new: bool) -> Unfinished | None:
     """Return the session to be resumed instead, None when none is in the way."""
-    from experiments.choosing import Choice, choose
-    from experiments.reopening import close
-    from experiments.wreckage import find_unfinished
+    from experiments.run.resume import close
+    from experiments.run.resume_prompt import Choice, choose
+    from experiments.session.unfinished import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
     found = [
@@ -118,7 +118,7 @@ def _make_room(request: Request, *, is_new: bool) -> Unfinished | None:
 
 
 def _as_reopening(args: argparse.Namespace, request: Request) -> Reopening:
-    from experiments.reopening import Reopening
+    from experiments.run.resume import Reopening
 
     return Reopening(
         data=request.data,

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from experiments.board import BoardLine
-    from experiments.console import Console
+    from experiments.operator.console import Console
+    from experiments.session.matrix_board import BoardLine
 
 EXAMPLES = """\
   traction status                           the board, and what comes next
@@ -37,9 +37,14 @@ def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
     import json
 
-    from experiments.board import KnownDigests, count_board, next_steps, parse_where
-    from experiments.console import Console
-    from experiments.settings import load_settings
+    from experiments.operator.console import Console
+    from experiments.session.matrix_board import (
+        KnownDigests,
+        count_board,
+        next_steps,
+        parse_where,
+    )
+    from experiments.settings.load import load_settings
 
     settings = load_settings(args.config)
     where, digest = parse_where(args.where), KnownDigests()

@@ -7,9 +7,9 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.console import Console
-    from experiments.rigs import Rig
-    from wam.startup import ArmInfo
+    from experiments.operator.console import Console
+    from experiments.rig.rig import Rig
+    from wam.driver.startup import ArmInfo
 
 EXAMPLES = """\
   traction zero                             asks, then defines the home position
@@ -28,10 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Define the home position after confirmation and return the exit code."""
-    from experiments.console import GOOD, Console
-    from experiments.preflight import connect_rig
-    from experiments.rigs import FakeOptions
-    from experiments.settings import load_settings
+    from experiments.operator.console import GOOD, Console
+    from experiments.preflight.preflight import connect_rig
+    from experiments.rig.rig import FakeOptions
+    from experiments.settings.load import load_settings
 
     console = Console(color=not args.no_color)
     settings = load_settings(args.config)
@@ -73,8 +73,8 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
     Raises:
         PreflightError: the arm is not where home was.
     """
-    from experiments.console import GOOD, WARNING
-    from wam.home_check import check_home, home_error
+    from experiments.operator.console import GOOD, WARNING
+    from wam.driver.home_check import check_home, home_error
 
     before = rig.settings.rig.arm.mech_at_home
     mech = [puck.mech for puck in info.pucks if puck.mech is not None]

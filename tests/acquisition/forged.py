@@ -7,7 +7,7 @@ import lz4.frame
 import zstandard
 from mcap.writer import CompressionType, Writer
 
-from acquisition.messages import CYCLE, schema_text
+from acquisition.schema import CYCLE, schema_text
 from tests.acquisition.trials import resealed, span_of
 
 CHUNK, CHUNK_INDEX = 6, 8

@@ -6,7 +6,7 @@ from typing import Any
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from acquisition.messages import schema_text
+from acquisition.schema import schema_text
 
 
 @cache

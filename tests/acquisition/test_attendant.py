@@ -2,12 +2,12 @@ import json
 
 import pytest
 
-from acquisition.attendant import Attendant, Surroundings
-from acquisition.board import Board, Role
-from acquisition.control import ArmState, ControlStatus
-from acquisition.guard import Action
-from acquisition.loop import PERIOD_NS, Tick
-from acquisition.mailbox import Kind, Mailbox, StatusBoard
+from acquisition.control_loop.guard import Action
+from acquisition.control_loop.loop import PERIOD_NS, Tick
+from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.ipc.commands import Kind, Mailbox, StatusBoard
+from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.loop_server import Attendant, Surroundings
 
 MS = 1_000_000
 START_NS = 10**12

@@ -3,10 +3,10 @@ from pathlib import Path
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.board import Board, Role, pack_wrench, unpack_wrenches
 from acquisition.devices import WrenchSample
-from acquisition.memory import SharedMemory
-from acquisition.messages import CYCLE
+from acquisition.ipc.layout import Board, Role, pack_wrench, unpack_wrenches
+from acquisition.ipc.memory import SharedMemory
+from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)
 BOARD = Board.create()

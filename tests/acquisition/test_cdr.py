@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
-from acquisition.messages import CYCLE
+from acquisition.schema import CYCLE
 from acquisition.trial_file.views import JOINT_NAMES, encode_views
 from tests.acquisition.ros import decode, encode
 

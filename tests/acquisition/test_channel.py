@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.channel import LARGEST, Channel, ChannelClosedError
 from acquisition.errors import DeviceFaultError, LinkError, TrialFileError
+from acquisition.ipc.rpc import LARGEST, Channel, ChannelClosedError
 
 
 @pytest.fixture

@@ -3,14 +3,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control import ArmState
-from acquisition.cycle import Cycle
+from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.guard import Limits
+from acquisition.control_loop.loop import PERIOD_NS, Tick
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
-from acquisition.guard import Limits
-from acquisition.loop import PERIOD_NS, Tick
-from acquisition.messages import CYCLE
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
+from acquisition.schema import CYCLE
 
 MS = 1_000_000
 START_NS = 1_000 * MS

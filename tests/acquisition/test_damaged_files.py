@@ -9,8 +9,8 @@ import pytest
 import zstandard
 
 from acquisition.errors import TrialFileError
-from acquisition.messages import CYCLE, schema_text
-from acquisition.recorder import seal
+from acquisition.recording.recorder import seal
+from acquisition.schema import CYCLE, schema_text
 from acquisition.trial_file.chunks import FILE_LIMIT, RECORD_LIMIT
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from acquisition.board import Board, Role
-from acquisition.control import ArmState, ControlStatus
-from acquisition.desk import Desk
-from acquisition.guard import Action, Verdict
-from acquisition.loop import PERIOD_NS
-from acquisition.mailbox import Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.ipc.commands import Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.loop_client import Desk
 from fakes.clock import SteppedClock
 
 STOPPED = Verdict(Action.HOLD, "ft-stale")

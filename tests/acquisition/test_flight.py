@@ -2,9 +2,9 @@ import struct
 
 import pytest
 
-from acquisition.board import FRAME_DTYPE
-from acquisition.flight import FrameTape, encode_can_batch, last_frames
-from acquisition.shared import Ring
+from acquisition.ipc.frame_tape import FrameTape, encode_can_batch, last_frames
+from acquisition.ipc.layout import FRAME_DTYPE
+from acquisition.ipc.rings import Ring
 from tests.acquisition.ros import decode
 
 S = 1_000_000_000

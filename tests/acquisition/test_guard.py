@@ -3,8 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.devices import ArmReading, SafetyMode
-from acquisition.guard import (
+from acquisition.control_loop.guard import (
     Action,
     GuardState,
     Limits,
@@ -12,6 +11,7 @@ from acquisition.guard import (
     Verdict,
     check,
 )
+from acquisition.devices import ArmReading, SafetyMode
 
 MS = 1_000_000
 S = 1_000_000_000

@@ -15,7 +15,7 @@ import pytest
 import zstandard
 
 from acquisition.errors import TrialFileError
-from acquisition.recorder import seal
+from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover, recovered_path
 from tests.acquisition.forged import (

@@ -2,7 +2,7 @@ import itertools
 
 import pytest
 
-from acquisition.loop import Loop
+from acquisition.control_loop.loop import Loop
 from fakes.clock import SteppedClock
 
 MS = 1_000_000

@@ -1,10 +1,10 @@
 import pytest
 
-from acquisition.board import Board
-from acquisition.control import ArmState, ControlStatus
+from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
-from acquisition.guard import Action, Verdict
-from acquisition.mailbox import Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.ipc.commands import Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.ipc.layout import Board
 
 
 @pytest.fixture(scope="module")

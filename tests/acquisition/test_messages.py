@@ -3,8 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.messages import CYCLE, TRUTH, fixed_layout, schema_text
 from acquisition.sample import CHANNELS, Sample
+from acquisition.schema import CYCLE, TRUTH, fixed_layout, schema_text
 from tests.acquisition.ros import decode, encode
 
 TYPES = [

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.board import Board
 from acquisition.errors import LinkError
-from acquisition.processes import Child, ProcessLostError
+from acquisition.ipc.child import Child, ProcessLostError
+from acquisition.ipc.layout import Board
 
 pytestmark = pytest.mark.wall_clock
 HERE = "tests.acquisition.test_processes"

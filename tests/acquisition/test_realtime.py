@@ -3,7 +3,7 @@ import os
 
 import pytest
 
-from acquisition.realtime import Wish, choose_cores, request
+from acquisition.control_loop.realtime import Wish, choose_cores, request
 
 
 @pytest.fixture

@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.board import Board, Role
 from acquisition.devices import WrenchSample
 from acquisition.errors import TrialFileError
-from acquisition.flight import FrameTape
-from acquisition.messages import CYCLE
-from acquisition.recorder import Recorder
-from acquisition.shared_sensor import publish
+from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.shared_sensor import publish
+from acquisition.recording.recorder import Recorder
+from acquisition.schema import CYCLE
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover
 from acquisition.trial_file.writer import TrialWriter

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import TrialFileError
-from acquisition.messages import TRUTH
-from acquisition.recorder import seal
+from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
+from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover, recovered_path
 from acquisition.trial_file.salvage import Salvage, recorded_seconds

@@ -3,8 +3,8 @@ import struct
 import numpy as np
 import pytest
 
-from acquisition.messages import CYCLE
-from acquisition.shared import Ring
+from acquisition.ipc.rings import Ring
+from acquisition.schema import CYCLE
 from tests.acquisition.trials import make_cycles
 
 

@@ -1,6 +1,6 @@
 import pytest
 
-from acquisition.shared import LINE, Slot
+from acquisition.ipc.rings import LINE, Slot
 
 
 @pytest.fixture

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from acquisition.board import TIMING_DTYPE
-from acquisition.loop import PERIOD_NS
-from acquisition.timing import loop_report
+from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.control_loop.timing import loop_report
+from acquisition.ipc.layout import TIMING_DTYPE
 
 START_NS = 10**12
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from acquisition.board import FRAME_DTYPE, WRENCH_DTYPE
 from acquisition.errors import TrialFileError
-from acquisition.messages import TRUTH
-from acquisition.recorder import seal
+from acquisition.ipc.layout import FRAME_DTYPE, WRENCH_DTYPE
+from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag
+from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
 from acquisition.trial_file.writer import (

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.messages import CYCLE
 from acquisition.sample import Flag
+from acquisition.schema import CYCLE
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 
 START_NS = 5_000_000_000

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.models import FitOptions
-from analysis.series import TractionSeries
-from analysis.study import StudyOptions, run_study
-from analysis.tables import load_tables
+from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables
+from analysis.study.models import FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 DATA = Path(__file__).parent.parent / "data"
 SMALL_FIT = FitOptions(gp_points=60, draws=20)

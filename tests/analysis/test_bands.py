@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from analysis.bands import BANDS, Band, Finding, hold_against_bands
-from analysis.events import find_slips
-from analysis.model_measures import model_measures
-from analysis.models import GP_SE, TUSTIN, FitOptions
-from analysis.prepare import PrepareOptions, prepare
-from analysis.series import TractionSeries
-from analysis.slip_measures import GroundTrials, slip_measures
-from analysis.study import StudyOptions, run_study
+from analysis.data.events import find_slips
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.series import TractionSeries
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
+from analysis.validation.bands import BANDS, Band, Finding, hold_against_bands
+from analysis.validation.model_measures import model_measures
+from analysis.validation.slip_measures import GroundTrials, slip_measures
 from tests.fakes.point_foot import PointFoot
 
 BAND = Band("X1", "something", 0.2, 0.4)

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.fits import to_fits
-from analysis.jobs import Workers, run_tasks
-from analysis.models import FitOptions
-from analysis.study import StudyOptions, run_study
+from analysis.study.fits import to_fits
+from analysis.study.jobs import Workers, run_tasks
+from analysis.study.models import FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 ROOT = Path(__file__).parents[2]
 FIT = FitOptions(gp_points=60, draws=5, models=("tustin", "gp_se"))

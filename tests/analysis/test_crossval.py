@@ -3,16 +3,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.arcsine import Arcsine
-from analysis.crossval import choose_rows, pair_trials, plan_folds, run_fold
-from analysis.gp import posterior_search
-from analysis.kernels import SquaredExponential
-from analysis.likelihood import Likelihood
-from analysis.metrics import mean_absolute_error
-from analysis.models import GP_SE, TUSTIN, FitOptions
-from analysis.noise import ConstantNoise
-from analysis.prepare import PrepareOptions, prepare
-from analysis.rows import Rows
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.rows import Rows
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import posterior_search
+from analysis.study.crossval import choose_rows, pair_trials, plan_folds, run_fold
+from analysis.study.metrics import mean_absolute_error
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
 
 SMALL_FIT = FitOptions(gp_points=60, models=(TUSTIN, GP_SE))
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from analysis.events import find_slips
-from analysis.prepare import PrepareOptions, Smoothed, prepare
+from analysis.data.events import find_slips
+from analysis.data.prepare import PrepareOptions, Smoothed, prepare
 
 DT = 0.002
 

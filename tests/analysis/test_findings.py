@@ -7,18 +7,18 @@ import json
 import numpy as np
 import pytest
 
-from analysis.confusion import Confusion
-from analysis.confusion_figures import shares_of
-from analysis.findings import find
-from analysis.fits import to_csv, to_plain
-from analysis.models import GP_SE, GP_SE_NOISE, FitOptions
-from analysis.noise_summary import noise_summaries
-from analysis.plain_findings import findings_rows, plain_findings
-from analysis.residuals import residual_band
-from analysis.study import StudyOptions, run_study
-from analysis.surfaces import cell_edges, coverages
-from analysis.trends import fit_trend, trends_of
-from analysis.trial_figures import way_of
+from analysis.figures.confusion import shares_of
+from analysis.figures.trials import way_of
+from analysis.findings.as_numbers import findings_rows, plain_findings
+from analysis.findings.findings import find
+from analysis.findings.noise_summary import noise_summaries
+from analysis.findings.residuals import residual_band
+from analysis.findings.surfaces import cell_edges, coverages
+from analysis.findings.trends import fit_trend, trends_of
+from analysis.study.fits import to_csv, to_plain
+from analysis.study.models import GP_SE, GP_SE_NOISE, FitOptions
+from analysis.study.study import StudyOptions, run_study
+from analysis.terrains.confusion import Confusion
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,11 @@
 import pytest
 
-from analysis.figures import styled
-from analysis.findings import find
-from analysis.gallery import _RECIPES
-from analysis.models import FitOptions
-from analysis.study import StudyOptions, run_study
-from analysis.surface_figures import told_apart
+from analysis.figures.style import styled
+from analysis.figures.surfaces import told_apart
+from analysis.findings.findings import find
+from analysis.report.gallery import _RECIPES
+from analysis.study.models import FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 MARGIN = 0.02  # inches: half a line that lies on the edge
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis import gp as gp_module
-from analysis.arcsine import Arcsine
-from analysis.gp import GaussianProcess, fit_gp, posterior_search
-from analysis.kernels import SquaredExponential
-from analysis.likelihood import Likelihood, factorise
-from analysis.noise import ConstantNoise
+from analysis.gp import regression as gp_module
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.likelihood import Likelihood, factorise
+from analysis.gp.noise import ConstantNoise
+from analysis.gp.regression import GaussianProcess, fit_gp, posterior_search
 
 SE = SquaredExponential(2)
 KERNELS = {

@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.identify import (
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.series import TractionSeries
+from analysis.study.metrics import Prediction
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
+from analysis.terrains.database import load
+from analysis.terrains.export import database_of
+from analysis.terrains.identify import (
     Confusion,
     Expert,
     Scores,
@@ -19,15 +26,8 @@ from analysis.identify import (
     score_trial,
     surface_of,
 )
-from analysis.metrics import Prediction
-from analysis.models import GP_SE, TUSTIN, FitOptions
-from analysis.prepare import PrepareOptions, prepare
-from analysis.recognition import recognise
-from analysis.series import TractionSeries
-from analysis.study import StudyOptions, run_study
-from analysis.terrain_db import load
-from analysis.terrain_export import database_of
-from analysis.terrain_table import Table
+from analysis.terrains.recognition import recognise
+from analysis.terrains.table import Table
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
 
@@ -217,9 +217,9 @@ def test_more_traction_than_there_is_is_a_risk(path):
 
 
 def test_the_tables_are_close_to_the_model_between_their_points(study, path):
-    from analysis.models import FITTERS
-    from analysis.rows import Rows, Training
-    from analysis.terrain_export import _STREAM, zlib
+    from analysis.data.rows import Rows, Training
+    from analysis.study.models import FITTERS
+    from analysis.terrains.export import _STREAM, zlib
 
     trials = study.terrains["S0"].trials
     rows = Rows.of(trials)

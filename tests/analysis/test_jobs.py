@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.jobs import available_cores, run_tasks
+from analysis.study.jobs import available_cores, run_tasks
 
 
 def square(number):

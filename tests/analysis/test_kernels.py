@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from analysis.arcsine import Arcsine
-from analysis.gp import fit_gp
-from analysis.kernels import Product, SquaredExponential, Sum
-from analysis.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import Product, SquaredExponential, Sum
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import fit_gp
 
 SE, NN = SquaredExponential(2), Arcsine(2)
 KERNELS = {

@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 
 from acquisition.errors import TrialFileError
-from acquisition.messages import CYCLE
 from acquisition.sample import Flag
+from acquisition.schema import CYCLE
 from acquisition.trial_file.recover import recover
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
-from analysis.load import load_trial
-from analysis.rig_health import rig_health
-from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
+from analysis.data.load import load_trial
+from analysis.findings.rig_health import rig_health
+from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
-from wam.constants import Body, load_constants
-from wam.model import ArmModel
-from wam.tool import Tool
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body, load_constants
+from wam.model.tool import Tool
 
 CONSTANTS = load_constants()
 TOOL = Tool(

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.metrics import (
+from analysis.study.metrics import (
     Prediction,
     coverage,
     log_density,

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from analysis.gp import fit_gp
-from analysis.metrics import Prediction
-from analysis.noise_choice import TailedNoise, choose_noise
-from analysis.rows import Rows, Training
+from analysis.data.rows import Rows, Training
+from analysis.gp.regression import fit_gp
+from analysis.study.metrics import Prediction
+from analysis.study.noise_selection import TailedNoise, choose_noise
 
 PER_TRIAL = 120
 

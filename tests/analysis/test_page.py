@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from analysis.models import FITTERS, GP_SE_NOISE, FitOptions
-from analysis.report import ReportContext, write_report
-from analysis.study import StudyOptions, run_study
-from analysis.tables import load_tables
+from analysis.data.tables import load_tables
+from analysis.report.page import ReportContext, write_report
+from analysis.study.models import FITTERS, GP_SE_NOISE, FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.prepare import PrepareOptions, foot_velocity, moving_average, prepare
+from analysis.data.prepare import PrepareOptions, foot_velocity, moving_average, prepare
 
 
 @given(

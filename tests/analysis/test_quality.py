@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.quality import Coverage, coverage, quick_ratio, suggest
+from analysis.data.quality import Coverage, coverage, quick_ratio, suggest
 
 
 class Trial:

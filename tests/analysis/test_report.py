@@ -5,17 +5,17 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.curve_figures import draw_excerpts
-from analysis.error_figures import draw_cross_map, draw_errors
-from analysis.figures import render, styled
-from analysis.files import write_atomic
-from analysis.findings import find
-from analysis.fits import to_fits
-from analysis.models import FitOptions
-from analysis.report import ReportContext, ReportTable, render_page, write_report
-from analysis.report_content import choices, summary, table_one, verdicts
-from analysis.scenes import best_excerpt
-from analysis.study import StudyOptions, run_study
+from analysis.figures.curves import draw_excerpts
+from analysis.figures.errors import draw_cross_map, draw_errors
+from analysis.figures.selection import best_excerpt
+from analysis.figures.style import render, styled
+from analysis.findings.findings import find
+from analysis.report.page import ReportContext, ReportTable, render_page, write_report
+from analysis.report.paper_tables import choices, summary, table_one, verdicts
+from analysis.study.atomic_files import write_atomic
+from analysis.study.fits import to_fits
+from analysis.study.models import FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 OPTIONS = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
 HOSTILE = "<script>$x_1</b>&"

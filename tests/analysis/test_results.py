@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.crossval import plan_folds, run_fold
-from analysis.jobs import run_tasks
-from analysis.models import FitOptions
-from analysis.plain_form import decode, encode
-from analysis.prepare import PrepareOptions, prepare
-from analysis.results import ResultStore, task_key
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.study.crossval import plan_folds, run_fold
+from analysis.study.fold_store import ResultStore, task_key
+from analysis.study.jobs import run_tasks
+from analysis.study.models import FitOptions
+from analysis.study.serialise import decode, encode
 
 ANY = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),

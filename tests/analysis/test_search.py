@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis import search as search_module
-from analysis.arcsine import Arcsine
-from analysis.gp import posterior_search
-from analysis.kernels import SquaredExponential
-from analysis.noise import ConstantNoise, LogLinearNoise
-from analysis.search import Scores, maximise
+from analysis.gp import search as search_module
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import posterior_search
+from analysis.gp.search import Scores, maximise
 
 SE = SquaredExponential(2)
 MODEL = (SE, ConstantNoise())

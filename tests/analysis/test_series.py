@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.series import TractionSeries
+from analysis.data.series import TractionSeries
 
 
 def columns(n=10):

@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 
-from analysis.fits import to_fits
-from analysis.models import FITTERS, GP_SE, GP_SE_NOISE, TUSTIN, FitOptions
-from analysis.prepare import PrepareOptions
-from analysis.report_content import table_one, verdicts
-from analysis.series import TractionSeries
-from analysis.study import StudyOptions, run_study
-from analysis.tables import load_tables, parse_columns
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.data.tables import load_tables, parse_columns
+from analysis.report.paper_tables import table_one, verdicts
+from analysis.study.fits import to_fits
+from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 pytestmark = [pytest.mark.shared_data, pytest.mark.timeout(900)]
 STONES = ("S0", "S10", "S15", "B0", "B10", "B15")

@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.arcsine import Arcsine
-from analysis.gp import fit_gp
-from analysis.kernels import SquaredExponential
-from analysis.likelihood import Likelihood
-from analysis.noise import ConstantNoise, LogLinearNoise
-from analysis.sparse import choose_inducing, fit_sparse
-from analysis.sparse_bound import bound
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import fit_gp
+from analysis.gp.sparse import choose_inducing, fit_sparse
+from analysis.gp.sparse_bound import bound
 
 SE = (SquaredExponential(2), ConstantNoise())
 

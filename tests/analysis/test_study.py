@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.fits import to_csv, to_fits
-from analysis.models import GP_SE, TUSTIN, FitOptions
-from analysis.prepare import PrepareOptions
-from analysis.series import TractionSeries
-from analysis.study import StudyOptions, run_study
+from analysis.data.prepare import PrepareOptions
+from analysis.data.series import TractionSeries
+from analysis.study.fits import to_csv, to_fits
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 SMALL_FIT = FitOptions(gp_points=60, draws=20)  # as in the shared small study
 TWO = (TUSTIN, GP_SE)

@@ -7,8 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis import tables
-from analysis.tables import load_tables, parse_columns
+from analysis.data import tables
+from analysis.data.tables import load_tables, parse_columns
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
 

@@ -5,13 +5,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import SettingsError
-from analysis.bootstrap import bootstrap_tustin
-from analysis.box_least_squares import solve_in_box
-from analysis.identifiability import correlation_samples
-from analysis.moments import Moments, solve_moments
-from analysis.prepare import PrepareOptions, prepare
-from analysis.rows import Rows
-from analysis.tustin import (
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.rows import Rows
+from analysis.tustin.bootstrap import bootstrap_tustin
+from analysis.tustin.box_least_squares import solve_in_box
+from analysis.tustin.identifiability import correlation_samples
+from analysis.tustin.model import (
     NO_STRIBECK,
     NOT_IDENTIFIABLE,
     TustinBounds,
@@ -21,7 +20,8 @@ from analysis.tustin import (
     fit_tustin,
     predict,
 )
-from analysis.varpro import Problem
+from analysis.tustin.moments import Moments, solve_moments
+from analysis.tustin.varpro import Problem
 
 TENTHS = st.integers(-50, 50).map(lambda number: number / 10)
 PLAIN = TustinParameters(mu=0.6, F_s=9.0, v_s=0.04, delta_s=1.2, b=6.0)

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.models import GP_NN, TUSTIN, FitOptions
-from analysis.study import StudyOptions, run_study
-from analysis.what_if import VALUES, parse_choice, plain_choice, side_by_side
+from analysis.report.what_if import VALUES, parse_choice, plain_choice, side_by_side
+from analysis.study.models import GP_NN, TUSTIN, FitOptions
+from analysis.study.study import StudyOptions, run_study
 
 
 @pytest.mark.parametrize(

@@ -8,24 +8,23 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from analysis import terrain_db
-from analysis.tables import load_tables
-from experiments.aftermath import settle
-from experiments.board import count_board
-from experiments.book import open_book
-from experiments.lock import session_lock
-from experiments.scripted import ScriptKeys
-from experiments.settings import load_settings
-from experiments.store import list_sessions
-from experiments.wreckage import find_unfinished
-from ft_sensor import bota, optoforce, robotous
-from ft_sensor.calibration_file import payload_from_toml, terrain_from_toml
-from ft_sensor.dating import FrameDating
+from analysis.data.tables import load_tables
+from analysis.terrains import database as terrain_db
+from experiments.operator.scripted import ScriptKeys
+from experiments.session.crash_recovery import settle
+from experiments.session.journal import open_book
+from experiments.session.lock import session_lock
+from experiments.session.matrix_board import count_board
+from experiments.session.store import list_sessions
+from experiments.session.unfinished import find_unfinished
+from experiments.settings.load import load_settings
+from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
+from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
-from ft_sensor.sensor_calibration import sensor_from_toml
-from wam.bus_words import BusReader
-from wam.can_log import parse_log
-from wam.frames import (
+from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.vendors import bota, optoforce, robotous
+from wam.bus.decoder import BusReader
+from wam.bus.frames import (
     FrameError,
     decode_acceleration,
     decode_force,
@@ -37,7 +36,8 @@ from wam.frames import (
     decode_torques,
     split_id,
 )
-from wam.gravity_file import gravity_from_toml
+from wam.bus.log import parse_log
+from wam.calibration.gravity_file import gravity_from_toml
 
 SESSION = "2027-01-15_S001_TF.fake"
 _DECODERS = (

@@ -7,17 +7,17 @@ from importlib import resources
 
 import numpy as np
 
-from analysis.terrain_db import FORMAT, VERSION
-from fakes.sensor_kinds import SERIAL_KINDS, SensorChoice, make_stream
-from ft_sensor.calibration import SensorFit
-from ft_sensor.calibration_file import payload_to_toml, terrain_to_toml
+from analysis.terrains.database import FORMAT, VERSION
+from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
+from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
+from ft_sensor.calibration.fit import SensorFit
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
-from ft_sensor.sensor_calibration import SensorCalibration, sensor_to_toml
 from tests.corpus.readers import RUNNING
-from wam.constants import Body
-from wam.frames import encode_force, encode_position, encode_torques
-from wam.gravity_file import GravityCalibration, gravity_to_toml
-from wam.tool import Tool
+from wam.bus.frames import encode_force, encode_position, encode_torques
+from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
+from wam.model.constants import Body
+from wam.model.tool import Tool
 
 _TOOL = Tool(
     Body(0.136, np.array([0.0, 0.0, 0.006]), np.diag([7e-5, 7e-5, 1.4e-4])),

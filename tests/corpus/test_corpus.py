@@ -11,8 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from experiments.settings import load_settings
-from ft_sensor.calibration_file import terrain_facts, terrain_from_toml, terrain_to_toml
+from experiments.settings.load import load_settings
+from ft_sensor.calibration.files import (
+    terrain_facts,
+    terrain_from_toml,
+    terrain_to_toml,
+)
 from ft_sensor.payload import TerrainFrame
 from tests.corpus.mutations import mutated
 from tests.corpus.readers import READERS

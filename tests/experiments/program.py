@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-import fakes.rig
+import fakes.world.rig
 from experiments.cli import main
-from experiments.operator import AutoKeys
+from experiments.operator.prompts import AutoKeys
 
 TRAVEL = 0.07  # m, a container that is crossed in a few seconds
 
@@ -83,7 +83,7 @@ class Watched:
 
     done: Done
     folder: Path
-    rig: fakes.rig.FakeRig
+    rig: fakes.world.rig.FakeRig
 
 
 def run_watched(config, data, *arguments, press=None):
@@ -93,13 +93,13 @@ def run_watched(config, data, *arguments, press=None):
     """
     seen = []
 
-    class Seen(fakes.rig.FakeRig):
+    class Seen(fakes.world.rig.FakeRig):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
             seen.append(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", Seen)
+        patch.setattr(fakes.world.rig, "FakeRig", Seen)
         if press is not None:
             usual = AutoKeys.answer
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from acquisition.trial_file.verify import verify
-from experiments.aftermath import settle
-from experiments.book import Book, open_book
-from experiments.phases import Event, Phase
-from experiments.store import create_session, read_json, sha256_of, write_json
+from experiments.session.crash_recovery import settle
+from experiments.session.journal import Book, open_book
+from experiments.session.states import Event, Phase
+from experiments.session.store import create_session, read_json, sha256_of, write_json
 from tests.acquisition.trials import make_cycles, write_trial
 
 STEPS = ("hardlink_to", "unlink", "replace")

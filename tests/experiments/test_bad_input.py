@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from experiments.store import create_session, write_json
+from experiments.session.store import create_session, write_json
 from tests.experiments.program import (
     digest,
     only_session,

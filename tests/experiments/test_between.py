@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from analysis.quality import Coverage, suggest
-from experiments.archive import cells_of
-from experiments.operator import Asked, Prompt
-from experiments.scripted import ScriptKeys
-from experiments.session import replay
+from analysis.data.quality import Coverage, suggest
+from experiments.operator.prompts import Asked, Prompt
+from experiments.operator.scripted import ScriptKeys
+from experiments.session.reducer import replay
+from experiments.trial.files import cells_of
 from tests.experiments.program import (
     journal,
     only_session,

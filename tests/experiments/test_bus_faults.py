@@ -7,7 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
-from experiments.operator import Prompt
+from experiments.operator.prompts import Prompt
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import (
     digest,

@@ -7,17 +7,18 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import fakes.rig
+import fakes.world.rig
 from acquisition.devices import SafetyMode
-from experiments.calibrating import gravity, walk
-from experiments.operator import AutoKeys, Prompt
-from fakes.plant import PlantOptions
+from experiments.calibrating import gravity
+from experiments.calibrating import pose_walk as walk
+from experiments.operator.prompts import AutoKeys, Prompt
+from fakes.plant.plant import PlantOptions
 from tests.experiments.program import traction, write_config
-from wam import calibration_poses
-from wam.constants import Body, load_constants
-from wam.first_moments import gravity_torque
-from wam.gravity_file import gravity_from_toml
-from wam.model import ArmModel
+from wam.calibration import poses as calibration_poses
+from wam.calibration.gravity_file import gravity_from_toml
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body, load_constants
+from wam.model.moments import gravity_torque
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -36,7 +37,7 @@ def perturbed(constants):
     return replace(constants, links=links)
 
 
-class HeavierRig(fakes.rig.FakeRig):
+class HeavierRig(fakes.world.rig.FakeRig):
     """A rig whose arm weighs otherwise than the drawings say."""
 
     made: ClassVar[list["HeavierRig"]] = []
@@ -56,7 +57,7 @@ def calibrate(out, *options, press=None, is_quick=True):
     goes less far and stops for a shorter time than a real one may.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", HeavierRig)
+        patch.setattr(fakes.world.rig, "FakeRig", HeavierRig)
         if is_quick:
             patch.setattr(walk, "SETTLE", 0.1)
             patch.setattr(gravity, "AVERAGE", 0.1)

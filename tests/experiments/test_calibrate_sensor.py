@@ -5,28 +5,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fakes.rig
+import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
-from experiments import operator
-from experiments.calibrated import with_calibrations
-from experiments.calibrating import sensor, walk
-from experiments.settings import load_settings
-from fakes import hand
-from fakes.plant import PlantOptions
-from fakes.sensor_errors import SensorErrors
-from ft_sensor.calibration_file import terrain_from_toml, terrain_to_toml
+from experiments.calibrating import pose_walk as walk
+from experiments.calibrating import sensor
+from experiments.operator import prompts as operator
+from experiments.settings.calibrations import with_calibrations
+from experiments.settings.load import load_settings
+from fakes.plant import hand
+from fakes.plant.plant import PlantOptions
+from fakes.sensor.errors import SensorErrors
+from ft_sensor.calibration.files import terrain_from_toml, terrain_to_toml
+from ft_sensor.calibration.sensor_file import sensor_from_toml, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
-from ft_sensor.sensor_calibration import sensor_from_toml, sensor_to_toml
 from tests.experiments.program import (
     only_session,
     run_short,
     traction,
     write_config,
 )
-from wam import calibration_poses
-from wam.constants import Body
-from wam.tool import Tool
+from wam.calibration import poses as calibration_poses
+from wam.model.constants import Body
+from wam.model.tool import Tool
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -34,7 +35,7 @@ QUICK = ("--fake", "--fast", "--operator-script", "auto")
 MASS, COM, ANGLE = 0.62, np.array([0.014, -0.006, 0.055]), np.radians(25.0)
 
 
-class OtherRig(fakes.rig.FakeRig):
+class OtherRig(fakes.world.rig.FakeRig):
     """A rig whose sensor is turned and whose foot weighs otherwise than rig.toml says.
 
     The sensor reads the reaction, too.
@@ -59,8 +60,8 @@ class DriftingErrors(SensorErrors):
 
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", rig)
-        patch.setattr(fakes.rig, "SensorErrors", errors)
+        patch.setattr(fakes.world.rig, "FakeRig", rig)
+        patch.setattr(fakes.world.rig, "SensorErrors", errors)
         patch.setattr(walk, "SETTLE", 0.2)
         patch.setattr(sensor, "AVERAGE", 0.4)
         patch.setattr(calibration_poses, "POINT_SPEED", 0.8)
@@ -153,7 +154,7 @@ def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated)
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
     config = write_config(tmp_path, rig=change)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", OtherRig)
+        patch.setattr(fakes.world.rig, "FakeRig", OtherRig)
         patch.setattr(OtherRig, "is_in_the_air", False)
         done = run_short(config, tmp_path / "data")
     assert done.code == 0, done.err
@@ -231,7 +232,7 @@ def test_a_touched_plate_gives_incline_and_heading(tmp_path):
     assert "0.0 mm rms off the plane" in done.out
 
 
-class TiltedRig(fakes.rig.FakeRig):
+class TiltedRig(fakes.world.rig.FakeRig):
     """A rig whose container is two degrees steeper than the matrix says."""
 
     def __init__(self, scene, *rest, **options):
@@ -241,7 +242,7 @@ class TiltedRig(fakes.rig.FakeRig):
 
 def test_a_container_that_is_inclined_otherwise_is_refused(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.rig, "FakeRig", TiltedRig)
+        patch.setattr(fakes.world.rig, "FakeRig", TiltedRig)
         done, out = touch(tmp_path, "S10")
         assert done.code == 2
         assert "the matrix says 10.0 (limit 1.0)" in done.err

@@ -13,24 +13,22 @@ from string import Formatter
 import numpy as np
 import pytest
 
-import fakes.rig
+import fakes.world.rig
 from acquisition.devices import SafetyMode
-from acquisition.processes import ProcessLostError
-from experiments import (
-    activation,
-    inline_crew,
-    preflight,
-    settings,
-    simulated,
-    taring,
-)
-from experiments.computer_faults import COMPUTER_FAULTS
-from experiments.faults import FaultPlan
-from experiments.lock import session_lock
+from acquisition.ipc.child import ProcessLostError
+from experiments.fault_injection.host_faults import COMPUTER_FAULTS
+from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
-from experiments.operator import AutoKeys, Prompt
-from experiments.session import replay
-from experiments.store import list_sessions
+from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.preflight import preflight
+from experiments.rig import fake as simulated
+from experiments.rig import inline as inline_crew
+from experiments.run import activation
+from experiments.run import tare as taring
+from experiments.session.lock import session_lock
+from experiments.session.reducer import replay
+from experiments.session.store import list_sessions
+from experiments.settings import load as settings
 from ft_sensor import tare
 from tests.experiments.program import (
     Done,
@@ -113,7 +111,9 @@ class Scene:
 
     def watch(self, press=None):
         """Keep hold of rigs and crews; `press(asked, scene)` goes before `hurry`."""
-        self.patch.setattr(fakes.rig, "FakeRig", self._seen(fakes.rig.FakeRig, "rigs"))
+        self.patch.setattr(
+            fakes.world.rig, "FakeRig", self._seen(fakes.world.rig.FakeRig, "rigs")
+        )
         crew = self._seen(simulated.InlineCrew, "crews")
         self.patch.setattr(simulated, "InlineCrew", crew)
         usual = AutoKeys.answer

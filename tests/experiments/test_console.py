@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.console import Console, wrapped
+from experiments.operator.console import Console, wrapped
 
 
 def test_a_line_is_broken_between_words_and_indented():

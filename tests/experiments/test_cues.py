@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
-from experiments.console import Console
-from experiments.cues import Cue, Cues, build_cues
-from experiments.rig_settings import OperatorSection
-from experiments.speech import Speaker, find_speech
-from experiments.trial import PaceWatch
+from experiments.operator.console import Console
+from experiments.operator.cues import Cue, Cues, build_cues
+from experiments.operator.speech import Speaker, find_speech
+from experiments.settings.rig import OperatorSection
+from experiments.trial.header import PaceWatch
 
 
 class Terminal(io.StringIO):
@@ -66,7 +66,7 @@ def test_cues_are_spoken_in_fixed_words_and_end_with_the_session():
 
 
 def test_nobody_speaks_unless_asked(monkeypatch):
-    monkeypatch.setattr("experiments.cues.find_speech", lambda: "/bin/speak")
+    monkeypatch.setattr("experiments.operator.cues.find_speech", lambda: "/bin/speak")
     assert build_cues(OperatorSection(), Console())._speaker is None
     speaking = build_cues(OperatorSection(speech=True), Console())
     assert speaking._speaker.program == "/bin/speak"

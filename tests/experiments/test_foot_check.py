@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from experiments.foot_check import foot_before
+from experiments.preflight.foot_check import foot_before
 from tests.experiments.program import only_session, traction
 
 

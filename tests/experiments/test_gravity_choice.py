@@ -7,14 +7,14 @@ import pytest
 
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
-from experiments.gravity_choice import build_law_model, gravity_words, read_gravity
-from experiments.parts import build_tool
-from experiments.settings import load_settings
+from experiments.rig.build import build_tool
+from experiments.rig.gravity import build_law_model, gravity_words, read_gravity
+from experiments.settings.load import load_settings
 from tests.experiments.program import only_session, run_short, traction, write_config
-from wam.constants import load_constants
-from wam.first_moments import gravity_torque, moments_of_links
-from wam.gravity_file import GravityCalibration, gravity_to_toml
-from wam.model import ArmModel
+from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+from wam.model.moments import gravity_torque, moments_of_links
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 

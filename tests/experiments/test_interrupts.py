@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import pytest
 
 from acquisition.devices import SafetyMode
-from experiments.operator import Prompt
-from experiments.phases import OPEN, Event, Phase
-from experiments.session import replay
+from experiments.operator.prompts import Prompt
+from experiments.session.reducer import replay
+from experiments.session.states import OPEN, Event, Phase
 from tests.experiments.program import (
     journal,
     kept_and_sound,
@@ -88,7 +88,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     def line(keys, asked):
         press(asked, None)
 
-    monkeypatch.setattr("experiments.operator.AutoKeys.line", line)
+    monkeypatch.setattr("experiments.operator.prompts.AutoKeys.line", line)
     session = run_watched(config, tmp_path, 1, press=press)
     events, state = journal(session.folder), replay(journal(session.folder))
     assert seen[1:] == [moment.phase]  # it came once, and where it should
@@ -115,7 +115,7 @@ def test_ctrl_c_in_a_preflight_touches_nothing(config, tmp_path, monkeypatch, ti
         for _ in range(times):
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr("experiments.preflight.check_code", interrupted)
+    monkeypatch.setattr("experiments.preflight.preflight.check_code", interrupted)
     options = ("--fake", "--fast", "--operator-script", "auto", "--config", config)
     done = traction("run", "TF", *options, "--data", tmp_path / "data")
     assert done.code == 130

@@ -4,8 +4,8 @@ import signal
 import pytest
 
 from acquisition.errors import SessionError
-from experiments.lock import owner_of, session_lock
-from experiments.store import create_session
+from experiments.session.lock import owner_of, session_lock
+from experiments.session.store import create_session
 from tests.experiments.program import traction
 
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from acquisition.board import WRENCH_DTYPE
-from experiments.console import BAD, GOOD, WARNING
-from experiments.machine_checks import (
+from acquisition.ipc.layout import WRENCH_DTYPE
+from experiments.operator.console import BAD, GOOD, WARNING
+from experiments.preflight.host_checks import (
     check_code,
     check_governor,
     check_stream,

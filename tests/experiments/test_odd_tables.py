@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from analysis.figures import Picture
+from analysis.figures.style import Picture
 from tests.experiments.program import traction
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -64,10 +64,11 @@ def odd(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # what is said is tested here; pictures cost seconds, see the long test
         patch.setattr(
-            "analysis.gallery.render", lambda key, *_: Picture(key, b"png", b"pdf")
+            "analysis.report.gallery.render",
+            lambda key, *_: Picture(key, b"png", b"pdf"),
         )
-        patch.setattr("analysis.jobs.available_cores", lambda: 1)
-        patch.setattr("analysis.report.available_cores", lambda: 1)
+        patch.setattr("analysis.study.jobs.available_cores", lambda: 1)
+        patch.setattr("analysis.report.page.available_cores", lambda: 1)
         yield fitted(tmp_path_factory.mktemp("odd"))
 
 

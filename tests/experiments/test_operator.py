@@ -4,9 +4,8 @@ import sys
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.faults import FaultPlan, parse_fault
-from experiments.key_choice import choose_keys
-from experiments.operator import (
+from experiments.fault_injection.plan import FaultPlan, parse_fault
+from experiments.operator.prompts import (
     AUTO_ATTEMPTS,
     AUTO_PATIENCE,
     Asked,
@@ -14,7 +13,8 @@ from experiments.operator import (
     Prompt,
     RehearsedHand,
 )
-from experiments.terminal import TerminalKeys
+from experiments.operator.select import choose_keys
+from experiments.operator.terminal import TerminalKeys
 
 KNOWN = ("ft-stale", "ft-silent", "estop")
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control import ArmState
+from acquisition.control_loop.guard import Action
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
-from acquisition.guard import Action
-from experiments.rigs import FakeOptions, build_rig
-from experiments.settings import load_settings
+from experiments.rig.rig import FakeOptions, build_rig
+from experiments.settings.load import load_settings
 
 J1, J6 = 0, 5
 PULL = 8.0  # N m of the hand at joint 1

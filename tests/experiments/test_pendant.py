@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from experiments.pendant import Lines, Pendant, TimedPress, parse_script
+from experiments.tools.pendant import Lines, Pendant, TimedPress, parse_script
 
 S = 1_000_000_000
 

@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.phases import OPEN, TABLE, Event, Phase
+from experiments.session.states import OPEN, TABLE, Event, Phase
 from tests.experiments.program import traction
 
 # (phase, event): where it leads; what is not here is refused.

@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.progress import ProgressLine, progress_text, time_left
+from experiments.operator.progress import ProgressLine, progress_text, time_left
 
 
 class Said:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from acquisition.clock import SystemClock
-from experiments.aftermath import settle
-from experiments.book import open_book
-from experiments.lock import session_lock
-from experiments.phases import Phase
-from experiments.session import replay
-from experiments.store import list_sessions
+from experiments.session.crash_recovery import settle
+from experiments.session.journal import open_book
+from experiments.session.lock import session_lock
+from experiments.session.reducer import replay
+from experiments.session.states import Phase
+from experiments.session.store import list_sessions
 from tests.experiments.program import digest, kept_and_sound, run_watched, traction
 from tests.experiments.test_resuming import short
 

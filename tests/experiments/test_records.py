@@ -13,11 +13,11 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.trial_file.reader import TrialReader
-from analysis.load import load_trial
-from experiments.order import confounding, suggest_order
-from experiments.records import parse_trial
-from experiments.session import replay
-from experiments.settings import load_settings
+from analysis.data.load import load_trial
+from experiments.session.annotations import parse_trial
+from experiments.session.order import confounding, suggest_order
+from experiments.session.reducer import replay
+from experiments.settings.load import load_settings
 from tests.experiments.program import (
     digest,
     journal,

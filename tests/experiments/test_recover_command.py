@@ -1,6 +1,6 @@
 import pytest
 
-from acquisition.recorder import seal
+from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.experiments.program import traction

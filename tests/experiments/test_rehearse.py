@@ -7,9 +7,9 @@ from concurrent.futures import Future
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from experiments import rehearsal
-from experiments.settings import load_settings
-from experiments.store import list_sessions
+from experiments.session.store import list_sessions
+from experiments.settings.load import load_settings
+from experiments.tools import acceptance as rehearsal
 from tests.experiments.program import traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]

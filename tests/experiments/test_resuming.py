@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from acquisition.trial_file.verify import verify
-from experiments.operator import Prompt
-from experiments.session import replay
+from experiments.operator.prompts import Prompt
+from experiments.session.reducer import replay
 from tests.experiments.program import (
     Done,
     digest,

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from acquisition.recorder import seal
+from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
-from experiments.console import GOOD, WARNING
-from experiments.review import review_trial
+from experiments.operator.console import GOOD, WARNING
+from experiments.trial.quality import review_trial
 
 
 def rewrite(source, path, cycles):

@@ -2,16 +2,16 @@
 
 import pytest
 
-from acquisition.guard import Action, Verdict
+from acquisition.control_loop.guard import Action, Verdict
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from experiments.messages import Circumstances, fault_text
-from experiments.operator import Prompt
-from experiments.parts import build_safety_limits
-from experiments.settings import load_settings
+from experiments.operator.prompts import Prompt
+from experiments.rig.build import build_safety_limits
+from experiments.settings.load import load_settings
 from tests.experiments.program import run_watched, traction, write_config
-from wam.frames import encode_set
-from wam.safety_limits import SafetyLimits
+from wam.bus.frames import encode_set
+from wam.driver.safety_limits import SafetyLimits
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from experiments.screens import (
+from experiments.operator.screens import (
     READY_KEYS,
     ReadyView,
     RecordingView,

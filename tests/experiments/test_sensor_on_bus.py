@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
-from experiments.settings import load_settings
+from experiments.settings.load import load_settings
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import (
     only_session,

@@ -8,10 +8,10 @@ import can
 import pytest
 
 from acquisition.clock import SystemClock
-from fakes.can_socket import SocketBus, open_socket
-from ft_sensor.line import Line
-from ft_sensor.serial_link import SerialLink, open_port
-from ft_sensor.serial_sensor import SerialSensor
+from fakes.bus.client import SocketBus, open_socket
+from ft_sensor.serial_line.link import SerialLink, open_port
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.sensor import SerialSensor
 from tests.experiments.program import run_short, traction
 from tests.ft_sensor.sensor_bench import MAKES
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.phases import OPEN, Event, Phase
-from experiments.session import SessionState, apply, refusal, replay
+from experiments.session.reducer import SessionState, apply, refusal, replay
+from experiments.session.states import OPEN, Event, Phase
 
 START = {"event": "session-started", "terrain": "S0", "trials": 2}
 ACTIVE = {"event": "activated"}

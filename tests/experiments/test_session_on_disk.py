@@ -10,10 +10,10 @@ from acquisition.sample import SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
 from acquisition.trial_file.writer import TRIAL_TOPICS
-from experiments.book import Book
-from experiments.phases import Phase
-from experiments.session import replay
-from experiments.store import create_session
+from experiments.session.journal import Book
+from experiments.session.reducer import replay
+from experiments.session.states import Phase
+from experiments.session.store import create_session
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import TRAVEL, digest, journal, sidecar
 

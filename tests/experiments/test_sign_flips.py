@@ -10,14 +10,14 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import analysis.load
-import fakes.rig
+import analysis.data.load
+import fakes.world.rig
 import ft_sensor.payload
-from analysis.load import load_trial
-from experiments.truth import truth_errors
+from analysis.data.load import load_trial
+from experiments.report.truth_errors import truth_errors
 from ft_sensor.payload import Payload
 from tests.experiments.program import only_session, run_short, write_config
-from wam.transmission import Transmission
+from wam.driver.transmission import Transmission
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 LARGEST_V, LARGEST_F = 1.5e-3, 1.0
 
 
-class ReadingRig(fakes.rig.FakeRig):
+class ReadingRig(fakes.world.rig.FakeRig):
     """A rig whose sensor is mounted in another way than rig.toml says."""
 
     changes: ClassVar[dict] = {}
@@ -35,7 +35,7 @@ class ReadingRig(fakes.rig.FakeRig):
         super().__init__(scene, constants, tool, clock, options, network)
 
 
-class TurnedRig(fakes.rig.FakeRig):
+class TurnedRig(fakes.world.rig.FakeRig):
     """A rig whose container lies 30 degrees beside where the matrix says."""
 
     def __init__(self, scene, *rest, **options):
@@ -46,13 +46,13 @@ class TurnedRig(fakes.rig.FakeRig):
 def sensor(**changes):
     def apply(patch):
         patch.setattr(ReadingRig, "changes", changes)
-        patch.setattr(fakes.rig, "FakeRig", ReadingRig)
+        patch.setattr(fakes.world.rig, "FakeRig", ReadingRig)
 
     return apply
 
 
 def container_turned(patch):
-    patch.setattr(fakes.rig, "FakeRig", TurnedRig)
+    patch.setattr(fakes.world.rig, "FakeRig", TurnedRig)
 
 
 def joint_reversed(joint):
@@ -89,7 +89,7 @@ def traction_with(*signs):
         def wrong(axes, velocity, force):
             return right(axes, velocity, force) * np.array(signs)
 
-        patch.setattr(analysis.load, "traction", wrong)
+        patch.setattr(analysis.data.load, "traction", wrong)
 
     return apply
 

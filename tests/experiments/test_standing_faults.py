@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
-from acquisition.control import ArmState
-from experiments import simulated
-from experiments.operator import Prompt
-from experiments.session import replay
+from acquisition.control_loop.states import ArmState
+from experiments.operator.prompts import Prompt
+from experiments.rig import fake as simulated
+from experiments.session.reducer import replay
 from tests.experiments.program import journal, run_watched
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]

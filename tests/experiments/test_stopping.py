@@ -6,8 +6,8 @@ from acquisition.devices import SafetyMode
 from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
-from experiments.company import StopFlag
-from experiments.operator import Prompt
+from experiments.operator.prompts import Prompt
+from experiments.run.participants import StopFlag
 from tests.experiments.program import journal, run_watched, sidecar
 
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError, TrialFileError
-from experiments import store
-from experiments.console import Console
-from experiments.store import (
+from experiments.operator.console import Console
+from experiments.session import store
+from experiments.session.store import (
     create_session,
     find_session,
     iso_utc,
@@ -17,7 +17,7 @@ from experiments.store import (
     read_json,
     write_json,
 )
-from experiments.trial import EndWatch, TrialName
+from experiments.trial.header import EndWatch, TrialName
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 
@@ -152,7 +152,7 @@ def test_a_console_that_nobody_reads_any_more_is_noticed(monkeypatch):
             return False
 
     monkeypatch.setattr("sys.stdout", Closed())
-    monkeypatch.setattr("experiments.console._discard_output", lambda: None)
+    monkeypatch.setattr("experiments.operator.console._discard_output", lambda: None)
     console = Console()
     assert not console.is_lost
     console.say("anybody?")

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from experiments.operator import Prompt
-from experiments.taps import DoubleTap
+from experiments.operator.double_tap import DoubleTap
+from experiments.operator.prompts import Prompt
 from tests.experiments.program import journal, run_watched, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]

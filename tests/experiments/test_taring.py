@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from experiments.taring import known_bias, residual_force
-from ft_sensor.calibration import SensorFit
+from experiments.run.tare import known_bias, residual_force
+from ft_sensor.calibration.fit import SensorFit
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import Payload
-from ft_sensor.sensor_calibration import SensorCalibration, sensor_to_toml
 
 BIAS = np.array([0.5, -1.0, 2.0, 0.01, 0.02, 0.03])
 

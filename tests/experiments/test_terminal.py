@@ -5,8 +5,8 @@ import termios
 
 import pytest
 
-from experiments.operator import Asked, AutoKeys, Prompt
-from experiments.terminal import LONGEST_LINE, Cbreak, TerminalKeys, keyboard
+from experiments.operator.prompts import Asked, AutoKeys, Prompt
+from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalKeys, keyboard
 
 
 @pytest.fixture

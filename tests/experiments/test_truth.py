@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.trial_file.reader import TrialReader
-from analysis.load import load_trial
-from analysis.prepare import PrepareOptions, moving_average, prepare
+from analysis.data.load import load_trial
+from analysis.data.prepare import PrepareOptions, moving_average, prepare
 
 WIDTH = 11  # samples, the smoothing of the analysis
 

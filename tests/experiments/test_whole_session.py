@@ -5,8 +5,8 @@ import os
 
 import pytest
 
-from experiments.operator import AutoKeys, Prompt
-from experiments.session import replay
+from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.session.reducer import replay
 from tests.experiments.program import (
     digest,
     journal,

@@ -2,13 +2,13 @@ import os
 
 import pytest
 
-from experiments.choosing import Choice, choose
-from experiments.console import Console
-from experiments.lock import session_lock
-from experiments.operator import Prompt
-from experiments.store import create_session
-from experiments.terminal import TerminalKeys
-from experiments.wreckage import find_unfinished
+from experiments.operator.console import Console
+from experiments.operator.prompts import Prompt
+from experiments.operator.terminal import TerminalKeys
+from experiments.run.resume_prompt import Choice, choose
+from experiments.session.lock import session_lock
+from experiments.session.store import create_session
+from experiments.session.unfinished import find_unfinished
 from tests.acquisition.trials import make_cycles, write_trial
 from tests.experiments.program import run_short, traction
 

@@ -4,11 +4,11 @@ from itertools import count
 
 import can
 
-from fakes.can_hub import SocketHub
-from fakes.can_port import CanPort
-from fakes.can_socket import SocketBus
-from fakes.pucks import PuckNetwork
-from fakes.serve import PuckServer
+from fakes.bus.adapter import CanPort
+from fakes.bus.client import SocketBus
+from fakes.bus.hub import SocketHub
+from fakes.pucks.network import PuckNetwork
+from fakes.serving.puck_server import PuckServer
 from tests.fakes.stepped import Motors, Rig, SteppedClock
 
 COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -7,13 +7,13 @@ import math
 
 import numpy as np
 
-from analysis.prepare import foot_velocity
-from analysis.series import TractionSeries
-from fakes.profile import smooth_profile, value_at
-from fakes.push import HandView, Pace, Push
+from analysis.data.prepare import foot_velocity
+from analysis.data.series import TractionSeries
+from fakes.ground.profile import smooth_profile, value_at
+from fakes.ground.terrain import make_terrain
+from fakes.plant.push import HandView, Pace, Push
 from fakes.randomness import trial_generators
-from fakes.sensor_errors import FORCE_ERRORS, SensorErrors
-from fakes.terrain import make_terrain
+from fakes.sensor.errors import FORCE_ERRORS, SensorErrors
 
 GROUNDS = {
     "S0": ("small", "tread", 0.0),

@@ -3,13 +3,13 @@
 import numpy as np
 
 from fakes.clock import SteppedClock
-from fakes.plant import ArmPlant, PlantOptions
-from fakes.rig import FakeRig, Scene, solve_start
+from fakes.plant.plant import ArmPlant, PlantOptions
+from fakes.world.rig import FakeRig, Scene, solve_start
 from ft_sensor.payload import TerrainFrame
-from wam.constants import Body, load_constants
-from wam.gravity import compensation
-from wam.model import ArmModel
-from wam.tool import Tool, sensor_body
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body, load_constants
+from wam.model.gravity import compensation
+from wam.model.tool import Tool, sensor_body
 
 CONSTANTS = load_constants()
 FOOT = Body(0.45, np.array([0.01, 0.0, 0.062]), np.diag([4e-4, 5.5e-4, 4.5e-4]))

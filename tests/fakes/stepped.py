@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from weakref import finalize
 
 from acquisition.clock import Readable
-from fakes.can_bus import FakeCanBus
-from fakes.ft_puck import Load
-from fakes.network_options import NetworkOptions
-from fakes.pucks import PuckNetwork
-from wam.can_link import CanLink
+from fakes.bus.in_process import FakeCanBus
+from fakes.pucks.ft_puck import Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from wam.bus.link import CanLink
 
 
 class SteppedClock:

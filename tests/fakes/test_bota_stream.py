@@ -3,18 +3,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fakes.bota_stream import BotaOptions, bota_stream
-from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import SensorStream
-from fakes.stream_faults import ByteFault, damage
-from ft_sensor.bota import (
+from fakes.sensor.bota import BotaOptions, bota_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.stream import SensorStream
+from fakes.sensor.stream_faults import ByteFault, damage
+from ft_sensor.serial_line.framing import FrameScanner
+from ft_sensor.vendors.bota import (
     Acknowledgement,
     BotaStatus,
     decode_frame,
     find_acknowledgements,
     find_boot_text,
 )
-from ft_sensor.framing import FrameScanner
 
 MS = 1_000_000
 S = 1_000_000_000

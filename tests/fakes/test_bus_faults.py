@@ -6,12 +6,12 @@ import can
 import pytest
 
 from acquisition.devices import SafetyMode
-from fakes.bus_faults import FOREIGN_IDS
-from fakes.faults import mend_network, network_faults
-from fakes.schedule import FRAME_NS
+from fakes.pucks.bus_faults import FOREIGN_IDS
+from fakes.pucks.event_queue import FRAME_NS
+from fakes.world.faults import mend_network, network_faults
 from tests.fakes.stepped import Rig
-from wam.frames import decode_position, position_reply_id
-from wam.safety import Level
+from wam.bus.frames import decode_position, position_reply_id
+from wam.driver.safety_module import Level
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -3,7 +3,7 @@ from itertools import pairwise
 import can
 import pytest
 
-from fakes.schedule import FRAME_NS
+from fakes.pucks.event_queue import FRAME_NS
 from tests.fakes.stepped import Rig
 
 

@@ -3,10 +3,10 @@
 import can
 import pytest
 
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.buses import BUSES, FIRMWARE
-from wam.frames import encode_get, encode_set, encode_torques
-from wam.pucks import Device, property_number
+from wam.bus.frames import encode_get, encode_set, encode_torques
+from wam.bus.properties import Device, property_number
 
 MS = 1_000_000
 SAFETY = {10: [(0x546, "85 00 02 00")]}

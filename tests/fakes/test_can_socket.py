@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from fakes.can_hub import CLIENTS, SocketHub
-from fakes.can_socket import SocketBus, open_socket, pack_frame, unpack_frame
-from wam.can_link import CanLink, open_bus
+from fakes.bus.client import SocketBus, open_socket, pack_frame, unpack_frame
+from fakes.bus.hub import CLIENTS, SocketHub
+from wam.bus.link import CanLink, open_bus
 
 QUESTION = pack_frame(0x404, b"\x30")
 
@@ -213,7 +213,7 @@ def test_python_can_finds_the_bus_by_its_entry_point():
 
 
 def test_the_driver_opens_the_bus_as_any_other(hub, path, monkeypatch):
-    backend = ("fakes.can_socket", "SocketBus")
+    backend = ("fakes.bus.client", "SocketBus")
     monkeypatch.setitem(can.interfaces.BACKENDS, "traction-fake", backend)
     monkeypatch.setattr(can.util, "VALID_INTERFACES", {"traction-fake"})
     link = CanLink(open_bus("traction-fake", str(path), 1_000_000))

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
-from fakes.plant import PlantOptions
-from fakes.rig import FakeRig, Scene, solve_start
+from fakes.plant.plant import PlantOptions
+from fakes.world.rig import FakeRig, Scene, solve_start
 from ft_sensor.payload import TerrainFrame
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.can_link import CanLink
-from wam.constants import load_constants
-from wam.controller import FootController
-from wam.model import ArmModel
+from wam.bus.link import CanLink
+from wam.control.controller import FootController
+from wam.driver.arm import WamArm
+from wam.driver.settings import ArmSettings
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
 PERIOD_NS = 2_000_000

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fakes.terrain import make_terrain
+from fakes.ground.terrain import make_terrain
 
 DT = 0.0005
 LIFTED, PRESS = 0.001, 4.0  # m, N

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from fakes.ft_puck import RANGES, STEPS, Load
-from fakes.network_options import NetworkOptions
-from fakes.pucks import PuckNetwork
-from fakes.sensor_errors import SensorErrors
+from fakes.pucks.ft_puck import RANGES, STEPS, Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.sensor.errors import SensorErrors
 from tests.fakes.stepped import Motors
-from wam.frames import decode_force, decode_torque
+from wam.bus.frames import decode_force, decode_torque
 
 MS = 1_000_000
 LOAD = (1.0, -2.5, -9.76, 0.099, -0.249, 0.015)  # whole steps of the sensor

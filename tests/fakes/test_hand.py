@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from fakes.container import FREE, Container
-from fakes.hand import LIFT, Hand, Phase
-from fakes.plate import PLATES, Plate
-from fakes.push import PACES, HandView, Pace
+from fakes.ground.container import FREE, Container
+from fakes.ground.plate import PLATES, Plate
+from fakes.plant.hand import LIFT, Hand, Phase
+from fakes.plant.push import PACES, HandView, Pace
 from tests.fakes.scenes import float_for, make_plant, release, sole
 
 AT_REST = HandView((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, (0.0,) * 3)

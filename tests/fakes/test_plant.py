@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.joint_loads import JointLoads
-from fakes.joint_state import JointState
+from fakes.plant.joint_loads import JointLoads
+from fakes.plant.joint_state import JointState
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -18,8 +18,8 @@ from tests.fakes.scenes import (
     send,
     sole,
 )
-from wam.constants import GRAVITY
-from wam.model import build_pinocchio, drive_inertia_matrix
+from wam.model.arm_model import build_pinocchio, drive_inertia_matrix
+from wam.model.constants import GRAVITY
 
 S = 1_000_000_000
 

@@ -3,11 +3,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.devices import SafetyMode
-from fakes.network_options import NetworkOptions
-from fakes.pucks import PuckNetwork
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Motors
-from wam.frames import encode_set, encode_torques
-from wam.safety import Level, decode_pendant
+from wam.bus.frames import encode_set, encode_torques
+from wam.driver.safety_module import Level, decode_pendant
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

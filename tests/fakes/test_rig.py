@@ -4,9 +4,9 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from fakes.hand import Phase
-from fakes.network_options import NetworkOptions
-from fakes.push import PACES
+from fakes.plant.hand import Phase
+from fakes.plant.push import PACES
+from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
     DrawnAhead,
     NormalStream,
@@ -15,10 +15,10 @@ from fakes.randomness import (
     trial_generator,
     trial_generators,
 )
-from fakes.rig import Rehearsal, solve_start
+from fakes.world.rig import Rehearsal, solve_start
 from ft_sensor.payload import TerrainFrame
 from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
-from wam.frames import decode_force, decode_torque
+from wam.bus.frames import decode_force, decode_torque
 
 S = 1_000_000_000
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from fakes.network_options import NetworkOptions
-from fakes.pucks import PuckNetwork
-from fakes.speed_watch import SpeedWatch
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.speed_monitor import SpeedWatch
 from tests.fakes.scenes import MODEL, START_Q
 from tests.fakes.stepped import Motors
-from wam.arm_settings import ArmSettings
-from wam.frames import encode_set
-from wam.safety import Level, decode_pendant
-from wam.transmission import Transmission
+from wam.bus.frames import encode_set
+from wam.driver.safety_module import Level, decode_pendant
+from wam.driver.settings import ArmSettings
+from wam.driver.transmission import Transmission
 
 MS = 1_000_000
 CYCLE_NS = 2 * MS

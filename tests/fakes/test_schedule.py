@@ -1,4 +1,4 @@
-from fakes.schedule import NEVER, Schedule
+from fakes.pucks.event_queue import NEVER, Schedule
 
 
 def schedule_of(log):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from fakes.sensor_errors import FORCE_ERRORS, ErrorScale, SensorErrors
+from fakes.sensor.errors import FORCE_ERRORS, ErrorScale, SensorErrors
 
 MS = 1_000_000
 QUIET = ErrorScale(bias=0.0, drift=0.0, white=0.0, resolution=0.0)

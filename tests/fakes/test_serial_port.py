@@ -1,8 +1,8 @@
 import pytest
 
 from acquisition.errors import LinkError
-from fakes.serial_port import FakeSerialPort
-from ft_sensor.serial_link import SerialLink
+from fakes.sensor.port import FakeSerialPort
+from ft_sensor.serial_line.link import SerialLink
 
 
 class Time:

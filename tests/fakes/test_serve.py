@@ -6,10 +6,10 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError
-from fakes.can_port import CanPort
-from fakes.network_options import NetworkOptions
-from fakes.pucks import PuckNetwork
-from fakes.serve import Home, PuckServer, Supported, build_home_server
+from fakes.bus.adapter import CanPort
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.serving.puck_server import Home, PuckServer, Supported, build_home_server
 from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
 from tests.fakes.stepped import Motors, SteppedClock
 

@@ -6,7 +6,7 @@ from contextlib import closing
 import can
 import pytest
 
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.buses import BUSES, FIRMWARE, InProcess
 from tests.fakes.strict_client import DeviationError, StrictClient
 

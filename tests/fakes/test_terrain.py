@@ -3,13 +3,13 @@ import math
 import numpy as np
 import pytest
 
-from fakes.contact import NO_CONTACT
-from fakes.footing import Footing, stretched
-from fakes.plate import PLATES, Plate
+from fakes.ground.contact import NO_CONTACT
+from fakes.ground.footing import Footing, stretched
+from fakes.ground.plate import PLATES, Plate
+from fakes.ground.stone_sizes import STONES, slope_factor
+from fakes.ground.stones import StoneBed
+from fakes.ground.terrain import make_terrain
 from fakes.randomness import trial_generator
-from fakes.stone_sizes import STONES, slope_factor
-from fakes.stones import StoneBed
-from fakes.terrain import make_terrain
 
 DT = 0.0005
 SPEED = 0.04

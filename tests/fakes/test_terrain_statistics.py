@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from analysis.crossval import FoldResult, plan_folds, run_fold
-from analysis.events import Slip, find_slips
-from analysis.jobs import run_tasks
-from analysis.models import GP_SE, TUSTIN, FitOptions
-from analysis.prepare import PreparedTrial, PrepareOptions, prepare
+from analysis.data.events import Slip, find_slips
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare
+from analysis.study.crossval import FoldResult, plan_folds, run_fold
+from analysis.study.jobs import run_tasks
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from tests.fakes.point_foot import GROUNDS, PointFoot
 
 SETS = (1, 2, 3)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from tests.faults.stage import PHASES
 
 HOLD, DAMP = ArmState.HOLD, ArmState.DAMP

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-import experiments.conduct
-import experiments.runner
-import fakes.rig
-from acquisition.control import ArmState
-from acquisition.cycle import Cycle
+import experiments.run.runner
+import experiments.run.session
+import fakes.world.rig
+from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.guard import Limits
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
-from acquisition.guard import Limits
 from acquisition.trial_file.verify import verify
-from experiments.operator import AutoKeys, Prompt
-from fakes.rig import FakeRig, Rehearsal
+from experiments.operator.prompts import AutoKeys, Prompt
+from fakes.world.rig import FakeRig, Rehearsal
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
@@ -143,7 +143,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[Scene]:
     """Let every simulated rig, cycle and torque frame be seen."""
     scenes: list[Scene] = []
 
-    class Rig(fakes.rig.FakeRig):
+    class Rig(fakes.world.rig.FakeRig):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
             scenes.append(scene := Scene(self, patch))
@@ -173,7 +173,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[Scene]:
         usual_mend(rehearsal)
 
     patch.setattr(Rehearsal, "mend", mend)
-    patch.setattr(fakes.rig, "FakeRig", Rig)
+    patch.setattr(fakes.world.rig, "FakeRig", Rig)
     patch.setattr(Cycle, "__call__", call)
     return scenes
 
@@ -198,9 +198,9 @@ def _at(patch, phase: str, scenes: list[Scene], strike: Strike) -> None:
 
     patch.setattr(AutoKeys, "answer", answer)
     if phase == "preflight":
-        _before(patch, experiments.conduct, "run_preflight", strike_once)
+        _before(patch, experiments.run.session, "run_preflight", strike_once)
     if phase == "idle":
-        _before(patch, experiments.runner, "activate", strike_once, idle=0.2)
+        _before(patch, experiments.run.runner, "activate", strike_once, idle=0.2)
 
 
 def _before(patch, module, name: str, first, idle: float = 0.0) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from tests.experiments.program import traction, write_config
 from tests.faults.expected import End
@@ -58,7 +58,7 @@ import fcntl, sys, termios
 if sys.stdout.isatty():
     fcntl.ioctl(1, termios.TIOCSCTTY, 0)
 from pathlib import Path
-from experiments.operator import AutoKeys, Prompt, RehearsedHand
+from experiments.operator.prompts import AutoKeys, Prompt, RehearsedHand
 prompt, marker = sys.argv.pop(1), Path(sys.argv.pop(1))
 answer, follow = AutoKeys.answer, RehearsedHand.follow
 def waiting(keys, asked):

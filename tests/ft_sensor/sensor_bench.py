@@ -7,29 +7,29 @@ from typing import Any
 import numpy as np
 
 from acquisition.devices import WrenchSample
-from fakes.bota_stream import BotaOptions, bota_stream
-from fakes.ft_puck import Load
-from fakes.network_options import NetworkOptions
-from fakes.optoforce_stream import (
+from fakes.pucks.ft_puck import Load
+from fakes.pucks.options import NetworkOptions
+from fakes.sensor.bota import BotaOptions, bota_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.optoforce import (
     SENSITIVITY,
     SERIAL_NUMBER,
     OptoForceOptions,
     optoforce_stream,
 )
-from fakes.robotous_stream import RobotousOptions, robotous_stream
-from fakes.sensor_errors import SensorErrors
-from fakes.sensor_stream import SensorStream
-from fakes.serial_port import FakeSerialPort
-from ft_sensor.barrett import BarrettSensor
-from ft_sensor.bota_device import BotaDevice, BotaSettings
-from ft_sensor.line import Line
-from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
-from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
-from ft_sensor.serial_link import SerialLink
-from ft_sensor.serial_sensor import SerialDevice, SerialSensor
+from fakes.sensor.port import FakeSerialPort
+from fakes.sensor.robotous import RobotousOptions, robotous_stream
+from fakes.sensor.stream import SensorStream
+from ft_sensor.serial_line.link import SerialLink
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.sensor import SerialDevice, SerialSensor
+from ft_sensor.vendors.barrett import BarrettSensor
+from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
+from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
+from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.frames import SENSOR_NODE
+from wam.bus.frames import SENSOR_NODE
+from wam.driver.arm import WamArm
 
 MS = 1_000_000
 LOAD = (1.0, -2.0, 30.0, 0.1, 0.2, -0.3)

@@ -6,18 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
-from fakes.ft_puck import Load
-from fakes.network_options import NetworkOptions
-from ft_sensor.barrett import BarrettSensor
-from ft_sensor.barrett_frames import (
+from fakes.pucks.ft_puck import Load
+from fakes.pucks.options import NetworkOptions
+from ft_sensor.vendors.barrett import BarrettSensor
+from ft_sensor.vendors.barrett_frames import (
     SAMPLING_DELAY_NS,
     BarrettCounters,
     WrenchPairing,
     status_words,
 )
 from tests.fakes.stepped import Rig, SteppedClock
-from wam.arm import WamArm
-from wam.frames import encode_force, encode_torque
+from wam.bus.frames import encode_force, encode_torque
+from wam.driver.arm import WamArm
 
 MS = 1_000_000
 CYCLE_NS = 2 * MS

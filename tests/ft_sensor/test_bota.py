@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ft_sensor import bota
-from ft_sensor.bota import (
+from ft_sensor.reading import StreamTiming
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.vendors import bota
+from ft_sensor.vendors.bota import (
     Acknowledgement,
     BootText,
     BotaFrame,
     BotaStatus,
 )
-from ft_sensor.framing import FrameScanner, wire_time_ns
-from ft_sensor.reading import StreamTiming
 from tests.ft_sensor.damage import damaged_stream, double, drop, flip
 
 NORMAL = bytes.fromhex(

@@ -10,15 +10,15 @@ from acquisition.errors import (
     LinkTimeoutError,
     SettingsError,
 )
-from fakes.bota_stream import BotaOptions, bota_stream
-from fakes.sensor_errors import SensorErrors
-from fakes.serial_port import FakeSerialPort
-from fakes.stream_faults import ByteFault
-from ft_sensor.bota import BotaStatus
-from ft_sensor.bota_device import BotaDevice, BotaSettings
-from ft_sensor.line import Line
-from ft_sensor.serial_link import SerialLink
-from ft_sensor.serial_sensor import SerialSensor
+from fakes.sensor.bota import BotaOptions, bota_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.port import FakeSerialPort
+from fakes.sensor.stream_faults import ByteFault
+from ft_sensor.serial_line.link import SerialLink
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.sensor import SerialSensor
+from ft_sensor.vendors.bota import BotaStatus
+from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
 from tests.ft_sensor.sensor_bench import LOAD, MS, SteppedTime
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from ft_sensor.calibration import check_residual, fit_sensor
+from ft_sensor.calibration.fit import check_residual, fit_sensor
 from ft_sensor.payload import Payload
 
 MASS, COM = 0.45, np.array([0.012, -0.004, 0.055])

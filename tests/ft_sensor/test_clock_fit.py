@@ -3,7 +3,7 @@ import sys
 import numpy as np
 import pytest
 
-from ft_sensor.clock_fit import ClockFit
+from ft_sensor.serial_line.clock_fit import ClockFit
 
 S = 1_000_000_000
 PERIOD = 1_250_000  # ns, 800 Hz

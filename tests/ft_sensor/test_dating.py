@@ -1,7 +1,7 @@
 from itertools import pairwise
 
-from ft_sensor.dating import FrameDating
 from ft_sensor.reading import Reading, StreamTiming
+from ft_sensor.serial_line.timestamps import FrameDating
 
 MS = 1_000_000
 SHOWN = StreamTiming(1.25 * MS, 802_951, 1 << 32, 1000.0, 50 * MS, 37)

@@ -5,12 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from fakes.optoforce_stream import SENSITIVITY, SERIAL_NUMBER
-from ft_sensor import optoforce
-from ft_sensor.framing import FrameScanner
-from ft_sensor.line import Line
-from ft_sensor.optoforce import OptoForceFrame, encode_configuration
-from ft_sensor.optoforce_device import OptoForceDevice, OptoForceSettings
+from fakes.sensor.optoforce import SENSITIVITY, SERIAL_NUMBER
+from ft_sensor.serial_line.framing import FrameScanner
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.vendors import optoforce
+from ft_sensor.vendors.optoforce import OptoForceFrame, encode_configuration
+from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
 from tests.ft_sensor.damage import damaged_stream, double, drop, flip, parse
 from tests.ft_sensor.sensor_bench import MS, SensorBench
 

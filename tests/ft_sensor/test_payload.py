@@ -12,7 +12,7 @@ from ft_sensor.payload import (
     payload_of,
     traction,
 )
-from wam.constants import GRAVITY
+from wam.model.constants import GRAVITY
 
 EXACT = 1e-12  # rounding of numbers of order 10
 INCLINES = [0.0, 10.0, 15.0]

@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
-from ft_sensor import robotous
-from ft_sensor.framing import FrameScanner
-from ft_sensor.line import Line
-from ft_sensor.robotous import RobotousFrame, encode_command
-from ft_sensor.robotous_device import RobotousDevice, RobotousSettings
+from ft_sensor.serial_line.framing import FrameScanner
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.vendors import robotous
+from ft_sensor.vendors.robotous import RobotousFrame, encode_command
+from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
 from tests.ft_sensor.damage import damaged_stream, double, drop, flip, parse
 from tests.ft_sensor.sensor_bench import MS, SensorBench
 

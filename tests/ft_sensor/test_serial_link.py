@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.clock import Readable
 from acquisition.errors import LinkError
-from ft_sensor.serial_link import SerialLink, latency_timer_warning, open_port
+from ft_sensor.serial_line.link import SerialLink, latency_timer_warning, open_port
 
 
 class ScriptedPort:

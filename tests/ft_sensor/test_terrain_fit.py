@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
+from ft_sensor.calibration.terrain_fit import check_terrain, fit_terrain
 from ft_sensor.payload import TerrainFrame
-from ft_sensor.terrain_fit import check_terrain, fit_terrain
 
 LENGTH, HALF_WIDTH = 0.45, 0.15
 

@@ -8,9 +8,9 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 
 from acquisition.clock import NS_PER_S
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
-from acquisition.messages import CYCLE
+from acquisition.schema import CYCLE
 from tests.processes.watching import is_running, session, until, wait
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(240)]

@@ -2,8 +2,8 @@
 
 import pytest
 
-from experiments.rigs import FakeOptions, build_rig
-from experiments.settings import load_settings
+from experiments.rig.rig import FakeOptions, build_rig
+from experiments.settings.load import load_settings
 from tests.processes.watching import until
 
 pytestmark = pytest.mark.wall_clock

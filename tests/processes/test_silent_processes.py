@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from tests.processes.watching import running_trial, until
 
 pytestmark = pytest.mark.wall_clock

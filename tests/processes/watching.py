@@ -12,12 +12,12 @@ from pathlib import Path
 
 import can
 
-from acquisition.board import Board
 from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
-from acquisition.mailbox import StatusBoard
-from acquisition.memory import SharedMemory
-from fakes.can_socket import SocketBus
+from acquisition.ipc.commands import StatusBoard
+from acquisition.ipc.layout import Board
+from acquisition.ipc.memory import SharedMemory
+from fakes.bus.client import SocketBus
 
 ROOT = Path(__file__).parents[2]
 CLOCK = SystemClock()

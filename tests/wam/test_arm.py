@@ -10,11 +10,11 @@ from acquisition.errors import (
     LinkTimeoutError,
     PreflightError,
 )
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.frames import decode_torques
+from wam.bus.frames import decode_torques
+from wam.driver.arm import WamArm
+from wam.driver.settings import ArmSettings
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -1,7 +1,7 @@
 import pytest
 
-from wam.bus_words import BusReader
-from wam.can_log import LoggedFrame
+from wam.bus.decoder import BusReader
+from wam.bus.log import LoggedFrame
 
 US = 1000
 MS = 1_000_000

@@ -6,8 +6,8 @@ import pytest
 from acquisition.clock import Readable
 from acquisition.errors import LinkError
 from tests.fakes.stepped import Rig
-from wam import can_link
-from wam.can_link import CanLink, open_bus
+from wam.bus import link as can_link
+from wam.bus.link import CanLink, open_bus
 
 
 class ScriptedBus(can.BusABC):

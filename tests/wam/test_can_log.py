@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.fakes.stepped import SteppedClock
-from wam.can_log import CanLog, CanLogError, format_frame, parse_frame, parse_log
+from wam.bus.log import CanLog, CanLogError, format_frame, parse_frame, parse_log
 
 KNOWN = "(1699999999.123456) can0 404#30"
 KNOWN_NS = 1_699_999_999_123_456_000

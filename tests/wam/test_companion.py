@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from acquisition.errors import LinkError
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
+from wam.driver.arm import WamArm
 
 CYCLE_NS = 2_000_000
 FORCE, TORQUE = 0x50A, 0x50B

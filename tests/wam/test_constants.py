@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.constants import load_constants
+from wam.model.constants import load_constants
 
 SHIPPED = load_constants()
 

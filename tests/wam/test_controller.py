@@ -3,12 +3,12 @@ import sys
 import numpy as np
 import pytest
 
-from acquisition.control import ArmState
+from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading
-from wam.controller import FootController
-from wam.gravity import compensation
-from wam.joint_lock import LockGains
-from wam.soft_walls import SoftWalls, Walls
+from wam.control.controller import FootController
+from wam.control.joint_lock import LockGains
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.model.gravity import compensation
 
 S = 1_000_000_000
 DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])

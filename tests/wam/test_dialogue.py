@@ -2,8 +2,8 @@ import pytest
 
 from acquisition.errors import LinkTimeoutError
 from tests.fakes.stepped import Rig
-from wam.dialogue import Dialogue
-from wam.frames import Group
+from wam.bus.frames import Group
+from wam.bus.property_client import Dialogue
 
 
 def test_a_question_is_answered_with_its_value():

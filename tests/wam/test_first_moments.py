@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.constants import Body, load_constants
-from wam.first_moments import (
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body, load_constants
+from wam.model.gravity import gravity_model
+from wam.model.moments import (
     MomentFit,
     check_fit,
     fit_moments,
     gravity_torque,
     moments_of_links,
 )
-from wam.gravity import gravity_model
-from wam.model import ArmModel
 
 CONSTANTS = load_constants()
 

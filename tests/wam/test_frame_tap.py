@@ -1,10 +1,10 @@
 import pytest
 
-from acquisition.board import FRAME_DTYPE
-from acquisition.flight import FrameTape
-from acquisition.shared import Ring
+from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.layout import FRAME_DTYPE
+from acquisition.ipc.rings import Ring
 from tests.fakes.stepped import SteppedClock
-from wam.frame_tap import FrameTap
+from wam.bus.tap import FrameTap
 
 NS_PER_S = 1_000_000_000
 

@@ -2,8 +2,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wam import frames
-from wam.frames import FrameError, Group
+from wam.bus import frames
+from wam.bus.frames import FrameError, Group
 
 GOLDEN_GETS = [(0x05, "05"), (68, "44"), (86, "56"), (90, "5a"), (66, "42")]
 GOLDEN_SETS = [

@@ -5,11 +5,11 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.dialogue import Dialogue
-from wam.frames import decode_torques
+from wam.bus.frames import decode_torques
+from wam.bus.property_client import Dialogue
+from wam.driver.arm import WamArm
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from wam.constants import GRAVITY
-from wam.gravity import MAX_VIRTUAL_MASS, VirtualMass, compensation
+from wam.model.constants import GRAVITY
+from wam.model.gravity import MAX_VIRTUAL_MASS, VirtualMass, compensation
 
 S = 1_000_000_000
 DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0])

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from wam.gravity_file import (
+from wam.calibration.gravity_file import (
     GravityCalibration,
     fits_tool,
     gravity_from_toml,

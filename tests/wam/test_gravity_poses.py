@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.calibration_poses import (
+from wam.calibration.poses import (
     APPROACH_SPEED,
     MARGIN,
     OFFSET,
@@ -17,10 +17,10 @@ from wam.calibration_poses import (
     plan_halts,
     way_seconds,
 )
-from wam.constants import load_constants
-from wam.first_moments import regressor
-from wam.model import ArmModel
-from wam.move import JointMove
+from wam.control.joint_move import JointMove
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+from wam.model.moments import regressor
 
 FLOOR = 0.33
 TWISTED = (0.0, 1.0, -1.1, 2.9, -4.3, -1.2, 0.6)  # to rise it goes down first

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wam.joint_lock import JointLock, LockGains
+from wam.control.joint_lock import JointLock, LockGains
 
 S = 1_000_000_000
 START = 7 * S

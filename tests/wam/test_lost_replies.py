@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fakes.bus_faults import BusFaults
-from fakes.faults import network_faults
-from fakes.network_options import NetworkOptions
+from fakes.pucks.bus_faults import BusFaults
+from fakes.pucks.options import NetworkOptions
+from fakes.world.faults import network_faults
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.frames import position_reply_id
+from wam.bus.frames import position_reply_id
+from wam.driver.arm import WamArm
+from wam.driver.settings import ArmSettings
 
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 ZERO = np.zeros(7)

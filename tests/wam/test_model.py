@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from wam.constants import GRAVITY, load_constants
-from wam.model import ArmModel, drive_inertia_matrix
-from wam.tool import Tool, box_inertia, sensor_body
+from wam.model.arm_model import ArmModel, drive_inertia_matrix
+from wam.model.constants import GRAVITY, load_constants
+from wam.model.tool import Tool, box_inertia, sensor_body
 
 POSES = ["zero", "home", "elbow_square", "foot_down", "generic_a", "generic_b"]
 STROKES = ["pass_l1", "pass_l2", "pass_w1", "pass_w2"]

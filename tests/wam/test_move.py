@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wam.move import TORQUE_LIMIT, JointMove, joint_pd
+from wam.control.joint_move import TORQUE_LIMIT, JointMove, joint_pd
 
 ANGLES = st.lists(st.floats(-2.5, 2.5), min_size=7, max_size=7).map(np.array)
 

@@ -3,7 +3,15 @@ from itertools import pairwise
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.pucks import Device, Role, device_of, is_wide, names, numbers, property_number
+from wam.bus.properties import (
+    Device,
+    Role,
+    device_of,
+    is_wide,
+    names,
+    numbers,
+    property_number,
+)
 
 # Numbers that are in the frames of a current arm.
 CURRENT = {

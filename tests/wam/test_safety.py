@@ -2,10 +2,10 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.dialogue import Dialogue
-from wam.safety import (
+from wam.bus.property_client import Dialogue
+from wam.driver.safety_module import (
     Button,
     Level,
     SafetyModule,

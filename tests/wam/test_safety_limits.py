@@ -4,10 +4,10 @@ import pytest
 
 from acquisition.errors import DeviceFaultError
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.frames import encode_set
-from wam.safety_limits import SafetyLimits
+from wam.bus.frames import encode_set
+from wam.driver.arm import WamArm
+from wam.driver.safety_limits import SafetyLimits
+from wam.driver.settings import ArmSettings
 
 RAISED = SafetyLimits(
     speed_warning=1.35,

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.devices import ArmReading
-from experiments.parts import terrain_frame
-from experiments.settings import load_settings
-from fakes.rig import solve_start
-from wam.constants import load_constants
-from wam.soft_walls import DEPTH, SoftWalls, Walls
+from experiments.rig.build import terrain_frame
+from experiments.settings.load import load_settings
+from fakes.world.rig import solve_start
+from wam.control.soft_walls import DEPTH, SoftWalls, Walls
+from wam.model.constants import load_constants
 
 LIMIT = 10.0
 WALLS = Walls((-1.0,) * 7, (2.0,) * 7, (LIMIT,) * 7, (5.0,) * 7)

@@ -6,11 +6,11 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.frames import property_reply_id
-from wam.pucks import MAGNETIC_ENCODER, Role
+from wam.bus.frames import property_reply_id
+from wam.bus.properties import MAGNETIC_ENCODER, Role
+from wam.driver.arm import WamArm
 
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
 MS = 1_000_000

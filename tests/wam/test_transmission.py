@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, SettingsError
-from wam.transmission import Transmission, coupled_ratios, keep_gravity
+from wam.driver.transmission import Transmission, coupled_ratios, keep_gravity
 
 VECTORS = json.loads(
     (Path(__file__).parents[1] / "data" / "wam7_vectors.json").read_text()

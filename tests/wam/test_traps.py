@@ -12,18 +12,15 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
-from fakes.network_options import NetworkOptions
-from ft_sensor.barrett_frames import (
+from fakes.pucks.options import NetworkOptions
+from ft_sensor.vendors.barrett_frames import (
     FORCE_ID,
     TORQUE_ID,
     BarrettCounters,
     WrenchPairing,
 )
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.arm_settings import ArmSettings
-from wam.can_link import MODE_BROADCAST_ID
-from wam.frames import (
+from wam.bus.frames import (
     Group,
     compose_id,
     decode_force,
@@ -39,9 +36,12 @@ from wam.frames import (
     position_reply_id,
     property_reply_id,
 )
-from wam.pucks import Device, names, property_number
-from wam.safety import Level
-from wam.transmission import HOST_TORQUE_LIMITS, Transmission
+from wam.bus.link import MODE_BROADCAST_ID
+from wam.bus.properties import Device, names, property_number
+from wam.driver.arm import WamArm
+from wam.driver.safety_module import Level
+from wam.driver.settings import ArmSettings
+from wam.driver.transmission import HOST_TORQUE_LIMITS, Transmission
 
 MS = 1_000_000
 CYCLE_NS = 2 * MS

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from fakes.network_options import NetworkOptions
+from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.arm import WamArm
-from wam.frames import encode_set
-from wam.health import PuckHealth, complaints, health_facts, temperature_range
+from wam.bus.frames import encode_set
+from wam.driver.arm import WamArm
+from wam.driver.health import PuckHealth, complaints, health_facts, temperature_range
 
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000

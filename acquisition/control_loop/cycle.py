@@ -1,0 +1,276 @@
+"""One cycle: read, check, command, sample. It has no waiting of its own."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import sample_flags as flags
+from acquisition.control_loop.guard import (
+    Action,
+    GuardState,
+    Limits,
+    Observation,
+    Verdict,
+    check,
+)
+from acquisition.control_loop.loop import Tick
+from acquisition.control_loop.states import (
+    ArmState,
+    ControlLaw,
+    ControlStatus,
+    FootObserver,
+)
+from acquisition.devices import (
+    Arm,
+    ArmReading,
+    SafetyMode,
+    Vector,
+    WrenchSample,
+    WrenchSensor,
+)
+from acquisition.errors import LinkError
+from acquisition.sample import Sample
+
+_ZERO = np.zeros(7)
+_OF_CIRCUIT = frozenset({"estop", "pendant-idle"})  # verdicts that may have a cause
+CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
+
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
+_UNKNOWN = ArmState.UNKNOWN
+_ACTIVE = SafetyMode.ACTIVE
+_E_STOP = SafetyMode.E_STOP
+_BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
+_NONE = Action.NONE
+
+
+class Cycle:
+    """The work of one period, with the devices, the law and the guard given.
+
+    `sink` receives the bytes of every sample; `on_wrench` the sensor's own samples.
+
+    Attributes:
+        is_recording: a trial is being recorded; the guard's limits for it count.
+        replies_ns: when the last joint reply of this cycle arrived [ns], 0 = none did.
+        status: what the console sees.
+    """
+
+    def __init__(  # noqa: PLR0913, PLR0917
+        self,
+        arm: Arm,
+        sensor: WrenchSensor,
+        law: ControlLaw,
+        observer: FootObserver,
+        limits: Limits,
+        sink: Callable[[memoryview], None],
+        on_wrench: Callable[[list[WrenchSample]], None],
+        extra_flags: int = 0,
+    ) -> None:
+        self._arm = arm
+        self._sensor = sensor
+        self._law = law
+        self._observer = observer
+        self._limits = limits
+        self._sink = sink
+        self._on_wrench = on_wrench
+        self._extra_flags = int(extra_flags)
+        self._guard = GuardState()
+        self._sample = Sample()
+        self._wrench: WrenchSample | None = None
+        self._wrench_ns = 0
+        self._speed = 0.0
+        self._requested: ArmState | None = None
+        self._move: tuple[Vector, float] | None = None
+        self._reported: Verdict | None = None
+        self._was_active = False
+        self.is_recording = False
+        self.replies_ns = 0
+        self.status = ControlStatus()
+
+    def request(self, state: ArmState) -> None:
+        """Ask for a state; it is entered at the next complete reading, IDLE at once.
+
+        A state asked for while the arm is still idle sends its torques at once: they
+        are there when the pendant activates the arm, or it would fall for a moment.
+        """
+        self._requested = state
+        self.status.verdict = None
+
+    def move_to(self, goal: Sequence[float], speed: float) -> None:
+        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+
+        No joint is faster than `speed` [rad/s] on the way.
+        """
+        self._move = np.array(goal), speed
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Take the sensor's reading without load [N, N m], six numbers."""
+        self._observer.set_bias(bias)
+
+    def report(self, verdict: Verdict) -> None:
+        """Let the next cycle obey what was found outside of it."""
+        self._reported = verdict
+
+    def __call__(self, tick: Tick) -> None:
+        """Run the cycle `tick`."""
+        reading = self._arm.read(tick.now_ns)
+        self.replies_ns = reading.arm_ns
+        status = self.status
+        status.safety = self._arm.safety_mode()
+        self._confirm_idle(reading)
+        self._enter_requested(reading)
+        self._begin_move(reading)
+        tau, tau_gravity = self._torque(reading)
+        sample = self._sample
+        verdict = self._judge(tick, reading, tau)
+        if verdict.action is not _NONE:
+            self._obey(verdict, reading)
+            tau, tau_gravity = self._torque(reading)
+        sent = sample.torque_command
+        if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
+            sent = self._arm.send(tau, tau_gravity)
+        # The torque has left; what follows is looked at by the next cycle's guard.
+        is_new = self._take_wrench(tick.now_ns)
+        self._speed = self._observer.observe(
+            reading, self._wrench if is_new else None, sample
+        )
+        self._fill(tick, reading, sent, tau_gravity, tau, is_new)
+        self._sink(sample.payload())
+
+    def _take_wrench(self, now_ns: int) -> bool:
+        """Drain the sensor; return whether the used sample is fresh.
+
+        A port that is gone is a sensor that is silent: its last sample grows old.
+        """
+        try:
+            samples = self._sensor.poll(now_ns)
+        except LinkError:
+            samples = []
+        if samples:
+            self._on_wrench(samples)
+            for newest in reversed(samples):
+                if newest.is_valid:
+                    self._wrench = newest
+                    self._wrench_ns = newest.t_ns
+                    break
+        if self._wrench_ns == 0:
+            self._wrench_ns = now_ns
+        age = now_ns - self._wrench_ns
+        return self._wrench is not None and age <= self._limits.ft_stale_ns
+
+    def _enter_requested(self, reading: ArmReading) -> None:
+        state = self._requested
+        if state is None or (reading.missing_cycles and state is not ArmState.IDLE):
+            return
+        self._requested = None
+        if state is ArmState.IDLE:
+            self._idle(reading)
+        else:
+            self._enter(state, reading)
+
+    def _begin_move(self, reading: ArmReading) -> None:
+        move = self._move
+        if move is None or reading.missing_cycles:
+            return
+        self._move = None
+        try:
+            self._law.move_to(*move, reading)
+        except ValueError:
+            self.report(Verdict(Action.HOLD, "move-refused"))
+
+    def _idle(self, reading: ArmReading) -> None:
+        """Brake the arm. Unless that is confirmed no zero torque follows: free fall."""
+        is_confirmed = self._arm.idle()
+        if is_confirmed:
+            self._sample.torque_command[:] = 0.0
+        self._enter(ArmState.IDLE if is_confirmed else ArmState.UNKNOWN, reading)
+
+    def _confirm_idle(self, reading: ArmReading) -> None:
+        """Believe the safety circuit when it confirms later what it was asked for."""
+        is_unknown = self.status.state is _UNKNOWN
+        if is_unknown and self.status.safety in _BRAKED:
+            self._sample.torque_command[:] = 0.0
+            self._enter(ArmState.IDLE, reading)
+
+    def _enter(self, state: ArmState, reading: ArmReading) -> None:
+        self.status.state = state
+        self._was_active = self.status.safety is SafetyMode.ACTIVE
+        self._law.enter(state, reading)
+
+    def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
+        if self.status.state in _UNPOWERED:
+            return _ZERO, _ZERO
+        return self._law.torque(reading)
+
+    def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> Verdict:
+        status = self.status
+        if self._wrench_ns:
+            status.ft_age_ns = tick.now_ns - self._wrench_ns
+        self._was_active |= status.safety is _ACTIVE
+        is_commanded = status.state not in _UNPOWERED
+        has_power = self._was_active or status.safety is _E_STOP
+        seen = Observation(
+            reading=reading,
+            safety=status.safety,
+            foot_speed=self._speed,
+            joint7_offset=self._law.joint7_offset(reading),
+            ft_age_ns=status.ft_age_ns,
+            tau=tau,
+            is_recording=self.is_recording,
+            is_powered=is_commanded and has_power,
+            is_late=tick.is_late,
+        )
+        self._guard, verdict = check(self._limits, self._guard, seen)
+        reported, self._reported = self._reported, None
+        if reported is not None and reported.severity > verdict.severity:
+            return reported
+        return verdict
+
+    def _obey(self, verdict: Verdict, reading: ArmReading) -> None:
+        """Enter the state the guard asks for; a fault is never made milder."""
+        state = self.status.state
+        if verdict.action is Action.IDLE:
+            self._idle(reading)
+            if verdict.reason in _OF_CIRCUIT:
+                verdict = replace(verdict, causes=self._arm.safety_faults())
+        elif verdict.action is Action.DAMP and state is not ArmState.DAMP:
+            self._enter(ArmState.DAMP, reading)
+        elif verdict.action is Action.HOLD and state is ArmState.FLOAT:
+            self._enter(ArmState.HOLD, reading)
+        told = self.status.verdict
+        if told is None or verdict.severity > told.severity:
+            self.status.verdict = verdict
+        self.is_recording = False
+
+    def _fill(
+        self,
+        tick: Tick,
+        reading: ArmReading,
+        sent: Vector,
+        tau_gravity: Vector,
+        tau: Vector,
+        is_new: bool,
+    ) -> None:
+        sample, wrench = self._sample, self._wrench
+        if wrench is not None:
+            sample.ft_ns[0] = wrench.t_ns
+            sample.ft_counter[0] = wrench.counter & 0xFFFFFFFF
+        bits = self._extra_flags | flags.of_safety(self._arm, self.status.safety)
+        bits |= flags.of_reading(reading, is_late=tick.is_late)
+        bits |= flags.of_wrench(wrench, is_new=is_new)
+        if self.status.state not in _UNPOWERED:
+            bits |= flags.JOINT7_LOCKED
+        if reading.is_complete and flags.is_clipped(sent, tau):
+            bits |= flags.TORQUE_CLIPPED
+        if sample.traction[2] > CONTACT_FORCE:
+            bits |= flags.CONTACT
+        sample.cycle[0] = tick.number
+        sample.flags[0] = bits
+        sample.host_ns[0] = reading.host_ns
+        sample.arm_ns[0] = reading.arm_ns
+        sample.counts[...] = reading.counts
+        sample.position[...] = reading.q
+        sample.velocity[...] = reading.qd
+        sample.torque_command[...] = sent
+        sample.torque_gravity[...] = tau_gravity

@@ -1,0 +1,97 @@
+"""When what happened in each cycle, and what a series of cycles says of the loop."""
+
+import struct
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.control_loop.loop import Tick
+from acquisition.sample import Record
+
+_TIMING: Final = struct.Struct("<7Q")
+QUANTILES = (50.0, 99.0, 99.9, 100.0)
+SLOW_EXCHANGE_NS = 1_300_000  # p99 of the seventh position; the cycle may not close
+
+
+def pack_timing(tick: Tick, replies_ns: int, sent_ns: int, ended_ns: int) -> bytes:
+    """Return the bytes of one record of the ring of timings."""
+    return _TIMING.pack(
+        tick.number,
+        tick.deadline_ns,
+        tick.now_ns,
+        replies_ns,
+        sent_ns,
+        ended_ns,
+        tick.is_late,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Quantiles of a time [us]: of 50, 99 and 99.9 percent, and the largest."""
+
+    p50: float
+    p99: float
+    p999: float
+    worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class LoopReport:
+    """What a series of cycles says about the loop.
+
+    Attributes:
+        cycles: cycles that ran.
+        missed: cycles that began late or were skipped.
+        rate: cycles per second [Hz].
+        late: wake-up after the deadline.
+        exchange: release to the seventh position; None if none was complete.
+        compute: last reply to torques handed over; None as above.
+        torque_out: release to torques handed over; None as above.
+        total: release to the end of the cycle.
+    """
+
+    cycles: int
+    missed: int
+    rate: float
+    late: Spread
+    exchange: Spread | None
+    compute: Spread | None
+    torque_out: Spread | None
+    total: Spread
+
+
+def spread(times_ns: NDArray[np.int64]) -> Spread:
+    """Return the quantiles of times [ns], shape (n,), n >= 1."""
+    values = np.percentile(times_ns, QUANTILES) / 1000.0
+    return Spread(*(round(float(value), 1) for value in values))
+
+
+def loop_report(timings: Record) -> LoopReport | None:
+    """Return what the records of the ring of timings say; None for fewer than two."""
+    if len(timings) < 2:
+        return None
+    columns = {
+        name: timings[name].astype(np.int64) for name in timings.dtype.names or ()
+    }
+    deadline, replies = columns["deadline_ns"], columns["replies_ns"]
+    sent = columns["sent_ns"]
+    whole = (replies > columns["woke_ns"]) & (sent >= replies)
+    skipped = int(columns["number"][-1] - columns["number"][0]) + 1 - len(timings)
+    span = (deadline[-1] - deadline[0]) / 1e9
+    return LoopReport(
+        cycles=len(timings),
+        missed=int(columns["is_late"].sum()) + max(0, skipped),
+        rate=round((len(timings) - 1) / span, 2),
+        late=spread(columns["woke_ns"] - deadline),
+        exchange=_spread_of((replies - columns["woke_ns"])[whole]),
+        compute=_spread_of((sent - replies)[whole]),
+        torque_out=_spread_of((sent - deadline)[whole]),
+        total=spread(columns["ended_ns"] - deadline),
+    )
+
+
+def _spread_of(times_ns: NDArray[np.int64]) -> Spread | None:
+    return spread(times_ns) if len(times_ns) else None

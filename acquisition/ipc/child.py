@@ -1,0 +1,173 @@
+"""Processes beside the console: spawned, watched, stopped; they die with it.
+
+A child is a new interpreter that is given three descriptors - board, channel, a file
+for its last words - and nothing else: no terminal, no signals of the terminal's group.
+"""
+
+import ctypes
+import importlib
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition.control_loop.realtime import die_with_parent
+from acquisition.errors import TractionError
+from acquisition.ipc.layout import Board
+from acquisition.ipc.memory import SharedMemory
+from acquisition.ipc.rpc import Channel, ChannelClosedError
+
+_ROOT = str(Path(__file__).parents[2])
+_START = (
+    "import sys; sys.path.insert(0, sys.argv[1]); "
+    "from acquisition.ipc.child import main; main(sys.argv[2:])"
+)
+# One thread per process: a pool of the linear algebra library would preempt the loop.
+_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+_RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
+_LAST_WORDS = 4000  # characters of a child's standard error
+_PATIENCE = 3.0  # s a child gets to end by itself
+
+
+class ProcessLostError(TractionError):
+    """A process beside the console ended unasked.
+
+    Attributes:
+        name: which one.
+    """
+
+    exit_code = 4
+
+    def __init__(self, name: str, how: str, *, arm_state: str = "") -> None:
+        super().__init__(
+            f"The {name} process ended: {how}.",
+            hint="A .partial file: traction recover. Then start again.",
+            arm_state=arm_state,
+        )
+        self.name = name
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """What a child works with.
+
+    Attributes:
+        board: the shared memory.
+        channel: to the console.
+        settings: what it was told at the start.
+    """
+
+    board: Board
+    channel: Channel
+    settings: Mapping[str, Any]
+
+
+class Child:
+    """A process that runs `module:function` with a `Station`.
+
+    Attributes:
+        name: what it is called in messages.
+        channel: to it.
+    """
+
+    def __init__(
+        self, name: str, target: str, settings: Mapping[str, object], board: Board
+    ) -> None:
+        self.name = name
+        self.channel, theirs = Channel.pair()
+        self._words = os.memfd_create(f"traction-{name}", os.MFD_CLOEXEC)
+        descriptors = (board.memory.descriptor, theirs.fileno())
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", _START, _ROOT, target]
+            + [str(descriptor) for descriptor in (*descriptors, os.getpid())],
+            pass_fds=descriptors,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self._words,
+            start_new_session=True,
+            env={**os.environ, **_ONE_THREAD},
+        )
+        theirs.close()
+        self.channel.send(dict(settings))
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.poll() is None
+
+    def ask(self, question: str, argument: object = None) -> Any:  # noqa: ANN401
+        """Put a question to it and return the answer.
+
+        Raises:
+            TractionError: what it raised.
+            ProcessLostError: it has ended.
+        """
+        try:
+            return self.channel.ask(question, argument)
+        except ChannelClosedError:
+            self._wait(_PATIENCE)
+            raise ProcessLostError(self.name, self.how_it_ended()) from None
+
+    def how_it_ended(self) -> str:
+        """Return how it ended, in words: a signal, or the last line it wrote."""
+        code = self._process.poll()
+        if code is not None and code < 0:
+            return f"killed by {signal.Signals(-code).name}"
+        words = self.last_words().strip().splitlines()
+        raised = [line for line in words if _RAISED.match(line)]
+        return (raised or words or [f"exit code {code}"])[-1]
+
+    def last_words(self) -> str:
+        """Return the end of what it wrote to its standard error."""
+        size = os.fstat(self._words).st_size
+        start = max(0, size - _LAST_WORDS)
+        return os.pread(self._words, _LAST_WORDS, start).decode(errors="replace")
+
+    def stop(self) -> None:
+        """Hang up and wait until it ends; after 3 s it is killed. Safe to repeat."""
+        self.channel.close()
+        if not self._wait(_PATIENCE):
+            self._process.kill()
+            self._process.wait()
+        if self._words >= 0:
+            os.close(self._words)
+            self._words = -1
+
+    def _wait(self, seconds: float) -> bool:
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return False
+        return True
+
+
+def main(arguments: list[str]) -> None:
+    """Run one child: TARGET, descriptors of board and channel, number of the parent."""
+    target, board, channel, parent = arguments
+    die_with_parent(signal.SIGTERM)
+    if os.getppid() != int(parent):
+        return  # it died before the line above
+    module, function = target.split(":")
+    run: Callable[[Station], None] = getattr(importlib.import_module(module), function)
+    link = Channel.adopt(int(channel))
+    try:
+        settings = link.receive()
+        run(Station(Board(SharedMemory(int(board))), link, settings))
+    except ChannelClosedError:
+        return  # the console has gone; whoever has an arm has braked it
+
+
+def name_process(name: str) -> None:
+    """Call this process `name` (15 characters) where processes are listed."""
+    pr_set_name = 15
+    ctypes.CDLL(None, use_errno=True).prctl(pr_set_name, name.encode()[:15], 0, 0, 0)

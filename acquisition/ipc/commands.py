@@ -1,0 +1,156 @@
+"""Commands from the console to the loop, and the loop's answer: its status."""
+
+import json
+import struct
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Final
+
+from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.devices import SafetyMode
+from acquisition.ipc.rings import Ring, Slot
+
+_COMMAND: Final = struct.Struct("<QIi12d")
+_STATUS: Final = struct.Struct("<QBB??4xqQQQQ")
+_VALUES = 12
+_NOTHING = (0.0,) * _VALUES
+
+
+class Kind(IntEnum):
+    """What a command asks for."""
+
+    ENTER = 1  # argument: an ArmState
+    WATCH_TRIAL = 2  # argument: 1 while a trial is recorded
+    SET_BIAS = 3  # values: the sensor's reading without load, six of them
+    MOVE = 4  # values: joint positions to go to, seven of them, and the speed
+    LEAVE = 5  # end the loop; the arm is idle by then, or is made so
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command.
+
+    Attributes:
+        number: counts the commands from 1; the status says which was obeyed last.
+        kind: what is asked for.
+        argument: a small number, see `Kind`.
+        values: numbers, see `Kind`.
+    """
+
+    number: int
+    kind: Kind
+    argument: int
+    values: tuple[float, ...]
+
+
+class Mailbox:
+    """Both ends of the commands; the console posts, the loop takes."""
+
+    def __init__(self, ring: Ring) -> None:
+        self._ring = ring
+        self._reader = ring.reader()
+        self.posted = ring.written
+
+    def post(
+        self, kind: Kind, argument: int = 0, values: tuple[float, ...] = ()
+    ) -> int:
+        """Leave a command and return its number."""
+        self.posted += 1
+        padded = (*values, *_NOTHING[len(values) :])
+        self._ring.write(_COMMAND.pack(self.posted, kind, argument, *padded))
+        return self.posted
+
+    def take(self) -> list[Command]:
+        """Return the commands that have come since the last call, oldest first."""
+        if not self._reader.backlog:
+            return []
+        return [
+            Command(number, Kind(kind), argument, tuple(values))
+            for number, kind, argument, *values in _COMMAND.iter_unpack(
+                self._reader.read().tobytes()
+            )
+        ]
+
+
+@dataclass(slots=True)
+class LoopStatus:
+    """What the console sees of the loop.
+
+    Attributes:
+        obeyed: number of the last command that was obeyed.
+        is_running: the loop goes on.
+        is_bus_down: the arm's bus refused the last question.
+        cycles: cycles run.
+        skipped: cycles that were skipped because one took too long.
+        late: cycles that began late.
+        worst_late_ns: the worst of them [ns].
+        control: state of the arm and the guard's verdict.
+    """
+
+    obeyed: int = 0
+    is_running: bool = False
+    is_bus_down: bool = False
+    cycles: int = 0
+    skipped: int = 0
+    late: int = 0
+    worst_late_ns: int = 0
+    control: ControlStatus = field(default_factory=ControlStatus)
+
+
+class StatusBoard:
+    """Writes and reads the loop's status; a verdict is put into words once."""
+
+    def __init__(self, slot: Slot) -> None:
+        self._slot = slot
+        self._verdict: Verdict | None = None
+        self._text = b""
+
+    def write(self, status: LoopStatus) -> None:
+        """Publish `status`."""
+        control = status.control
+        if control.verdict is not self._verdict:
+            self._verdict = control.verdict
+            self._text = _verdict_text(control.verdict)
+        head = _STATUS.pack(
+            status.obeyed,
+            control.state,
+            control.safety,
+            status.is_running,
+            status.is_bus_down,
+            control.ft_age_ns,
+            status.cycles,
+            status.skipped,
+            status.late,
+            status.worst_late_ns,
+        )
+        self._slot.write(head + self._text)
+
+    def read(self) -> LoopStatus:
+        """Return the newest status; the first one before the loop ran."""
+        raw = self._slot.read()
+        if len(raw) < _STATUS.size:
+            return LoopStatus()
+        obeyed, state, safety, running, is_down, age, cycles, skipped, late, worst = (
+            _STATUS.unpack_from(raw)
+        )
+        verdict = _verdict_of(raw[_STATUS.size :])
+        control = ControlStatus(ArmState(state), SafetyMode(safety), verdict, age)
+        return LoopStatus(
+            obeyed, running, is_down, cycles, skipped, late, worst, control
+        )
+
+
+def _verdict_text(verdict: Verdict | None) -> bytes:
+    if verdict is None:
+        return b""
+    fields = (verdict.action.value, verdict.reason, verdict.facts, verdict.causes)
+    return json.dumps(fields).encode()
+
+
+def _verdict_of(text: bytes) -> Verdict | None:
+    if not text:
+        return None
+    action, reason, facts, causes = json.loads(text)
+    pairs = tuple((name, value) for name, value in facts)
+    return Verdict(Action(action), reason, pairs, tuple(causes))

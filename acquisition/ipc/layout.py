@@ -1,0 +1,167 @@
+"""The board: everything that loop, recorder, sensor reader and console share.
+
+Memory is laid out once, here, so that a process which is given the descriptor finds
+everything in it. Each area has one writer.
+"""
+
+import struct
+from enum import IntEnum
+from typing import Final
+
+import numpy as np
+
+from acquisition.devices import WrenchSample
+from acquisition.ipc.memory import SharedMemory
+from acquisition.ipc.rings import LINE, Ring, Slot, lines
+from acquisition.sample import Record
+from acquisition.schema import CYCLE
+
+CYCLE_SLOTS = 8192  # 16 s at 500 Hz
+WRENCH_SLOTS = 32_768  # 6.5 s of the fastest sensor
+FRAME_SLOTS = 32_768  # 5 s of a bus with 13 frames per cycle
+TIMING_SLOTS = 32_768  # 65 s of cycles
+COMMAND_SLOTS = 256
+_SLOT_BYTES = 8192
+
+WRENCH_DTYPE = np.dtype(
+    [
+        ("t_ns", "<u8"),
+        ("counter", "<u4"),
+        ("status", "<u2"),
+        ("is_valid", "?"),
+        ("saturated", "u1"),
+        ("wrench", "<f8", (6,)),
+    ]
+)
+_WRENCH: Final = struct.Struct("<QIH?B6d")
+FRAME_DTYPE = np.dtype(
+    [
+        ("t_ns", "<u8"),
+        ("can_id", "<u4"),
+        ("length", "u1"),
+        ("gap", "V3"),
+        ("data", "V8"),
+    ]
+)
+TIMING_DTYPE = np.dtype(
+    [
+        ("number", "<u8"),
+        ("deadline_ns", "<u8"),
+        ("woke_ns", "<u8"),
+        ("replies_ns", "<u8"),
+        ("sent_ns", "<u8"),
+        ("ended_ns", "<u8"),
+        ("is_late", "<u8"),
+    ]
+)
+COMMAND_DTYPE = np.dtype(
+    [("number", "<u8"), ("kind", "<u4"), ("argument", "<i4"), ("values", "<f8", (12,))]
+)
+
+
+class Role(IntEnum):
+    """Who shows by its beats that it is alive."""
+
+    CONSOLE = 0
+    CONTROL = 1
+    RECORDER = 2
+    READER = 3
+
+
+class Beats:
+    """When each process was last seen alive [monotonic ns], 0 = never."""
+
+    def __init__(self, memory: memoryview) -> None:
+        self._times = memory.cast("Q")
+
+    def beat(self, role: Role, now_ns: int) -> None:
+        """Note that `role` is alive now."""
+        self._times[role] = now_ns
+
+    def last_ns(self, role: Role) -> int:
+        """Return when `role` was last alive, 0 = never."""
+        return self._times[role]
+
+
+class Board:
+    """The shared memory of one rig.
+
+    Attributes:
+        memory: what it lies in.
+        cycles: records of the loop (traction_msgs/Cycle).
+        wrenches: every sample of the wrist sensor.
+        frames: every frame of the bus.
+        timings: when what happened in each cycle.
+        commands: the console's commands to the loop.
+        status: state of the loop, newest value.
+        recorder: state of the recorder, newest value.
+        health: what the pucks said about themselves, newest value.
+        beats: who is alive.
+    """
+
+    def __init__(self, memory: SharedMemory) -> None:
+        self.memory = memory
+        self._end = 0
+        self.beats = Beats(self._take(lines(8 * len(Role))))
+        self.status = Slot(self._take(LINE + _SLOT_BYTES))
+        self.recorder = Slot(self._take(LINE + _SLOT_BYTES))
+        self.health = Slot(self._take(LINE + _SLOT_BYTES))
+        self.commands = self._ring(COMMAND_DTYPE, COMMAND_SLOTS)
+        self.cycles = self._ring(CYCLE.dtype, CYCLE_SLOTS)
+        self.wrenches = self._ring(WRENCH_DTYPE, WRENCH_SLOTS)
+        self.frames = self._ring(FRAME_DTYPE, FRAME_SLOTS)
+        self.timings = self._ring(TIMING_DTYPE, TIMING_SLOTS)
+
+    @classmethod
+    def create(cls) -> "Board":
+        """Return a new, empty board."""
+        return cls(SharedMemory.create(_SIZE))
+
+    def close(self) -> None:
+        """Give the descriptor back."""
+        self.memory.close()
+
+    def _take(self, size: int) -> memoryview:
+        start, self._end = self._end, self._end + size
+        return self.memory.view[start : self._end]
+
+    def _ring(self, dtype: "np.dtype[np.void]", slots: int) -> Ring:
+        return Ring(self._take(lines(Ring.size_of(dtype, slots))), dtype, slots)
+
+
+_SIZE = (
+    lines(8 * len(Role))
+    + 3 * (LINE + _SLOT_BYTES)
+    + sum(
+        lines(Ring.size_of(dtype, slots))
+        for dtype, slots in (
+            (COMMAND_DTYPE, COMMAND_SLOTS),
+            (CYCLE.dtype, CYCLE_SLOTS),
+            (WRENCH_DTYPE, WRENCH_SLOTS),
+            (FRAME_DTYPE, FRAME_SLOTS),
+            (TIMING_DTYPE, TIMING_SLOTS),
+        )
+    )
+)
+
+
+def pack_wrench(sample: WrenchSample) -> bytes:
+    """Return the bytes of one sample for the ring of wrenches."""
+    return _WRENCH.pack(
+        sample.t_ns,
+        sample.counter & 0xFFFFFFFF,
+        sample.status & 0xFFFF,
+        sample.is_valid,
+        sample.saturated,
+        *sample.wrench,
+    )
+
+
+def unpack_wrenches(records: Record) -> list[WrenchSample]:
+    """Return the samples of records of the ring of wrenches, oldest first."""
+    return [
+        WrenchSample(t_ns, counter, tuple(wrench), status, valid, saturated)
+        for t_ns, counter, status, valid, saturated, *wrench in _WRENCH.iter_unpack(
+            records.tobytes()
+        )
+    ]

@@ -1,0 +1,158 @@
+"""The console's side of the loop: let time pass, ask for states, see the newest."""
+
+import json
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from acquisition.clock import NS_PER_S, Clock
+from acquisition.control_loop.loop import PERIOD_NS, Loop
+from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.ipc.commands import Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.rings import RingReader
+from acquisition.recording.recorder import Recorder
+from acquisition.sample import Record
+
+PORTION = 10  # cycles between two looks of the console: 20 ms
+_GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
+
+
+class Passing(Protocol):
+    """How time passes for the console."""
+
+    def __call__(self, cycles: int) -> None:
+        """Return when `cycles` periods have passed.
+
+        Raises:
+            TractionError: the loop, the recorder or another process is in trouble.
+        """
+        ...
+
+
+class InlinePassing:
+    """Loop and recorder in this thread: nothing runs unless the console waits.
+
+    The recorder drains as often as it would flush anyway: a process of its own drains
+    every 20 ms, but here one long piece of work costs half of many short ones, and it
+    is the simulation that waits for it.
+    """
+
+    def __init__(self, loop: Loop, recorder: Recorder) -> None:
+        self._loop = loop
+        self._recorder = recorder
+        self._passed = 0
+
+    def __call__(self, cycles: int) -> None:
+        """Run the loop for `cycles` periods; drain the recorder when it is time."""
+        self._loop.run(cycles)
+        self._passed += cycles
+        if self._passed >= _GATHERED:
+            self._passed = 0
+            self._recorder.drain()
+        if self._recorder.failure is not None:
+            raise self._recorder.failure
+
+
+class Desk:
+    """What the console has of the loop, wherever it runs.
+
+    Attributes:
+        passing: how time passes.
+        on_pass: called after every 20 ms that pass.
+    """
+
+    def __init__(self, board: Board, clock: Clock, passing: Passing) -> None:
+        self._board = board
+        self._clock = clock
+        self.passing = passing
+        self._mailbox = Mailbox(board.commands)
+        self._status_board = StatusBoard(board.status)
+        self._asked = 0
+        self.on_pass: list[Callable[[], None]] = []
+
+    @property
+    def loop(self) -> LoopStatus:
+        """The loop's newest status."""
+        return self._status_board.read()
+
+    @property
+    def status(self) -> ControlStatus:
+        """State of the arm and the guard's verdict since the last request."""
+        loop = self.loop
+        if loop.obeyed < self._asked:
+            loop.control.verdict = None  # said before the loop heard of the request
+        return loop.control
+
+    @property
+    def late_cycles(self) -> int:
+        """Cycles that began late since the start."""
+        return self.loop.late
+
+    def advance(self, seconds: float) -> None:
+        """Let `seconds` pass, at least one cycle; the loop sees that we are alive."""
+        left = max(1, round(seconds * NS_PER_S / PERIOD_NS))
+        while left > 0:
+            portion = min(left, PORTION)
+            self.beat()
+            self.passing(portion)
+            left -= portion
+            for look in self.on_pass:
+                look()
+
+    def beat(self) -> None:
+        """Show the loop that the console is alive."""
+        self._board.beats.beat(Role.CONSOLE, self._clock.now_ns())
+
+    def request(self, state: ArmState) -> None:
+        """Ask the loop for a state of the arm."""
+        self._asked = self._mailbox.post(Kind.ENTER, state)
+
+    def idle(self, seconds: float = 1.0) -> bool:
+        """Ask for the brakes and wait; return whether the arm is confirmed idle."""
+        self.request(ArmState.IDLE)
+        end_ns = self._clock.now_ns() + int(seconds * NS_PER_S)
+        while self._clock.now_ns() < end_ns and self.loop.is_running:
+            self.advance(PORTION * PERIOD_NS / NS_PER_S)
+            loop = self.loop
+            if loop.obeyed >= self._asked and loop.control.state is ArmState.IDLE:
+                return True
+        return self.status.state is ArmState.IDLE
+
+    def move_to(self, goal: Sequence[float], speed: float) -> None:
+        """Ask for a move to joint positions `goal` [rad], seven; only in hold.
+
+        No joint is faster than `speed` [rad/s] on the way.
+        """
+        self._asked = self._mailbox.post(Kind.MOVE, values=(*goal, speed))
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Tell the loop what the sensor reads without load [N, N m], six numbers."""
+        self._mailbox.post(Kind.SET_BIAS, values=tuple(bias))
+
+    def watch_trial(self, *, is_recording: bool) -> None:
+        """Switch the guard's limits for a running trial on or off."""
+        self._mailbox.post(Kind.WATCH_TRIAL, int(is_recording))
+
+    def leave(self) -> None:
+        """Ask the loop to end."""
+        self._mailbox.post(Kind.LEAVE)
+
+    def last(self, seconds: float) -> Record:
+        """Return the records of the last `seconds`, oldest first."""
+        return self._board.cycles.last(round(seconds * NS_PER_S / PERIOD_NS))
+
+    def latest(self) -> Record:
+        """Return the newest record, shape (1,); empty before the first cycle."""
+        return self._board.cycles.last(1)
+
+    def wrenches(self) -> RingReader:
+        """Return a reader of the sensor's samples from now on."""
+        return self._board.wrenches.reader()
+
+    def timings(self) -> RingReader:
+        """Return a reader of the loop's timings from now on."""
+        return self._board.timings.reader()
+
+    def device_facts(self) -> dict[str, str]:
+        """Return what the devices said last about themselves."""
+        return json.loads(self._board.health.read() or b"{}")

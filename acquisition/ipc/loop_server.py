@@ -1,0 +1,141 @@
+"""The loop's side of the board: commands in, status and times out, others watched."""
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.loop import LoopStats, Tick
+from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.timing import pack_timing
+from acquisition.devices import Arm
+from acquisition.ipc.commands import Command, Kind, LoopStatus, Mailbox, StatusBoard
+from acquisition.ipc.layout import Board, Role
+
+MS = 1_000_000
+SILENT_NS = 500 * MS  # of console or recorder: the arm holds
+LONELY_NS = 60_000 * MS  # of the console: the arm rings for help
+ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then brakes
+_FACTS_EVERY = 500  # cycles
+_BELL_EVERY = 500  # cycles
+
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_CONSOLE, _CONTROL, _RECORDER = Role.CONSOLE, Role.CONTROL, Role.RECORDER
+
+Facts = Callable[[], Mapping[str, str]]
+
+
+def no_bell() -> None:
+    """Ring no bell."""
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the loop knows of the machine it runs on.
+
+    Attributes:
+        now_ns: tells the monotonic time [ns].
+        facts: what the devices say about themselves; asked once a second.
+        ring: rings a bell for a person.
+    """
+
+    now_ns: Callable[[], int]
+    facts: Facts
+    ring: Callable[[], None] = no_bell
+
+
+class Attendant:
+    """Wraps a cycle for the loop: obeys the mailbox, publishes, watches the others.
+
+    Attributes:
+        is_over: the loop is to end after this cycle.
+        is_orphaned: the console's process has died; set from a signal handler.
+    """
+
+    def __init__(
+        self, cycle: Cycle, arm: Arm, board: Board, around: Surroundings
+    ) -> None:
+        self.is_over = False
+        self.is_orphaned = False
+        self.stats = LoopStats()
+        self._cycle = cycle
+        self._arm = arm
+        self._board = board
+        self._around = around
+        self._mailbox = Mailbox(board.commands)
+        self._status_board = StatusBoard(board.status)
+        self._status = LoopStatus(is_running=True, control=cycle.status)
+        self._cycles = 0
+        self._orphaned_ns = 0
+
+    def __call__(self, tick: Tick) -> None:
+        """Run one cycle with everything around it."""
+        for command in self._mailbox.take():
+            self._obey(command)
+        self._watch(tick.now_ns)
+        self._cycle(tick)
+        self._cycles += 1
+        if self._cycles % _FACTS_EVERY == 1:
+            self._publish_facts()
+        self._publish(tick)
+
+    def leave(self) -> None:
+        """Say that the loop has ended."""
+        self._status.is_running = False
+        self._status_board.write(self._status)
+
+    def _obey(self, command: Command) -> None:
+        kind, cycle = command.kind, self._cycle
+        if kind is Kind.ENTER:
+            cycle.request(ArmState(command.argument))
+        elif kind is Kind.WATCH_TRIAL:
+            cycle.is_recording = bool(command.argument)
+            self._publish_facts()
+        elif kind is Kind.SET_BIAS:
+            cycle.set_bias(command.values[:6])
+        elif kind is Kind.MOVE:
+            *goal, speed = command.values[:8]
+            cycle.move_to(tuple(goal), speed)
+        else:
+            self.is_over = True
+        self._status.obeyed = command.number
+
+    def _publish_facts(self) -> None:
+        self._board.health.write(json.dumps(dict(self._around.facts())).encode())
+
+    def _watch(self, now_ns: int) -> None:
+        """Stop the arm when those who look after it have gone."""
+        beats = self._board.beats
+        console_ns = now_ns - beats.last_ns(_CONSOLE)
+        if console_ns > SILENT_NS:
+            self._cycle.report(Verdict(Action.HOLD, "console-silent"))
+            if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
+                self._around.ring()
+        if self._cycle.is_recording and now_ns - beats.last_ns(_RECORDER) > SILENT_NS:
+            self._cycle.report(Verdict(Action.HOLD, "recorder-silent"))
+        if self.is_orphaned:
+            self._brake_alone(now_ns)
+
+    def _brake_alone(self, now_ns: int) -> None:
+        """Nobody will ever ask for anything again: hold, then brake, then end."""
+        if not self._orphaned_ns:
+            self._orphaned_ns = now_ns
+            self._cycle.report(Verdict(Action.HOLD, "console-lost"))
+        elif now_ns - self._orphaned_ns > ORPHAN_NS:
+            self._cycle.request(ArmState.IDLE)
+            self.is_over = True
+
+    def _publish(self, tick: Tick) -> None:
+        status, stats = self._status, self.stats
+        status.control = self._cycle.status
+        status.is_bus_down = self._arm.is_bus_down
+        status.cycles = self._cycles
+        status.skipped, status.late = stats.skipped, stats.late
+        status.worst_late_ns = stats.worst_late_ns
+        self._status_board.write(status)
+        now_ns = self._around.now_ns()
+        self._board.beats.beat(_CONTROL, now_ns)
+        self._board.timings.write(
+            pack_timing(tick, self._cycle.replies_ns, self._arm.sent_ns, now_ns)
+        )

@@ -1,0 +1,216 @@
+"""The recorder: drains the board into a trial file, every 20 ms."""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.errors import TrialFileError
+from acquisition.ipc.layout import Board, Role
+from acquisition.sample import Record
+from acquisition.trial_file.verify import Verified, verify
+from acquisition.trial_file.writer import (
+    FLIGHT_TOPICS,
+    TRIAL_TOPICS,
+    TrialHeader,
+    TrialWriter,
+    publish,
+)
+
+FLUSH_NS = 250_000_000
+RATE_HZ = 500
+_BATCH_NS = 20_000_000  # of sensor samples or frames in one message
+PRE_ROLL = 1.0  # what is kept from before the trigger [s]
+
+
+class TrialRecording(Protocol):
+    """What the console asks of a recorder, here or in a process of its own."""
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a trial file is open."""
+        ...
+
+    @property
+    def largest_backlog(self) -> int:
+        """Cycles that waited at most since the trial began."""
+        ...
+
+    def start(self, path: Path, header: TrialHeader) -> None:
+        """Begin a file with the last second of samples.
+
+        Raises:
+            TrialFileError: it exists or cannot be written.
+        """
+        ...
+
+    def event(self, level: int, name: str, text: str) -> None:
+        """Write an event of now into the file, if one is open."""
+        ...
+
+    def finish(self, stop_reason: str) -> Verified:
+        """End, verify and publish the file.
+
+        Raises:
+            TrialFileError: it could not be written or verified; it keeps `.partial`.
+        """
+        ...
+
+    def abandon(self) -> None:
+        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        ...
+
+
+class Recorder:
+    """Writes one trial at a time from the board; implements `TrialRecording`.
+
+    `drain` is called every 20 ms or so.
+
+    Attributes:
+        failure: why the last file could not be written; None = nothing failed.
+        largest_backlog: cycles that waited at most since the trial began.
+    """
+
+    def __init__(self, board: Board, clock: Clock) -> None:
+        self._board = board
+        self._clock = clock
+        self._cycles = board.cycles.reader()
+        self._wrenches = board.wrenches.reader()
+        self._frames = board.frames.reader()
+        self._writer: TrialWriter | None = None
+        self._has_frames = False
+        self._flushed_ns = 0
+        self.largest_backlog = 0
+        self.failure: TrialFileError | None = None
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a trial file is open."""
+        return self._writer is not None
+
+    def start(self, path: Path, header: TrialHeader) -> None:
+        """Begin a file with the last second of samples."""
+        if self._writer is not None:
+            raise TrialFileError(path, "another trial is being recorded")
+        self._has_frames = header.has_frames
+        topics = FLIGHT_TOPICS if self._has_frames else TRIAL_TOPICS
+        writer = TrialWriter(path, header, topics)
+        now_ns = self._clock.now_ns()
+        earliest_ns = now_ns - int(PRE_ROLL * 1e9)
+        for reader in (self._cycles, self._wrenches, self._frames):
+            reader.read()
+            reader.lost = 0
+        self._cycles.rewind(int(PRE_ROLL * RATE_HZ))
+        self._wrenches.rewind(_since(self._board.wrenches.last(8192), earliest_ns))
+        self._frames.rewind(_since(self._board.frames.last(8192), earliest_ns))
+        self.largest_backlog = 0
+        self._flushed_ns = now_ns
+        self.failure = None
+        self._writer = writer
+
+    def drain(self) -> None:
+        """Write what is new and force it to the disk every 0.25 s; show being alive.
+
+        A file that cannot be written is left as `.partial`; see `failure`.
+        """
+        if self._writer is not None:
+            try:
+                self._write_new(self._writer)
+            except TrialFileError as error:
+                self.failure = error
+                self._let_go()
+        self._board.beats.beat(Role.RECORDER, self._clock.now_ns())
+
+    def event(self, level: int, name: str, text: str) -> None:
+        """Write an event of now into the file, if one is open."""
+        if self._writer is None:
+            return
+        try:
+            self._writer.write_event(self._clock.now_ns(), level, name, text)
+        except TrialFileError as error:
+            self.failure = error
+            self._let_go()
+
+    def finish(self, stop_reason: str) -> Verified:
+        """End, verify and publish the file; see `seal`."""
+        writer = self._writer
+        if writer is None:
+            if self.failure is not None:
+                raise self.failure
+            raise RuntimeError("no trial is being recorded")
+        self._writer = None
+        self._write_new(writer)
+        return seal(writer, stop_reason)
+
+    def abandon(self) -> None:
+        """Stop recording; what there is goes to the disk and stays as `.partial`."""
+        writer = self._writer
+        if writer is not None:
+            with contextlib.suppress(TrialFileError):
+                self._write_new(writer)
+                writer.flush()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        """Leave the file as it stands."""
+        if self._writer is not None:
+            self._writer.close_partial()
+            self._writer = None
+
+    def publish_state(self) -> None:
+        """Write to the board how the recorder is doing."""
+        failure = self.failure
+        state = {
+            "is_recording": self.is_recording,
+            "largest_backlog": self.largest_backlog,
+            "lost": self._cycles.lost,
+            "failure": [str(failure.path), failure.reason, failure.hint]
+            if failure
+            else None,
+        }
+        self._board.recorder.write(json.dumps(state).encode())
+
+    def _write_new(self, writer: TrialWriter) -> None:
+        self.largest_backlog = max(self.largest_backlog, self._cycles.backlog)
+        writer.write_cycles(self._cycles.read())
+        for batch in _batches(self._wrenches.read()):
+            writer.write_wrenches(batch)
+        if self._has_frames:
+            for batch in _batches(self._frames.read()):
+                writer.write_can(batch)
+        writer.counts.lost_in_ring = self._cycles.lost
+        if self._clock.now_ns() - self._flushed_ns >= FLUSH_NS:
+            writer.flush()
+            self._flushed_ns = self._clock.now_ns()
+
+
+def seal(writer: TrialWriter, stop_reason: str) -> Verified:
+    """End a file, read it back, and give it its final name.
+
+    Raises:
+        TrialFileError: it could not be written or verified; it keeps `.partial`.
+    """
+    try:
+        writer.finish(stop_reason)
+        verified = verify(writer.partial, writer.counts)
+        publish(writer)
+    except TrialFileError:
+        writer.close_partial()
+        raise
+    return verified
+
+
+def _since(records: Record, earliest_ns: int) -> int:
+    """Return how many of `records` are not older than `earliest_ns`."""
+    return int(np.count_nonzero(records["t_ns"].astype(np.int64) >= earliest_ns))
+
+
+def _batches(records: Record) -> list[Record]:
+    """Return records with a time, oldest first, in pieces of about 20 ms."""
+    if not len(records):
+        return []
+    span_ns = int(records["t_ns"][-1]) - int(records["t_ns"][0])
+    return np.array_split(records, max(1, round(span_ns / _BATCH_NS)))

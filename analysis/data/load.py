@@ -1,0 +1,221 @@
+"""From a trial file to arrays: joint positions and raw wrench, and what follows.
+
+The analysis starts again from joint positions and raw wrench with the calibration that
+the file carries, so a better calibration can be applied years later.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError, TrialFileError
+from acquisition.sample import Record
+from acquisition.trial_file.reader import TrialReader
+from analysis.data.prepare import foot_velocity
+from analysis.data.series import TractionSeries
+from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
+from ft_sensor.payload import Payload, TerrainFrame, traction
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Body, load_constants
+from wam.model.tool import Tool
+
+Array = NDArray[np.float64]
+Frame = Literal["terrain", "sole"]
+_LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
+_LONGEST_NUMBER = 20  # digits of 64 bits
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTrial:
+    """One recorded trial, checked and in arrays.
+
+    Attributes:
+        path: the file.
+        metadata: metadata by name, e.g. `metadata["trial"]["operator"]`.
+        terrain: name of the terrain.
+        cycles: records of traction_msgs/Cycle, shape (n,).
+        t: time since the first cycle [s], shape (n,).
+        sole: centre of the sole in the base frame [m], shape (n, 3).
+        rotation: foot to base, z out of the arm, shape (n, 3, 3).
+        velocity: its velocity in the base frame [m/s], shape (n, 3); NaN beside gaps.
+        force: of the ground on the foot in the base frame [N], shape (n, 3).
+        traction: v_t [m/s], F_t [N], F_n [N] in the terrain frame, shape (n, 3).
+        lateral: force along y_T [N], shape (n,).
+        frame: where the container stood.
+        payload: calibration and tare that were applied.
+        constants: the arm model that was applied.
+        sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
+    """
+
+    path: Path
+    metadata: dict[str, dict[str, str]]
+    terrain: str
+    cycles: Record
+    t: Array
+    sole: Array
+    rotation: Array
+    velocity: Array
+    force: Array
+    traction: Array
+    lateral: Array
+    frame: TerrainFrame
+    payload: Payload
+    constants: ArmConstants
+    sole_point: Array
+
+    @property
+    def name(self) -> str:
+        """Session and trial, e.g. S012/T04."""
+        trial = self.metadata["trial"]
+        return f"{trial.get('session', '?')}/{trial.get('trial', '?')}"
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the trial came from simulated devices."""
+        return self.metadata["trial"].get("simulated") == "true"
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the recording was ended properly; False for a recovered one."""
+        return self.metadata["result"].get("complete") == "true"
+
+    @property
+    def displacement(self) -> Array:
+        """Distance of the sole from the far end along x_T [m], shape (n,)."""
+        return self.frame.displacement(self.sole)
+
+    def series(self, frame: Frame = "terrain") -> TractionSeries:
+        """Return the trial as the models want it.
+
+        Args:
+            frame: "terrain" projects on the plane of the container, "sole" on the sole
+                as it was tilted in each cycle: the normal is against joint 7's axis,
+                slip is along what x_T leaves in the sole.
+        """
+        v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
+        return TractionSeries(self.terrain, self.name, self.t, v_t, F_n, F_t)
+
+    def _on_sole(self) -> Array:
+        """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""
+        normal = -self.rotation[:, :, 2]
+        x_T = self.frame.axes()[0]
+        along = x_T - (normal @ x_T)[:, None] * normal
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        v_t = np.einsum("ni,ni->n", self.velocity, along)
+        F_t = -np.einsum("ni,ni->n", self.force, along)
+        return np.column_stack([v_t, F_t, np.einsum("ni,ni->n", self.force, normal)])
+
+
+def load_trial(path: Path) -> RecordedTrial:
+    """Read a trial file and derive sole, force and traction.
+
+    A recovered file is read like any other; see `RecordedTrial.is_complete`.
+
+    Raises:
+        TrialFileError: the file is not a sound trial, or lacks its calibration.
+    """
+    reader = TrialReader(path)
+    _check_metadata(reader)
+    cycles = reader.cycles().data
+    _check_cycles(path, cycles)
+    at_hand = _calibrated(reader)
+    payload, frame = at_hand.payload, at_hand.frame
+    t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
+    path_of_sole = at_hand.model.sole_path(np.ascontiguousarray(cycles["position"]))
+    velocity = foot_velocity(t, path_of_sole.position)
+    raw = np.ascontiguousarray(cycles["wrench_raw"])
+    contact = payload.contact(raw, path_of_sole.rotation)
+    force = payload.to_base(contact, path_of_sole.rotation)
+    axes = frame.axes()
+    trial = RecordedTrial(
+        path=path,
+        metadata=reader.metadata,
+        terrain=at_hand.terrain,
+        cycles=cycles,
+        t=t,
+        sole=path_of_sole.position,
+        rotation=path_of_sole.rotation,
+        velocity=velocity,
+        force=force,
+        traction=traction(axes, velocity, force),
+        lateral=force @ axes[1],
+        frame=frame,
+        payload=payload,
+        constants=at_hand.constants,
+        sole_point=at_hand.sole_point,
+    )
+    try:
+        trial.series()
+    except SettingsError as error:
+        raise TrialFileError(path, f"is of no use ({error.message})") from error
+    return trial
+
+
+class _Calibrated(NamedTuple):
+    """What a trial file carries besides its cycles."""
+
+    payload: Payload
+    sole_point: Array
+    terrain: str
+    frame: TerrainFrame
+    constants: ArmConstants
+    model: ArmModel
+
+
+def _calibrated(reader: TrialReader) -> _Calibrated:
+    """Return calibration, terrain and arm of a trial file.
+
+    Raises:
+        TrialFileError: one of them is missing or impossible.
+    """
+    try:
+        payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
+        terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
+        constants = load_constants(_text(reader, "arm_model.toml"))
+        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        model = ArmModel(constants, Tool(nothing, nothing, sole_point))
+    except SettingsError as error:
+        raise TrialFileError(reader.path, error.message.rstrip(".")) from error
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        raise TrialFileError(
+            reader.path, f"has an impossible arm model ({error})"
+        ) from error
+    point = np.asarray(sole_point, dtype=np.float64)
+    return _Calibrated(payload, point, terrain, frame, constants, model)
+
+
+def _check_metadata(reader: TrialReader) -> None:
+    """Refuse a file that lacks what the report says about every trial."""
+    for section, key in (("clock", "utc_offset_ns"), ("result", "cycles_missed")):
+        value = reader.metadata.get(section, {}).get(key, "")
+        if not value.removeprefix("-").isdecimal() or len(value) > _LONGEST_NUMBER:
+            raise TrialFileError(
+                reader.path,
+                f"has no number {section}.{key} in its metadata",
+                hint="Was the recording ended properly?",
+            )
+    if "provenance" not in reader.metadata:
+        raise TrialFileError(reader.path, "lacks metadata provenance")
+
+
+def _check_cycles(path: Path, cycles: Record) -> None:
+    """Refuse records that no arm can have produced."""
+    if len(cycles) < 3:
+        raise TrialFileError(path, f"holds only {len(cycles)} cycles")
+    if not bool((cycles["host_ns"][1:] > cycles["host_ns"][:-1]).all()):
+        raise TrialFileError(path, "has cycles out of order")
+    if not bool((np.abs(cycles["position"]) < _LARGEST_ANGLE).all()):
+        raise TrialFileError(path, "has joint positions that no arm can reach")
+
+
+def _text(reader: TrialReader, name: str) -> str:
+    content = reader.attachments.get(name)
+    if content is None:
+        raise TrialFileError(reader.path, f"lacks the attachment {name}")
+    try:
+        return content.decode()
+    except UnicodeDecodeError as error:
+        raise TrialFileError(reader.path, f"{name} is no text") from error

@@ -1,0 +1,222 @@
+"""From a recorded trial to the samples that models are fitted to.
+
+Smooth with a centred moving average, keep every fifth sample, keep the window of
+velocities; in this order. Sticking, backward motion and fast peaks are left out.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array, Indices, TractionSeries
+
+MINIMUM_KEPT = 250  # kept samples that make a trial count
+MINIMUM_TRAVEL_SHARE = 0.9  # of the container
+_LONGEST_GAP = 3  # missing samples that a difference may span
+
+
+@dataclass(frozen=True, slots=True)
+class PrepareOptions:
+    """How a trial is smoothed, thinned and windowed.
+
+    Attributes:
+        smoothing: width of the moving average [samples], odd.
+        downsample: one sample of this many is kept.
+        slowest: lower edge of the window [m/s], included.
+        fastest: upper edge of the window [m/s], included.
+        container_travel: length of the container [m]; None = unknown, then travel
+            does not decide whether a trial counts.
+
+    Raises:
+        SettingsError: a width below one or even, or an empty window.
+    """
+
+    smoothing: int = 11
+    downsample: int = 5
+    slowest: float = 0.005
+    fastest: float = 0.2
+    container_travel: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.smoothing < 1 or self.smoothing % 2 == 0:
+            raise SettingsError(
+                f"A smoothing width of {self.smoothing} samples has no centre.",
+                hint="Give an odd number, e.g. 11.",
+            )
+        if self.downsample < 1:
+            raise SettingsError(
+                f"One sample in {self.downsample} cannot be kept.",
+                hint="Give a whole number of at least 1, e.g. 5.",
+            )
+        if not 0 < self.slowest < self.fastest < np.inf:
+            raise SettingsError(
+                f"The window {self.slowest:g} to {self.fastest:g} m/s is empty or "
+                "starts at standstill.",
+                hint="Give 0 < slowest < fastest, e.g. 0.005 and 0.2.",
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Smoothed:
+    """A trial at the recorded rate after the moving average.
+
+    Attributes:
+        t: time [s], shape (n,).
+        v_t: velocity [m/s], shape (n,).
+        F_n: normal force [N], shape (n,).
+        F_t: traction force [N], shape (n,).
+    """
+
+    t: Array
+    v_t: Array
+    F_n: Array
+    F_t: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Shares:
+    """How the thinned samples of a trial divide by velocity; they sum to one.
+
+    Attributes:
+        window: inside the window, these are kept.
+        sticking: slower than the window in either direction.
+        backward: faster backward than the window's lower edge.
+        fast: above the window.
+    """
+
+    window: float
+    sticking: float
+    backward: float
+    fast: float
+
+    @property
+    def window_of_moving(self) -> float | None:
+        """Share of the moving samples that is in the window; None if none moves."""
+        moving = 1.0 - self.sticking
+        return self.window / moving if moving > 0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedTrial:
+    """The kept samples of one trial and what they were taken from.
+
+    Attributes:
+        terrain: name of the terrain.
+        name: name of the trial.
+        v_t: kept velocities [m/s], shape (m,).
+        F_n: kept normal forces [N], shape (m,).
+        F_t: kept traction forces [N], shape (m,).
+        indices: rows of `smooth` that were kept, shape (m,).
+        shares: how the thinned samples divide by velocity.
+        smooth: the whole trial after smoothing.
+        travel: distance along the slip direction [m].
+        is_countable: enough kept samples and, where the container is known, travel.
+        dropped_rows: rows that were not finite in the record.
+        repeated_rows: rows of the record that were there twice.
+    """
+
+    terrain: str
+    name: str
+    v_t: Array
+    F_n: Array
+    F_t: Array
+    indices: Indices
+    shares: Shares
+    smooth: Smoothed
+    travel: float
+    is_countable: bool
+    dropped_rows: int
+    repeated_rows: int
+
+    @property
+    def kept(self) -> int:
+        """Number of kept samples."""
+        return int(self.indices.size)
+
+
+def moving_average(x: Array, width: int) -> Array:
+    """Return the centred moving average of `x`, shape (n,).
+
+    Near the ends the sum is divided by the number of samples present.
+    """
+    window = np.ones(width)
+    half = width // 2
+    sums = np.convolve(x, window)[half : half + x.size]
+    counts = np.convolve(np.ones(x.size), window)[half : half + x.size]
+    return sums / counts
+
+
+def foot_velocity(t: Array, position: Array) -> Array:
+    """Return the velocity of the foot [m/s] by central differences of its position.
+
+    The recorded times are used, so a missing cycle does no harm; the two ends take the
+    one-sided difference. A difference over more than three missing samples would invent
+    motion: there the velocity is NaN, for the row to be dropped.
+
+    Args:
+        t: recorded time [s], shape (n,), strictly increasing, n >= 2.
+        position: position of the sole [m], shape (n,) or (n, 3).
+
+    Returns:
+        Velocity of the shape of `position`.
+    """
+    rows = np.arange(t.size)
+    before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, t.size - 1)
+    span = t[after] - t[before]
+    change = position[after] - position[before]
+    velocity = (change.T / span).T
+    steps = np.diff(t)
+    # n missing samples leave a step of n + 1 periods; half a period is jitter
+    is_gap = steps > (_LONGEST_GAP + 1.5) * np.median(steps)
+    velocity[np.concatenate([is_gap, [False]]) | np.concatenate([[False], is_gap])] = (
+        np.nan
+    )
+    return velocity
+
+
+def prepare(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
+    """Return the kept samples of a trial: smoothed, thinned, inside the window."""
+    smooth = _smooth(series, options.smoothing)
+    thinned = np.arange(0, smooth.t.size, options.downsample)
+    v = smooth.v_t[thinned]
+    is_kept = (v >= options.slowest) & (v <= options.fastest)
+    indices = thinned[is_kept]
+    travel = float(np.trapezoid(smooth.v_t, smooth.t))
+    return PreparedTrial(
+        terrain=series.terrain,
+        name=series.name,
+        v_t=smooth.v_t[indices],
+        F_n=smooth.F_n[indices],
+        F_t=smooth.F_t[indices],
+        indices=indices,
+        shares=_shares(v, options),
+        smooth=smooth,
+        travel=travel,
+        is_countable=_is_countable(indices.size, travel, options.container_travel),
+        dropped_rows=series.dropped_rows,
+        repeated_rows=series.repeated_rows,
+    )
+
+
+def _smooth(series: TractionSeries, width: int) -> Smoothed:
+    columns = {
+        field.name: moving_average(getattr(series, field.name), width)
+        for field in fields(Smoothed)
+        if field.name != "t"
+    }
+    return Smoothed(t=series.t, **columns)
+
+
+def _shares(v: Array, options: PrepareOptions) -> Shares:
+    return Shares(
+        window=float(np.mean((v >= options.slowest) & (v <= options.fastest))),
+        sticking=float(np.mean(np.abs(v) < options.slowest)),
+        backward=float(np.mean(v <= -options.slowest)),
+        fast=float(np.mean(v > options.fastest)),
+    )
+
+
+def _is_countable(kept: int, travel: float, container: float | None) -> bool:
+    is_crossed = container is None or travel >= MINIMUM_TRAVEL_SHARE * container
+    return kept >= MINIMUM_KEPT and is_crossed

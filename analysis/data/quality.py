@@ -1,0 +1,80 @@
+"""What a trial is worth and where the trials of a terrain still have gaps; pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.data.prepare import PreparedTrial
+
+SPEED_EDGES = (0.0, 0.01, 0.05, 0.2, np.inf)  # m/s
+LOAD_EDGES = (0.0, 2.0, 5.0, 10.0, np.inf)  # N
+_SPEED_WORDS = (
+    "slower than 0.01 m/s",
+    "slower than 0.05 m/s",
+    "at 0.05 to 0.2 m/s",
+    "faster than 0.2 m/s",
+)
+_LOAD_WORDS = (
+    "hardly pressing",
+    "pressing lightly",
+    "pressing harder",
+    "pressing hard",
+)
+# What people can do: the extremes come by themselves in slips and at lift-off.
+_AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
+ENOUGH = 0.02  # share of the samples a cell should hold
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How the moving samples spread over speed and load.
+
+    Attributes:
+        counts: samples per cell, shape (4, 4), rows speed, columns load.
+    """
+
+    counts: NDArray[np.int64]
+
+    @property
+    def shares(self) -> NDArray[np.float64]:
+        """Share of all samples per cell, shape (4, 4); zeros where there are none."""
+        total = self.counts.sum()
+        return self.counts / total if total else np.zeros_like(self.counts, float)
+
+    @property
+    def fast_share(self) -> float:
+        """Share of the samples above 0.2 m/s."""
+        return float(self.shares[3].sum())
+
+
+def coverage(trials: Sequence[PreparedTrial]) -> Coverage:
+    """Return how the kept samples of `trials` spread over speed and load."""
+    counts = np.zeros((4, 4), np.int64)
+    for trial in trials:
+        cells, _, _ = np.histogram2d(
+            np.abs(trial.v_t), trial.F_n, bins=(SPEED_EDGES, LOAD_EDGES)
+        )
+        counts += cells.astype(np.int64)
+    return Coverage(counts)
+
+
+def suggest(found: Coverage) -> str:
+    """Return how the next push should be, in words; empty when nothing is missing.
+
+    Of the cells that a person can aim at, the emptiest one below 2 % of the samples.
+    """
+    shares = found.shares
+    if not found.counts.sum():
+        return ""
+    emptiest = min(_AIMS, key=lambda cell: shares[cell])
+    if shares[emptiest] >= ENOUGH:
+        return ""
+    return f"{_SPEED_WORDS[emptiest[0]]}, {_LOAD_WORDS[emptiest[1]]}"
+
+
+def quick_ratio(trial: PreparedTrial) -> float:
+    """Return the least-squares slope of F_t over F_n, NaN without load."""
+    power = float(trial.F_n @ trial.F_n)
+    return float(trial.F_n @ trial.F_t) / power if power > 0.0 else float("nan")

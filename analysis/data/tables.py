@@ -1,0 +1,200 @@
+"""Tables that other programs wrote, as trials: CSV, or npz with one array per trial.
+
+Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
+is unpickled, and whatever does not fit becomes one SettingsError that names the file.
+"""
+
+import csv
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array, TractionSeries
+
+COLUMNS = ("t", "v_t", "F_n", "F_t")
+DEFAULT_TERRAIN = "table"
+LARGEST_FILE = 1 << 29  # bytes, also of an npz once unpacked
+MOST_TRIALS = 2000
+
+_FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
+_BROKEN_NPZ = (
+    ValueError,
+    OSError,
+    EOFError,
+    MemoryError,
+    RuntimeError,  # an encrypted member
+    NotImplementedError,  # a compression nobody knows
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def parse_columns(text: str) -> dict[str, str]:
+    """Return the names of the columns from `t=t_s,v_t=vt_mps,...`.
+
+    Columns that are not mentioned keep their own name.
+
+    Raises:
+        SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
+    """
+    columns = {name: name for name in COLUMNS}
+    for part in filter(None, text.split(",")):
+        name, equals, column = (piece.strip() for piece in part.partition("="))
+        if not (equals and column) or name not in columns:
+            raise SettingsError(
+                f"--columns {text}: {part!r} does not name a column.",
+                hint="Write e.g. --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N",
+            )
+        columns[name] = column
+    return columns
+
+
+def load_tables(
+    paths: Sequence[Path],
+    columns: Mapping[str, str] | None = None,
+    terrain: str | None = None,
+) -> dict[str, list[TractionSeries]]:
+    """Return the trials in `paths` by terrain, in the order of the files.
+
+    Args:
+        paths: CSV files, one trial each, and npz files, any number of trials each.
+        columns: name of each column of the analysis in a CSV; by default its own.
+        terrain: terrain of every CSV; by default "table". An npz names its own.
+
+    Raises:
+        SettingsError: a file that is missing, too large, or not what it should be.
+    """
+    trials: dict[str, list[TractionSeries]] = {}
+    for path in paths:
+        for series in _load(path, columns or {}, terrain or DEFAULT_TERRAIN):
+            trials.setdefault(series.terrain, []).append(series)
+    if not trials:
+        raise SettingsError("No table was given.", hint="Name at least one file.")
+    return trials
+
+
+def _load(path: Path, columns: Mapping[str, str], terrain: str) -> list[TractionSeries]:
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            start = file.read(4)
+    except OSError as error:
+        raise SettingsError(
+            f"{path}: cannot be read ({error.strerror}).", hint="Check the name."
+        ) from error
+    if size == 0:
+        raise _refusal(path, "the file is empty", "Check that it was copied whole.")
+    _check_size(path, size)
+    if start[:2] == b"PK":
+        return _load_npz(path)
+    return [
+        _load_csv(path, {name: columns.get(name, name) for name in COLUMNS}, terrain)
+    ]
+
+
+def _refusal(path: Path, reason: str, hint: str) -> SettingsError:
+    return SettingsError(f"{path}: {reason}.", hint=hint)
+
+
+def _check_size(path: Path, size: int) -> None:
+    if size > LARGEST_FILE:
+        raise _refusal(
+            path,
+            f"{size / 1e6:.0f} MB, the limit is {LARGEST_FILE / 1e6:.0f} MB",
+            "Split it into one file per terrain.",
+        )
+
+
+def _load_npz(path: Path) -> list[TractionSeries]:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+        _check_members(path, members)
+        with np.load(path, allow_pickle=False) as arrays:
+            return [_from_array(path, key, arrays[key]) for key in arrays.files]
+    except _BROKEN_NPZ as error:
+        raise _refusal(path, f"not a readable npz ({error})", _FORM) from error
+
+
+def _check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
+    _check_size(path, sum(member.file_size for member in members))
+    strangers = [member.filename for member in members if not _is_trial(member)]
+    if strangers or not members:
+        found = ", ".join(strangers[:5]) or "nothing"
+        raise _refusal(path, f"no table of trials (it holds {found:.200s})", _FORM)
+    if len(members) > MOST_TRIALS:
+        raise _refusal(
+            path, f"{len(members)} arrays, the limit is {MOST_TRIALS}", "Split it."
+        )
+
+
+def _is_trial(member: zipfile.ZipInfo) -> bool:
+    terrain, slash, trial = member.filename.removesuffix(".npy").rpartition("/")
+    return member.filename.endswith(".npy") and bool(terrain and slash and trial)
+
+
+def _from_array(path: Path, key: str, array: np.ndarray) -> TractionSeries:
+    if (
+        array.ndim != 2
+        or array.shape[1] != len(COLUMNS)
+        or array.dtype.kind not in "fiu"
+    ):
+        raise _refusal(
+            path,
+            f"array {key} has shape {array.shape} and type {array.dtype}",
+            _FORM,
+        )
+    t, v_t, F_n, F_t = np.asarray(array, dtype=np.float64).T
+    return TractionSeries(
+        key.rpartition("/")[0], f"{path.name}:{key}", t, v_t, F_n, F_t
+    )
+
+
+def _load_csv(path: Path, columns: Mapping[str, str], terrain: str) -> TractionSeries:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
+            places = _places(path, header, columns)
+            rows = [line for line in file if line.strip()]
+    except UnicodeDecodeError as error:
+        raise _refusal(
+            path, "neither a text table nor an npz", "Give CSV files in UTF-8."
+        ) from error
+    except csv.Error as error:
+        raise _refusal(
+            path, f"its header cannot be read ({error})", "Give a CSV table."
+        ) from error
+    if not rows:
+        raise _refusal(path, "a header but no rows", "Check that it was copied whole.")
+    table = _numbers(path, rows, places)
+    t, v_t, F_n, F_t = table.T
+    return TractionSeries(terrain, path.name, t, v_t, F_n, F_t)
+
+
+def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[int]:
+    missing = [column for column in columns.values() if column not in header]
+    if missing:
+        found = ", ".join(header)
+        raise _refusal(
+            path,
+            f"no column {', '.join(missing)}; it has {found[:300] or 'none'}",
+            "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
+        )
+    return [header.index(columns[name]) for name in COLUMNS]
+
+
+def _numbers(path: Path, rows: list[str], places: list[int]) -> Array:
+    try:
+        return np.loadtxt(
+            rows, delimiter=",", usecols=places, ndmin=2, comments=None, quotechar='"'
+        )
+    except (ValueError, IndexError) as error:
+        raise _refusal(
+            path,
+            f"not only numbers below the header ({error})",
+            "Rows are numbered from 0 below the header; nan is allowed, text is not.",
+        ) from error

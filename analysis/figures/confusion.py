@@ -1,0 +1,85 @@
+"""Which terrain was taken for which: confusion matrices over windows of motion."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from analysis.figures.style import (
+    Axes,
+    Figure,
+    name_ticks,
+    new_figure,
+    plain,
+    shade_table,
+)
+from analysis.findings.findings import Findings
+from analysis.terrains.confusion import Confusion
+
+_KEPT_PER_SECOND = 100
+_SIDE = 2.25  # inches of one matrix of terrains
+_SMALL_SIDE = 1.55  # of a matrix of two or three kinds
+_MANY = 5  # kinds from which a matrix is a large one
+_RULES = (("by log density", "by_density"), ("smallest error (paper)", "by_error"))
+
+
+def draw_confusion(level: str) -> Callable[[Findings], Figure | None]:
+    """Return a function that draws the matrices of a level for every window length.
+
+    Above the log density's, below the paper's rule.
+    """
+
+    def draw(found: Findings) -> Figure | None:
+        identification = found.identification
+        if identification is None or not identification.sizes:
+            return None
+        sizes = identification.sizes
+        kinds = identification.by_density[sizes[0]][level].names
+        if len(kinds) < 2:
+            return None
+        side = _SIDE if len(kinds) >= _MANY else _SMALL_SIDE
+        figure = new_figure(side * len(_RULES) + 0.3)
+        grid = figure.subplots(len(_RULES), len(sizes), squeeze=False)
+        for row, (rule, attribute) in enumerate(_RULES):
+            for ax, size in zip(grid[row], sizes, strict=True):
+                confusion = getattr(identification, attribute)[size][level]
+                _draw_matrix(ax, confusion)
+                seconds = size / _KEPT_PER_SECOND
+                ax.set_title(
+                    f"{seconds:g} s, {rule}: {confusion.accuracy:.0%}",
+                    loc="left",
+                    fontsize=7.5,
+                )
+            grid[row, 0].set_ylabel("from")
+        for ax in grid[-1]:
+            ax.set_xlabel("taken for")
+        return figure
+
+    return draw
+
+
+def shares_of(confusion: Confusion) -> np.ndarray:
+    """Return the counts as shares of their row, NaN where a row is empty."""
+    totals = confusion.counts.sum(axis=1, keepdims=True).astype(np.float64)
+    totals[totals == 0] = np.nan
+    return confusion.counts / totals
+
+
+def _draw_matrix(ax: Axes, confusion: Confusion) -> None:
+    shares, names = shares_of(confusion), list(confusion.names)
+    shade_table(ax, shares.tolist(), 1.0)
+    size = 5.5 if len(names) >= _MANY else 8.0
+    for (i, j), share in np.ndenumerate(shares):
+        if not np.isnan(share):
+            ax.text(
+                j + 0.5,
+                i + 0.5,
+                f"{100 * share:.0f}",
+                ha="center",
+                va="center",
+                fontsize=size,
+                color="white" if share > 0.65 else "black",
+                fontweight="bold" if i == j else "normal",
+            )
+    name_ticks(ax, names, 0.5)
+    ax.set_yticks(np.arange(len(names)) + 0.5, [plain(name) for name in names])
+    ax.tick_params(labelsize=6.5, length=0)

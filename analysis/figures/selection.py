@@ -1,0 +1,182 @@
+"""What the figures show, chosen and computed without drawing anything."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.events import Slip
+from analysis.data.prepare import Smoothed
+from analysis.data.rows import Rows
+from analysis.data.series import Array
+from analysis.study.models import FittedModel
+from analysis.study.study import Study, TerrainResult
+
+EXCERPT = 3.5  # s shown of a trial
+LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn
+SMALL, BIG, FLAT = "small stones", "big stones", "flat plate"
+CLASSES = {
+    **dict.fromkeys(("S0", "S10", "S15"), SMALL),
+    **dict.fromkeys(("B0", "B10", "B15"), BIG),
+    **dict.fromkeys(("TF", "Tf"), FLAT),
+}
+
+_MOST_POINTS = 1500  # drawn per panel
+_CURVE_POINTS = 120
+_STEP = 0.1  # s between the excerpts compared
+_BEFORE, _AFTER = 0.3, 0.6  # s around a slip that an excerpt should hold
+
+
+@dataclass(frozen=True, slots=True)
+class Excerpt:
+    """A stretch of one trial.
+
+    Attributes:
+        terrain: its terrain.
+        trial: number of the trial, from 1.
+        t: time from the start of the excerpt [s], shape (n,).
+        v_t: smoothed velocity [m/s], shape (n,).
+        F_t: smoothed traction force [N], shape (n,).
+        slips: the slips inside, times from the start of the excerpt.
+    """
+
+    terrain: str
+    trial: int
+    t: Array
+    v_t: Array
+    F_t: Array
+    slips: tuple[tuple[Slip, float, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One fitted model with its terrain's samples, for curves over v_t.
+
+    Attributes:
+        terrain: its terrain.
+        fold: number of the fold drawn, from 1.
+        data: samples of the terrain, thinned evenly for drawing.
+        v: velocities of the curves [m/s], shape (m,).
+        loads: low, median and high F_n [N] at which curves are drawn.
+        means: predicted F_t [N], shape (3, m).
+        sds: standard deviations [N], noise included, shape (3, m).
+    """
+
+    terrain: str
+    fold: int
+    data: Rows
+    v: Array
+    loads: Array
+    means: Array
+    sds: Array
+
+    def nearest_load(self) -> Array:
+        """Return for every sample which of the three loads is nearest, shape (n,)."""
+        return np.argmin(np.abs(self.data.F_n[:, None] - self.loads), axis=1)
+
+
+def terrain_class(terrain: str) -> str:
+    """Return the kind of ground of one of the paper's terrains, else its own name."""
+    return CLASSES.get(terrain, terrain)
+
+
+def representatives(study: Study, most: int = 4) -> list[TerrainResult]:
+    """Return the first terrain of every class that has kept samples."""
+    first: dict[str, TerrainResult] = {}
+    for name, result in study.terrains.items():
+        if result.kept:
+            first.setdefault(terrain_class(name), result)
+    return list(first.values())[:most]
+
+
+def excerpts(study: Study) -> list[Excerpt]:
+    """Return one telling stretch per class of terrain."""
+    return [best_excerpt(result) for result in representatives(study)]
+
+
+def best_excerpt(result: TerrainResult) -> Excerpt:
+    """Return the stretch with the most slips and bounces, else with the most motion."""
+    candidates = [
+        (_worth(trial.smooth, slips, start), k, start)
+        for k, (trial, slips) in enumerate(
+            zip(result.trials, result.slips, strict=True)
+        )
+        for start in _starts(trial.smooth)
+    ]
+    _, k, start = max(candidates)
+    smooth = result.trials[k].smooth
+    rows = (smooth.t >= start) & (smooth.t <= start + EXCERPT)
+    return Excerpt(
+        terrain=result.terrain,
+        trial=k + 1,
+        t=smooth.t[rows] - start,
+        v_t=smooth.v_t[rows],
+        F_t=smooth.F_t[rows],
+        slips=tuple(
+            (slip, slip.onset - start, slip.end - start)
+            for slip in result.slips[k]
+            if _is_inside(slip, start)
+        ),
+    )
+
+
+def panels(study: Study, model: str) -> list[Panel]:
+    """Return the curves of the first fold of `model` for every terrain that has one."""
+    return [
+        _panel(result, model)
+        for result in study.terrains.values()
+        if result.models(model)
+    ]
+
+
+def force_range(panels: Sequence[Panel]) -> tuple[float, float]:
+    """Return limits of F_t [N] that suit all panels: nearly all samples, all curves."""
+    low = min(float(np.quantile(panel.data.F_t, 0.005)) for panel in panels)
+    high = max(float(np.quantile(panel.data.F_t, 0.995)) for panel in panels)
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _starts(smooth: Smoothed) -> Array:
+    last = max(float(smooth.t[-1]) - EXCERPT, float(smooth.t[0]))
+    return np.arange(float(smooth.t[0]), last + _STEP / 2, _STEP)
+
+
+def _is_inside(slip: Slip, start: float) -> bool:
+    return start + _BEFORE <= slip.onset and slip.end + _AFTER <= start + EXCERPT
+
+
+def _worth(
+    smooth: Smoothed, slips: Sequence[Slip], start: float
+) -> tuple[float, float]:
+    inside = [slip for slip in slips if _is_inside(slip, start)]
+    rows = slice(*np.searchsorted(smooth.t, [start, start + EXCERPT]))
+    moving = float(np.mean(smooth.v_t[rows] > 0)) if rows.stop > rows.start else 0.0
+    return len(inside) + 0.5 * sum(slip.has_bounce for slip in inside), moving
+
+
+def _panel(result: TerrainResult, model: str) -> Panel:
+    fold = next(fold for fold in result.folds if model in fold.models)
+    everything = Rows.of(result.trials)
+    step = max(1, -(-everything.count // _MOST_POINTS))
+    loads = np.quantile(everything.F_n, LOADS)
+    span = float(everything.v_t.min()), float(everything.v_t.max())
+    # dense at the slow end, where models bend, and fine enough at the fast one
+    v = np.union1d(
+        np.geomspace(*span, _CURVE_POINTS), np.linspace(*span, _CURVE_POINTS)
+    )
+    curves = [_curve(fold.models[model].model, load, v) for load in loads]
+    return Panel(
+        terrain=result.terrain,
+        fold=fold.fold + 1,
+        data=everything.take(np.arange(0, everything.count, step)),
+        v=v,
+        loads=loads,
+        means=np.array([mean for mean, _ in curves]),
+        sds=np.array([sd for _, sd in curves]),
+    )
+
+
+def _curve(model: FittedModel, load: float, v: Array) -> tuple[Array, Array]:
+    prediction = model.predict(np.full(v.shape, load), v)
+    return prediction.mean, prediction.sd

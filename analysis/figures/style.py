@@ -1,0 +1,208 @@
+"""The one door to matplotlib: style, colours, watermark and files of every figure.
+
+Colours are Okabe and Ito's, safe for colour-blind readers, and never the only sign of a
+difference. Figures are drawn on `Figure` objects of their own, so that nothing is
+shared between them and no screen is needed.
+"""
+
+import io
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from analysis.figures.selection import BIG, FLAT, SMALL, terrain_class
+
+__all__ = [
+    "ONE_COLUMN",
+    "WIDTH",
+    "Axes",
+    "Figure",
+    "LogNorm",
+    "Picture",
+    "new_figure",
+    "panel_grid",
+    "render",
+    "shade_table",
+    "styled",
+]
+
+WIDTH = 7.16  # inches, both columns of a paper's page
+ONE_COLUMN = 3.45  # inches
+FORCE_LABEL = "traction $F_t$ [N]"
+SPEED_LABEL = "slip velocity $v_t$ [m/s]"
+LOAD_LABEL = "normal force $F_n$ [N]"
+ERROR_LABEL = "mean absolute error [N]"
+LOAD_LINES = (
+    ("low", "#0072B2", "-"),
+    ("median", "#D55E00", "--"),
+    ("high", "#009E73", "-."),
+)
+MODEL_COLOURS = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#D55E00",
+    "#000000",
+)
+MODEL_HATCHES = ("", "///", "...", "xxx", "---")
+MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+
+_DPI = 160
+_MARK = 6.0  # points of the watermark per inch of the figure's width
+_CLASS_COLOURS = {
+    SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
+    BIG: ("#7f2704", "#d9690f", "#fdb97d"),
+    FLAT: ("#4d4d4d", "#b3b3b3", "#d9d9d9"),
+}
+_OTHER_COLOURS = ("#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00")
+_STYLE: dict[Any, Any] = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": "#e5e5e5",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "pdf.fonttype": 42,  # letters stay letters
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A drawn figure.
+
+    Attributes:
+        key: name of its files, e.g. "fig4_excerpts".
+        png: the figure as PNG.
+        pdf: the figure as vector PDF.
+    """
+
+    key: str
+    png: bytes
+    pdf: bytes
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw with the project's style inside the block."""
+    with mpl.rc_context():
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure of so many inches, by default as wide as both columns."""
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def panel_grid(
+    count: int, height: float, most_columns: int = 4
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure of `count` panels that share their axes, row by row.
+
+    One panel alone is as wide as one column of a paper.
+
+    Args:
+        count: number of panels.
+        height: of one row [inches].
+        most_columns: panels side by side.
+    """
+    columns = min(most_columns, count)
+    rows = -(-count // columns)
+    figure = new_figure(height * rows + 0.7, ONE_COLUMN if count == 1 else WIDTH)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    axes = list(grid.flat)
+    for spare in axes[count:]:
+        spare.set_visible(False)
+        # the panel above it is the lowest of its column
+        axes[axes.index(spare) - columns].xaxis.set_tick_params(labelbottom=True)
+    return figure, axes[:count]
+
+
+def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
+    """Draw a table of numbers as shaded cells, the first row above.
+
+    Cells that are not a number stay white. Unlike an image, cells stay vectors.
+    """
+    values = np.ma.masked_invalid(np.asarray(table, dtype=np.float64))
+    ax.pcolormesh(values, cmap="YlOrBr", vmin=0.0, vmax=top or 1.0, edgecolors="none")
+    ax.invert_yaxis()
+    ax.grid(visible=False)
+
+
+def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
+    """Return the finished figure as files, watermarked if simulated."""
+    if is_simulated:
+        figure.text(
+            0.5,
+            0.5,
+            "SIMULATED",
+            ha="center",
+            va="center",
+            rotation=20,
+            fontsize=_MARK * figure.get_figwidth(),
+            color="#808080",
+            alpha=0.25,  # not bold: another font would have to be embedded
+            zorder=100,
+        )
+    png, pdf = io.BytesIO(), io.BytesIO()
+    with warnings.catch_warnings():
+        # a terrain may be named in a script the font does not have
+        warnings.filterwarnings("ignore", message="Glyph")
+        # canvases of their own draw once; savefig would draw twice for each format
+        figure.set_dpi(_DPI)
+        FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})
+        figure.set_layout_engine("none")  # the layout is found; do not search again
+        FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
+    return Picture(key, png.getvalue(), pdf.getvalue())
+
+
+def terrain_colours(terrains: list[str]) -> dict[str, str]:
+    """Return a colour for every terrain; one family of shades per class."""
+    used: dict[str, int] = {}
+    colours = {}
+    for terrain in terrains:
+        kind = terrain_class(terrain)
+        family = _CLASS_COLOURS.get(kind, _OTHER_COLOURS)
+        kind = kind if kind in _CLASS_COLOURS else ""
+        colours[terrain] = family[used.get(kind, 0) % len(family)]
+        used[kind] = used.get(kind, 0) + 1
+    return colours
+
+
+def titled(terrain: str) -> str:
+    """Return the title of a terrain's panel, with its class."""
+    kind = terrain_class(terrain)
+    return plain(terrain if kind == terrain else f"{terrain}: {kind}")
+
+
+def plain(text: str) -> str:
+    """Return text without meaning for matplotlib's mathematics."""
+    return text.replace("$", r"\$")
+
+
+def name_ticks(ax: Axes, terrains: list[str], shift: float = 0.0) -> None:
+    """Put the names of terrains under the axis, slanted if they are long."""
+    longest = max(map(len, terrains))
+    is_long = longest > 6 and len(terrains) > 3
+    ax.set_xticks(
+        np.arange(len(terrains)) + shift,
+        [plain(terrain) for terrain in terrains],
+        rotation=30 if is_long else 0,
+        ha="right" if is_long else "center",
+    )

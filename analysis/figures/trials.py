@@ -1,0 +1,153 @@
+"""The trials themselves: side by side, from first to last, and force over way."""
+
+import numpy as np
+
+from analysis.data.prepare import Smoothed
+from analysis.data.series import Array
+from analysis.figures.selection import representatives
+from analysis.figures.style import (
+    FORCE_LABEL,
+    ONE_COLUMN,
+    WIDTH,
+    Axes,
+    Figure,
+    new_figure,
+    panel_grid,
+    plain,
+    terrain_colours,
+    titled,
+)
+from analysis.findings.findings import Findings
+from analysis.findings.trends import MEAN_FORCE, Trend
+from analysis.study.study import TerrainResult
+
+_MOST_TRIALS = 20  # side by side
+_MOST_POINTS = 400  # of a curve
+_GAP = 0.08  # of a cell between two trials
+
+
+def draw_trials(found: Findings) -> Figure | None:
+    """Return small multiples: F_t over the way of every trial, a row per terrain."""
+    results = list(found.study.terrains.values())
+    figure = new_figure(0.95 * len(results) + 0.7)
+    axes = figure.subplots(len(results), 1, sharex=True, sharey=True, squeeze=False)
+    most = min(max(len(result.trials) for result in results), _MOST_TRIALS)
+    colours = terrain_colours([result.terrain for result in results])
+    for ax, result in zip(axes[:, 0], results, strict=True):
+        for k, trial in enumerate(result.trials[:most]):
+            way, force = _thinned(trial.smooth)
+            reach = max(float(way.max()), 1e-9)
+            ax.plot(
+                k + 0.5 + _GAP + (1.0 - 2.0 * _GAP) * np.clip(way / reach, 0.0, 1.0),
+                force,
+                lw=0.6,
+                color=colours[result.terrain],
+            )
+        ax.set_title(titled(result.terrain), loc="left", pad=2.0)
+        ax.grid(visible=False, axis="x")
+    lowest, highest = force_limits(results)
+    axes[0, 0].set_ylim(lowest, highest)
+    axes[0, 0].set_xlim(0.5, most + 0.5)
+    axes[-1, 0].set_xticks(range(1, most + 1))
+    axes[-1, 0].set_xlabel("trial, and in it the share of its way from 0 to 1")
+    figure.supylabel(FORCE_LABEL, fontsize=8)
+    return figure
+
+
+def draw_trends(found: Findings) -> Figure | None:
+    """Return the mean F_t of every trial with its line: wear of the terrain."""
+    shown = {
+        name: trends[MEAN_FORCE]
+        for name, trends in found.trends.items()
+        if trends[MEAN_FORCE].means.size
+    }
+    if not shown:
+        return None
+    figure, axes = panel_grid(len(shown), 1.6)
+    for ax, (name, trend) in zip(axes, shown.items(), strict=True):
+        _draw_trend(ax, trend)
+        ax.set_title(titled(name), loc="left")
+    means = np.concatenate([trend.means for trend in shown.values()])
+    low, high = min(0.0, float(means.min())), float(means.max())
+    axes[0].set_ylim(low, high + 0.25 * (high - low or 1.0))  # room for the words
+    most = int(max(float(trend.trials.max()) for trend in shown.values()))
+    axes[0].set_xlim(0.4, most + 0.6)
+    axes[0].set_xticks(range(1, most + 1, 1 + most // 6))
+    figure.supxlabel("trial", fontsize=8)
+    figure.supylabel("mean traction of a trial [N]", fontsize=8)
+    return figure
+
+
+def draw_stick_slip(found: Findings) -> Figure | None:
+    """Return force over displacement of one trial per class of terrain."""
+    chosen = representatives(found.study)
+    if not chosen:
+        return None
+    figure = new_figure(
+        1.35 * len(chosen) + 0.6, ONE_COLUMN if len(chosen) == 1 else WIDTH
+    )
+    axes = figure.subplots(len(chosen), 1, sharex=True, sharey=True, squeeze=False)
+    for ax, result in zip(axes[:, 0], chosen, strict=True):
+        number = most_slips(result)
+        smooth, way = result.trials[number].smooth, way_of(result.trials[number].smooth)
+        for k, slip in enumerate(result.slips[number]):
+            start, stop = np.interp((slip.onset, slip.end), smooth.t, way)
+            label = "slip" if k == 0 else None
+            ax.axvspan(
+                1e3 * start, 1e3 * stop, color="#F0E442", alpha=0.55, lw=0, label=label
+            )
+        ax.plot(1e3 * way, smooth.F_t, color="#0072B2", lw=0.8)
+        ax.set_title(f"{titled(result.terrain)}, trial {number + 1}", loc="left")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside upper right")
+    axes[-1, 0].set_xlabel("displacement of the sole [mm]")
+    figure.supylabel(FORCE_LABEL, fontsize=8)
+    return figure
+
+
+def way_of(smooth: Smoothed) -> Array:
+    """Return the way of the sole since the start [m], shape (n,), by trapezia."""
+    steps = 0.5 * (smooth.v_t[1:] + smooth.v_t[:-1]) * np.diff(smooth.t)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def most_slips(result: TerrainResult) -> int:
+    """Return the number of the trial with most slips, from 0; the first of equals."""
+    counts = [len(slips) for slips in result.slips]
+    return counts.index(max(counts))
+
+
+def force_limits(results: list[TerrainResult]) -> tuple[float, float]:
+    """Return limits of F_t [N] that hold all but a few spikes of all trials."""
+    ends = [
+        np.quantile(trial.smooth.F_t, (0.001, 0.999))
+        for result in results
+        for trial in result.trials
+    ]
+    low, high = min(float(e[0]) for e in ends), max(float(e[1]) for e in ends)
+    margin = 0.04 * (high - low) or 1.0
+    return low - margin, high + margin
+
+
+def _thinned(smooth: Smoothed) -> tuple[Array, Array]:
+    step = max(1, smooth.t.size // _MOST_POINTS)
+    return way_of(smooth)[::step], smooth.F_t[::step]
+
+
+def _draw_trend(ax: Axes, trend: Trend) -> None:
+    ax.plot(trend.trials, trend.means, "o", ms=3.2, color="#0072B2")
+    if trend.slope is None or trend.slope_error is None:
+        return
+    ends = np.array([trend.trials.min(), trend.trials.max()])
+    ax.plot(ends, trend.start + trend.slope * ends, "--", color="#D55E00", lw=1.3)
+    text = f"{trend.slope:+.3f} ± {trend.slope_error:.3f} N per trial".replace("-", "−")
+    ax.text(
+        0.03,
+        0.97,
+        plain(text),
+        transform=ax.transAxes,
+        va="top",
+        fontsize=6.5,
+        fontweight="bold" if trend.is_significant else "normal",
+    )

@@ -1,0 +1,178 @@
+"""The findings of a report as plain values, for fits.json and fits.csv."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from analysis.findings.findings import Findings
+from analysis.findings.noise_summary import NoiseSummary
+from analysis.findings.residuals import ResidualBand
+from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
+from analysis.findings.trends import TREND_UNITS, Trend
+from analysis.terrains.confusion import Confusion
+from analysis.terrains.identify import LEVELS, Identification
+
+_DIGITS = 5  # of the surfaces in fits.json
+
+
+def plain_findings(found: Findings) -> dict[str, Any]:
+    """Return the findings as plain values for fits.json, with units."""
+    return {
+        "identification": _identification(found.identification),
+        "noise": {summary.terrain: _noise(summary) for summary in found.noise},
+        "trends": {
+            name: {key: _trend(trend) for key, trend in trends.items()}
+            for name, trends in found.trends.items()
+        },
+        "residuals": {
+            name: {model: _residuals(band) for model, band in bands.items()}
+            for name, bands in found.residuals.items()
+        },
+        "surfaces": _surfaces(found),
+        "coverage": _coverage(found),
+        "rig": [trial.numbers() for trial in found.rig],
+        "units": {
+            "nlpd_constant": "log N",
+            "nlpd_chosen": "log N",
+            "trend means, slope, slope_error, spread": TREND_UNITS,
+            "residual quantiles, bias, sd": "N",
+            "F_n": "N",
+            "v_t": "m/s",
+            "mean": "N",
+            "variance": "N^2",
+            "rig": HEALTH_UNITS,
+        },
+    }
+
+
+def findings_rows(found: Findings) -> list[tuple[str, str, str, str, float, str]]:
+    """Return the findings for fits.csv: terrain, model, fold, quantity, value, unit."""
+    rows: list[tuple[str, str, str, str, float, str]] = []
+    for s in found.noise:
+        rows += [
+            (s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
+            (s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
+        ]
+    for name, trends in found.trends.items():
+        for key, trend in trends.items():
+            values = {"slope per trial": trend.slope, "slope error": trend.slope_error}
+            values["spread of trial means"] = trend.spread
+            rows += [
+                (name, "", "", f"{key} {what}", value, TREND_UNITS[key])
+                for what, value in values.items()
+                if value is not None
+            ]
+    for name, bands in found.residuals.items():
+        for model, band in bands.items():
+            rows.append((name, model, "", "residual bias", band.bias, "N"))
+            rows.append((name, model, "", "residual sd", band.sd, "N"))
+    return rows + _recognised(found.identification) + _rig_rows(found.rig)
+
+
+def _recognised(
+    found: Identification | None,
+) -> list[tuple[str, str, str, str, float, str]]:
+    if found is None:
+        return []
+    rules = {"log density": found.by_density, "smallest error": found.by_error}
+    return [
+        ("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
+        for rule, sizes in rules.items()
+        for size, levels in sizes.items()
+        for level in LEVELS
+        if np.isfinite(share := levels[level].accuracy)
+    ]
+
+
+def _rig_rows(
+    rig: Sequence[RigTrial],
+) -> list[tuple[str, str, str, str, float, str]]:
+    return [
+        (trial.terrain, "", "", f"{trial.name} {key}", float(value), HEALTH_UNITS[key])
+        for trial in rig
+        for key, value in trial.numbers().items()
+        if key in HEALTH_UNITS and isinstance(value, int | float)
+    ]
+
+
+def _noise(summary: NoiseSummary) -> dict[str, Any]:
+    return {
+        "folds": summary.counts,
+        "nlpd_constant": summary.before,
+        "nlpd_chosen": summary.after,
+        "paired": summary.paired._asdict(),
+    }
+
+
+def _residuals(band: ResidualBand) -> dict[str, Any]:
+    return {
+        "v_t": band.v.tolist(),
+        "quantiles": band.quantiles.tolist(),
+        "bias": band.bias,
+        "sd": band.sd,
+    }
+
+
+def _surfaces(found: Findings) -> dict[str, Any]:
+    return {
+        "F_n": _short(found.axes.F_n),
+        "v_t": _short(found.axes.v_t),
+        "terrains": {
+            s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
+            for s in found.surfaces
+        },
+    }
+
+
+def _coverage(found: Findings) -> dict[str, Any]:
+    return {
+        "F_n_edges": _short(found.edges.F_n),
+        "v_t_edges": _short(found.edges.v_t),
+        "terrains": {
+            c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
+            for c in found.coverage
+        },
+    }
+
+
+def _identification(found: Identification | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "windows_samples": list(found.by_density),
+        "by_density": _confusions(found.by_density),
+        "by_error": _confusions(found.by_error),
+        "neighbour_correlation": dict(found.rho),
+    }
+
+
+def _confusions(sizes: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
+    return {
+        str(size): {
+            level: {
+                "names": list(confusion.names),
+                "counts": confusion.counts.tolist(),
+                "recognised": confusion.accuracy,
+            }
+            for level, confusion in levels.items()
+        }
+        for size, levels in sizes.items()
+    }
+
+
+def _trend(trend: Trend) -> dict[str, Any]:
+    return {
+        "trials": trend.trials.astype(int).tolist(),
+        "means": trend.means.tolist(),
+        "slope": trend.slope,
+        "slope_error": trend.slope_error,
+        "spread": trend.spread,
+    }
+
+
+def _short(values: np.ndarray) -> Any:  # noqa: ANN401
+    """Return an array as nested lists of few digits."""
+    if values.ndim > 1:
+        return [_short(row) for row in values]
+    return [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]

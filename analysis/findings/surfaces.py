@@ -1,0 +1,123 @@
+"""Mean and variance of a model over velocity and load, and where samples lie there."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.rows import Rows
+from analysis.data.series import Array
+from analysis.study.study import Study, TerrainResult
+
+_POINTS = 41  # along each axis of a surface
+_CELLS = 20  # along each axis of a coverage map
+_REACH = 0.995  # quantile of F_n that the load axis ends at
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """A fitted model over (v_t, F_n), with the samples it was made for.
+
+    Attributes:
+        terrain: its terrain.
+        data: kept samples of the terrain.
+        mean: predicted F_t [N], shape (loads, velocities).
+        variance: of a measurement, noise included [N^2], same shape.
+    """
+
+    terrain: str
+    data: Rows
+    mean: Array
+    variance: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """How many kept samples of a terrain lie in every cell of velocity and load.
+
+    Attributes:
+        terrain: its terrain.
+        counts: samples, shape (loads, velocities).
+        outside: samples beyond the load axis.
+    """
+
+    terrain: str
+    counts: Array
+    outside: int
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """Axes shared by all terrains, so that surfaces can be compared by eye.
+
+    Attributes:
+        v_t: slip velocities [m/s], increasing.
+        F_n: normal forces [N], increasing.
+    """
+
+    v_t: Array
+    F_n: Array
+
+
+def surface_axes(study: Study) -> Axes:
+    """Return the points at which surfaces are evaluated."""
+    return _axes(study, _POINTS)
+
+
+def cell_edges(study: Study) -> Axes:
+    """Return the edges of the cells of coverage maps."""
+    return _axes(study, _CELLS + 1)
+
+
+def surfaces(study: Study, model: str, axes: Axes) -> list[Surface]:
+    """Return the surface of the first fold of `model` for every terrain with one."""
+    v, load = (grid.ravel() for grid in np.meshgrid(axes.v_t, axes.F_n))
+    shape = (axes.F_n.size, axes.v_t.size)
+    found = []
+    for result in study.terrains.values():
+        folds = result.models(model)
+        if folds:
+            prediction = folds[0].model.predict(load, v)
+            found.append(
+                Surface(
+                    terrain=result.terrain,
+                    data=Rows.of(result.trials),
+                    mean=prediction.mean.reshape(shape),
+                    variance=(prediction.sd**2).reshape(shape),
+                )
+            )
+    return found
+
+
+def coverages(study: Study, edges: Axes) -> list[Coverage]:
+    """Return the coverage of every terrain that has kept samples."""
+    return [
+        _coverage(result, edges) for result in study.terrains.values() if result.kept
+    ]
+
+
+def common_range(values: Sequence[Array]) -> tuple[float, float]:
+    """Return the smallest and largest value of all arrays."""
+    return min(float(v.min()) for v in values), max(float(v.max()) for v in values)
+
+
+def _coverage(result: TerrainResult, edges: Axes) -> Coverage:
+    rows = Rows.of(result.trials)
+    counts, *_ = np.histogram2d(rows.F_n, rows.v_t, bins=[edges.F_n, edges.v_t])
+    return Coverage(result.terrain, counts, rows.count - int(counts.sum()))
+
+
+def _axes(study: Study, count: int) -> Axes:
+    options = study.options.prepare
+    loads = Rows.of([t for r in study.terrains.values() for t in r.trials]).F_n
+    low, high = (
+        (float(np.quantile(loads, 1.0 - _REACH)), float(np.quantile(loads, _REACH)))
+        if loads.size
+        else (0.0, 1.0)
+    )
+    low = min(low, 0.0)
+    high = max(high, low + 1e-3)
+    return Axes(
+        v_t=np.linspace(options.slowest, options.fastest, count),
+        F_n=np.linspace(low, high, count),
+    )

@@ -1,0 +1,176 @@
+"""The arcsine covariance of an infinite neural network (eq. 5).
+
+p(x) = beta + 2 sum_d x_d^2/l_d^2,  N(x, x') = beta + 2 sum_d x_d x'_d/l_d^2
+k(x, x') = sf^2 asin(N / sqrt((c + p(x)) (c + p(x'))))
+
+c = 1 is the covariance of a network (Rasmussen and Williams 2006, eq. 4.29, with
+beta = 2 sigma_0^2 and their 2/pi inside sf). c = 0 is eq. (5) as printed: there k(x, x)
+is the same everywhere and the arcsine has a cusp at zero distance, so functions are
+very rough.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.data.series import Array
+from analysis.gp.kernels import Composable, Contraction, Evaluator, length_pairs
+
+_ROOT_2 = np.sqrt(2.0)
+_BIASES = (20.0, 0.05)  # beta that a search may start with
+
+
+class Augmented(NamedTuple):
+    """Augmented rows U = (sqrt(beta), sqrt(2) x/l), shape (n, 1 + d), and A = c + U'U.
+
+    Attributes:
+        U: augmented rows.
+        A: c + p of every row, shape (n,).
+    """
+
+    U: Array
+    A: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Arcsine(Composable):
+    """The neural-network kernel, one length per input.
+
+    Attributes:
+        dimensions: number of inputs d; theta = (log sf, log l_1 ... log l_d, log beta).
+        as_printed: c = 0 instead of 1.
+    """
+
+    dimensions: int = 2
+    as_printed: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the hyperparameters."""
+        lengths = (f"log_l{d + 1}" for d in range(self.dimensions))
+        return ("log_sf", *lengths, "log_beta")
+
+    @property
+    def c(self) -> float:
+        """What is added to both factors under the root [-]."""
+        return 0.0 if self.as_printed else 1.0
+
+    def rows(self, theta: Array, X: Array) -> Augmented:
+        """Return the augmented rows of X (n, d) at theta."""
+        bias = np.full(X.shape[0], np.exp(0.5 * theta[-1]))
+        U = np.column_stack([bias, _ROOT_2 * X / np.exp(theta[1:-1])])
+        return Augmented(U, self.c + np.einsum("na,na->n", U, U))
+
+    def diagonal(self, theta: Array, X: Array) -> Array:
+        """Return sf^2 asin(p/(c + p)) of every row."""
+        A = self.rows(theta, X).A
+        return np.exp(2.0 * theta[0]) * np.arctan2(
+            A - self.c, np.sqrt(self.c * (2.0 * A - self.c))
+        )
+
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and its contraction for any theta."""
+        return _ArcsineOver(self, X, X_other)
+
+    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
+        """Return sum_i w_i dk(x_i, x_i)/dtheta, shape (p,)."""
+        U, A = self.rows(theta, X)
+        of_sf = 2.0 * float(w @ self.diagonal(theta, X))
+        # d asin(p/A)/dp = c / (A sqrt(A^2 - p^2))
+        root = np.sqrt(self.c * (2.0 * A - self.c))
+        share = np.divide(self.c, A * root, out=np.zeros_like(A), where=root > 0)
+        of_shape = np.exp(2.0 * theta[0]) * ((U**2).T @ (w * share))
+        return np.concatenate([[of_sf], -2.0 * of_shape[1:], [of_shape[0]]])
+
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
+
+        Short lengths with a large bias, and long ones with next to none, are optima of
+        their own.
+        """
+        return [
+            np.log(np.concatenate([[0.5 * sd_y], lengths, [bias]]))
+            for bias in _BIASES
+            for lengths in length_pairs(sd_x)
+        ]
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return nothing: the bias makes up for a single length that changes."""
+        return []
+
+    def bounds(self, sd_y: float, sd_x: Array) -> Array:
+        """Return log sf in log sd(y) + [-6, 4], log l_d in [-4, 6], log beta +-6."""
+        centre = np.log(np.concatenate([[sd_y], sd_x, [1.0]]))
+        span = [[-6.0, 4.0], *([[-4.0, 6.0]] * self.dimensions), [-6.0, 6.0]]
+        return centre[:, None] + np.array(span)
+
+
+class _ArcsineOver:
+    """The kernel over two sets of rows, in memory of its own.
+
+    Of D = sqrt(A A' - N^2), the sine's partner, everything that depends on the rows
+    alone is computed once: by Lagrange's identity A A' - N^2 = c (c + p + p') +
+    sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and the lengths taken out these are
+    squares of x_a - x'_a and of x_a x'_b - x_b x'_a. The latter is written as
+    x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where two rows are close.
+    """
+
+    def __init__(self, kernel: Arcsine, X: Array, X_other: Array) -> None:
+        self._kernel, self._X, self._X_other = kernel, X, X_other
+        shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
+        self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
+        self._squares = np.empty((d + len(self._pairs), *shape))
+        steps = [np.subtract.outer(X[:, a], X_other[:, a]) for a in range(d)]
+        for a, b in self._pairs:
+            steps.append(X[:, b, None] * steps[a] - X[:, a, None] * steps[b])
+        for step, square in zip(steps, self._squares, strict=True):
+            np.multiply(step, step, out=square)
+        self._K, self._N, self._D = (np.empty(shape) for _ in range(3))
+
+    def __call__(self, theta: Array) -> tuple[Array, Contraction]:
+        """Return K and its contraction, with asin(u) = atan(N / D)."""
+        rows = self._kernel.rows(theta, self._X)
+        others = self._kernel.rows(theta, self._X_other)
+        sf2, K, D = float(np.exp(2.0 * theta[0])), self._K, self._D
+        np.matmul(rows.U, np.ascontiguousarray(others.U.T), out=self._N)
+        self._fill_partner(theta, rows, others)
+        with np.errstate(divide="ignore"):  # repeated inputs as printed: pi/2
+            np.divide(self._N, D, out=K)
+        np.arctan(K, out=K)
+        K *= sf2
+        if self._kernel.as_printed:
+            # at repeated inputs the arcsine has its cusp: its slope is set to 0
+            D[D == 0.0] = np.inf
+        return K, lambda W: self._contract(W, sf2, rows, others)
+
+    def _fill_partner(self, theta: Array, rows: Augmented, others: Augmented) -> None:
+        c, D, beta = self._kernel.c, self._D, np.exp(theta[-1])
+        inverse = 2.0 * np.exp(-2.0 * theta[1:-1])
+        weights = [beta * inverse, [inverse[a] * inverse[b] for a, b in self._pairs]]
+        flat = self._squares.reshape(self._squares.shape[0], -1)
+        np.matmul(np.concatenate(weights), flat, out=D.reshape(-1))
+        if c:
+            D += (c * (rows.A - 0.5 * c))[:, None]
+            D += c * (others.A - 0.5 * c)
+        np.sqrt(D, out=D)
+
+    def _contract(
+        self, W: Array, sf2: float, rows: Augmented, others: Augmented
+    ) -> Array:
+        """Return sum_ij W_ij dK_ij/dtheta.
+
+        For any parameter t, dk/dt = sf^2 [dN/dt - N/2 (dA/dt / A + dA'/dt / A')] / D.
+        So W/D and that times N are all that is needed, and their products with U and
+        1/A.
+        """
+        of_sf = 2.0 * float(np.vdot(W, self._K))
+        q = np.divide(W, self._D, out=W)
+        r = np.multiply(q, self._N, out=self._N)
+        of_shape = 2.0 * np.einsum("na,na->a", rows.U, q @ others.U)
+        of_shape -= (rows.U**2).T @ (r.sum(axis=1) / rows.A)
+        of_shape -= (others.U**2).T @ (r.sum(axis=0) / others.A)
+        of_shape *= sf2
+        # U_0^2 = beta and U_d^2 ~ l_d^-2: slopes of log beta and of -2 log l_d
+        return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])

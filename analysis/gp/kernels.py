@@ -1,0 +1,294 @@
+"""Covariance functions of Gaussian processes, and how they compose.
+
+A kernel over two sets of rows evaluates its matrix once and hands back, with it, a
+function that contracts any weight matrix W with the derivatives: sum_ij W_ij
+dK_ij/dtheta_k. No derivative matrix is ever formed, and a sum or product of kernels
+needs only the contractions of its parts: W for a sum, W times the other's matrix for a
+product.
+
+A search evaluates the same rows some hundred times. Fresh memory of a few hundred rows
+squared costs as much as what is computed in it, so an `Evaluator` keeps its own.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Protocol
+
+import numpy as np
+
+from analysis.data.series import Array
+
+# W -> sum_ij W_ij dK_ij/dtheta_k, shape (p,); W may be overwritten
+Contraction = Callable[[Array], Array]
+# theta -> K and its contraction; both are good until the next call
+Evaluator = Callable[[Array], tuple[Array, Contraction]]
+
+_LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
+_STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
+_MOVES = (-2.5, -1.2, 1.2, 2.5, 10.0)  # of log l, to another top; the last: not used
+
+
+class Kernel(Protocol):
+    """A covariance function with hyperparameters theta, natural logarithms."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the hyperparameters in the order of theta; sizes end in log_sf."""
+        ...
+
+    def matrix(self, theta: Array, X: Array, X_other: Array) -> Array:
+        """Return the covariances of the rows of X (n, d) and X_other (m, d): (n, m)."""
+        ...
+
+    def diagonal(self, theta: Array, X: Array) -> Array:
+        """Return k(x, x) of every row of X, shape (n,)."""
+        ...
+
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K, shape (n, m), and its contraction for any theta."""
+        ...
+
+    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
+        """Return sum_i w_i dk(x_i, x_i)/dtheta_k, shape (p,)."""
+        ...
+
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return points that a search may start with, each of shape (p,)."""
+        ...
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return points that may belong to another top than theta, each (p,)."""
+        ...
+
+    def bounds(self, sd_y: float, sd_x: Array) -> Array:
+        """Return the bounds of the search relative to the data, shape (p, 2)."""
+        ...
+
+
+class Composable:
+    """Gives a kernel its matrix, `+` and `*`."""
+
+    __slots__ = ()
+
+    def matrix(self: Kernel, theta: Array, X: Array, X_other: Array) -> Array:
+        """Return the covariances of the rows of X (n, d) and X_other (m, d): (n, m)."""
+        return self.over(X, X_other)(theta)[0]
+
+    def __add__(self: Kernel, other: Kernel) -> "Sum":
+        """Return the kernel of the sum of two independent functions."""
+        return Sum(self, other)
+
+    def __mul__(self: Kernel, other: Kernel) -> "Product":
+        """Return the kernel of the product of two independent functions."""
+        return Product(self, other)
+
+
+@dataclass(frozen=True, slots=True)
+class SquaredExponential(Composable):
+    """k = sf^2 exp(-1/2 sum_d (x_d - x'_d)^2 / l_d^2), one length per input (eq. 4).
+
+    Attributes:
+        dimensions: number of inputs d; theta = (log sf, log l_1 ... log l_d).
+    """
+
+    dimensions: int = 2
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the hyperparameters."""
+        return ("log_sf", *(f"log_l{d + 1}" for d in range(self.dimensions)))
+
+    def diagonal(self, theta: Array, X: Array) -> Array:
+        """Return sf^2 for every row."""
+        return np.full(X.shape[0], np.exp(2.0 * theta[0]))
+
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and its contraction for any theta."""
+        return _SquaredExponentialOver(X, X_other)
+
+    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
+        """Return 2 sf^2 sum_i w_i for sf and nothing for the lengths."""
+        slope = np.zeros(theta.size)
+        slope[0] = 2.0 * float(w @ self.diagonal(theta, X))
+        return slope
+
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return sf = sd(y)/2 with every pair of lengths."""
+        return [
+            np.log(np.concatenate([[0.5 * sd_y], lengths]))
+            for lengths in length_pairs(sd_x)
+        ]
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return theta with one length changed: shorter, longer, or not used."""
+        steps = np.eye(theta.size)[1:]
+        return [theta + size * step for step in steps for size in _MOVES]
+
+    def bounds(self, sd_y: float, sd_x: Array) -> Array:
+        """Return log sf in log sd(y) + [-6, 4], log l_d in log sd(x_d) + [-4, 6]."""
+        centre = np.log(np.concatenate([[sd_y], sd_x]))
+        span = np.array([[-6.0, 4.0]] + [[-4.0, 6.0]] * self.dimensions)
+        return centre[:, None] + span
+
+
+class _SquaredExponentialOver:
+    """A squared exponential over two sets of rows, in memory of its own."""
+
+    def __init__(self, X: Array, X_other: Array) -> None:
+        self._X, self._X_other = X, X_other
+        (n, d), m = X.shape, X_other.shape[0]
+        self._left, self._right = np.ones((n, d + 2)), np.ones((d + 2, m))
+        self._K = np.empty((n, m))
+
+    def __call__(self, theta: Array) -> tuple[Array, Contraction]:
+        """Return K and its contraction.
+
+        The exponent is one matrix product, 2 log sf - |z|^2/2 + z'z' - |z'|^2/2; what
+        rounding leaves above its largest value is cut off.
+        """
+        lengths, K = np.exp(theta[1:]), self._K
+        Z, Z_other = self._X / lengths, self._X_other / lengths
+        self._left[:, :-2], self._right[:-2] = Z, Z_other.T
+        self._left[:, -2] = 2.0 * theta[0] - 0.5 * np.einsum("nd,nd->n", Z, Z)
+        self._right[-1] = -0.5 * np.einsum("nd,nd->n", Z_other, Z_other)
+        np.matmul(self._left, self._right, out=K)
+        np.minimum(K, 2.0 * theta[0], out=K)
+        np.exp(K, out=K)
+        return K, lambda W: self._contract(W, Z, Z_other)
+
+    def _contract(self, W: Array, Z: Array, Z_other: Array) -> Array:
+        """Return sum_ij W_ij dK_ij/dtheta.
+
+        With G = W o K: sum_ij G_ij (x_i - x'_j)^2 = (x o x)'(G 1) + (x' o x')'(G' 1)
+        - 2 x'(G x'), so the lengths cost one product with G and no matrix of their own.
+        """
+        G = np.multiply(W, self._K, out=W)
+        row_sums, column_sums = G.sum(axis=1), G.sum(axis=0)
+        slopes_l = (Z * Z).T @ row_sums + (Z_other * Z_other).T @ column_sums
+        slopes_l -= 2.0 * np.einsum("nd,nd->d", Z, G @ Z_other)
+        return np.concatenate([[2.0 * row_sums.sum()], slopes_l])
+
+
+@dataclass(frozen=True, slots=True)
+class _Pair(Composable):
+    """Two kernels in one; theta is the left one's, then the right one's."""
+
+    left: Kernel
+    right: Kernel
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the hyperparameters, "a." before the left, "b." the right ones."""
+        left = (f"a.{name}" for name in self.left.names)
+        return (*left, *(f"b.{name}" for name in self.right.names))
+
+    def moves(self, theta: Array) -> Sequence[Array]:
+        """Return the moves of one part while the other stays."""
+        a, b = self._split(theta)
+        of_left = [np.concatenate([move, b]) for move in self.left.moves(a)]
+        return of_left + [np.concatenate([a, move]) for move in self.right.moves(b)]
+
+    def _split(self, theta: Array) -> tuple[Array, Array]:
+        count = len(self.left.names)
+        return theta[:count], theta[count:]
+
+    def _both(
+        self, left: Evaluator, right: Evaluator, theta: Array
+    ) -> tuple[tuple[Array, Contraction], tuple[Array, Contraction]]:
+        a, b = self._split(theta)
+        return left(a), right(b)
+
+
+@dataclass(frozen=True, slots=True)
+class Sum(_Pair):
+    """k = k_left + k_right."""
+
+    def diagonal(self, theta: Array, X: Array) -> Array:
+        """Return the sum of the variances, shape (n,)."""
+        a, b = self._split(theta)
+        return self.left.diagonal(a, X) + self.right.diagonal(b, X)
+
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and the contractions of both parts with the same W."""
+        left, right = self.left.over(X, X_other), self.right.over(X, X_other)
+
+        def at(theta: Array) -> tuple[Array, Contraction]:
+            (K_left, of_left), (K_right, of_right) = self._both(left, right, theta)
+            return K_left + K_right, lambda W: np.concatenate(
+                [of_left(W.copy()), of_right(W)]
+            )
+
+        return at
+
+    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
+        """Return the slopes of both parts, shape (p,)."""
+        a, b = self._split(theta)
+        left = self.left.diagonal_slope(a, X, w)
+        return np.concatenate([left, self.right.diagonal_slope(b, X, w)])
+
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return those of both side by side, the right ones with longer lengths."""
+        return _side_by_side(
+            self.left.design(sd_y, sd_x), self.right.design(sd_y, _LONGER * sd_x)
+        )
+
+    def bounds(self, sd_y: float, sd_x: Array) -> Array:
+        """Return the bounds of both parts, shape (p, 2)."""
+        return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(sd_y, sd_x)])
+
+
+@dataclass(frozen=True, slots=True)
+class Product(_Pair):
+    """k = k_left k_right; the left part carries the unit of y."""
+
+    def diagonal(self, theta: Array, X: Array) -> Array:
+        """Return the product of the variances, shape (n,)."""
+        a, b = self._split(theta)
+        return self.left.diagonal(a, X) * self.right.diagonal(b, X)
+
+    def over(self, X: Array, X_other: Array) -> Evaluator:
+        """Return what gives K and the contractions, each W weighed by the other's K."""
+        left, right = self.left.over(X, X_other), self.right.over(X, X_other)
+
+        def at(theta: Array) -> tuple[Array, Contraction]:
+            (K_left, of_left), (K_right, of_right) = self._both(left, right, theta)
+            return K_left * K_right, lambda W: np.concatenate(
+                [of_left(W * K_right), of_right(W * K_left)]
+            )
+
+        return at
+
+    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
+        """Return the slopes of both parts, weighed by the other's variance."""
+        a, b = self._split(theta)
+        left = self.left.diagonal_slope(a, X, w * self.right.diagonal(b, X))
+        right = self.right.diagonal_slope(b, X, w * self.left.diagonal(a, X))
+        return np.concatenate([left, right])
+
+    def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
+        """Return those of both; the right part is dimensionless with sf = 1."""
+        return _side_by_side(
+            self.left.design(sd_y, sd_x), self.right.design(2.0, _LONGER * sd_x)
+        )
+
+    def bounds(self, sd_y: float, sd_x: Array) -> Array:
+        """Return the bounds of both parts, shape (p, 2)."""
+        return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
+
+
+def length_pairs(sd_x: Array) -> list[Array]:
+    """Return lengths of d inputs, each of shape (d,), from rough to smooth.
+
+    Two inputs get every pair of four lengths; further ones take turns with these two.
+    """
+    return [np.resize(pair, sd_x.size) * sd_x for pair in product(_STRETCHES, repeat=2)]
+
+
+def _side_by_side(left: Sequence[Array], right: Sequence[Array]) -> list[Array]:
+    """Return pairs of points; those of the shorter list are used again."""
+    count = max(len(left), len(right))
+    return [
+        np.concatenate([left[k % len(left)], right[k % len(right)]])
+        for k in range(count)
+    ]

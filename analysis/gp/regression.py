@@ -1,0 +1,167 @@
+"""Gaussian process regression: the likeliest hyperparameters, and prediction.
+
+Equations 6 and 7 of the traction paper.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.gp.kernels import Kernel, SquaredExponential
+from analysis.gp.likelihood import Likelihood, factorise, split
+from analysis.gp.noise import ConstantNoise, Noise
+from analysis.gp.search import Optimum, Scores, Start, maximise, spread
+
+MINIMUM_ROWS = 20
+
+_ROUGH = 150  # rows by which the first starts are chosen
+_BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
+
+
+@dataclass(frozen=True, slots=True)
+class GaussianProcess:
+    """A fitted Gaussian process on standardised inputs.
+
+    Attributes:
+        kernel: covariance function.
+        noise: noise of the measurements.
+        theta: logarithms of the kernel's, then the noise's hyperparameters.
+        X: standardised training inputs, shape (n, d).
+        alpha: C^-1 (y - offset), shape (n,).
+        offset: what was taken off the training outputs: their mean, or nothing.
+        centre: mean of the training inputs, shape (d,).
+        scale: standard deviation of the training inputs, shape (d,); 1 if constant.
+        lml: log marginal likelihood of the training outputs, noise prior included.
+        starts: where every start of the search ended.
+        jitter: what the factorisation needed on the diagonal.
+        at_bound: hyperparameters at the edge of the search.
+    """
+
+    kernel: Kernel
+    noise: Noise
+    theta: Array
+    X: Array
+    alpha: Array
+    offset: float
+    centre: Array
+    scale: Array
+    lml: float
+    starts: tuple[Start, ...]
+    jitter: float
+    at_bound: tuple[str, ...]
+
+    def mean(self, inputs: Array) -> Array:
+        """Return the predictive mean at `inputs`, shape (m, d), in y's unit."""
+        theta, _ = split(self.kernel, self.theta)
+        Z = (inputs - self.centre) / self.scale
+        # multiplied as in `predict`, so that both agree to the last digit
+        blocks = [
+            self.alpha @ self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
+            for i in range(0, Z.shape[0], _BLOCK)
+        ]
+        return self.offset + np.concatenate([np.zeros(0), *blocks])
+
+    def predict(
+        self, inputs: Array, *, include_noise: bool = True
+    ) -> tuple[Array, Array]:
+        """Return the predictive mean and variance at `inputs`, shape (m, d).
+
+        Args:
+            inputs: rows in the units of the training inputs.
+            include_noise: variance of a measurement; False gives eq. (7), that of the
+                function itself.
+
+        Returns:
+            Mean and variance, each of shape (m,).
+        """
+        theta, theta_noise = split(self.kernel, self.theta)
+        Z = (inputs - self.centre) / self.scale
+        S = self.noise.variance(theta_noise, self.X) + self.jitter
+        L = factorise(self.kernel.matrix(theta, self.X, self.X), S).L
+        mean, variance = np.empty(Z.shape[0]), self.kernel.diagonal(theta, Z)
+        for i in range(0, Z.shape[0], _BLOCK):
+            cross = self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
+            mean[i : i + _BLOCK] = self.offset + self.alpha @ cross
+            half = solve_triangular(L, cross, lower=True, check_finite=False)
+            variance[i : i + _BLOCK] -= np.einsum("nm,nm->m", half, half)
+        variance = np.maximum(variance, 0.0)
+        if include_noise:
+            variance = variance + self.noise.variance(theta_noise, Z)
+        return mean, variance
+
+
+def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum:
+    """Return the hyperparameters of largest likelihood times the noise's prior."""
+    kernel, noise = model
+    likelihood = Likelihood(model, X, r)
+
+    def objective(theta: Array) -> tuple[float, Array]:
+        lml, slope = likelihood(theta)
+        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
+        slope[-prior_slope.size :] += prior_slope
+        return lml + prior, slope
+
+    every = -(-r.size // _ROUGH)
+    rough = Likelihood(model, X[::every], r[::every])
+    scores = Scores(rough.value, likelihood.value)
+    return maximise(model, objective, X, float(np.std(r)), scores)
+
+
+def fit_gp(
+    inputs: Array,
+    y: Array,
+    kernel: Kernel | None = None,
+    noise: Noise | None = None,
+    *,
+    is_centred: bool = True,
+) -> GaussianProcess:
+    """Return a Gaussian process fitted to `y`.
+
+    Args:
+        inputs: training inputs, shape (n, d); standardised here.
+        y: training outputs, shape (n,).
+        kernel: covariance function, by default squared exponential.
+        noise: noise of the measurements, by default constant.
+        is_centred: take the mean of `y` off first; False where another mean function
+            already was.
+
+    Raises:
+        SettingsError: fewer than 20 rows, or outputs that do not vary.
+    """
+    check_outputs(y)
+    kernel = kernel or SquaredExponential(inputs.shape[1])
+    noise = noise or ConstantNoise()
+    centre, scale = inputs.mean(axis=0), spread(inputs)
+    X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
+    optimum = posterior_search((kernel, noise), X, y - offset)
+    theta_kernel, theta_noise = split(kernel, optimum.theta)
+    K = kernel.matrix(theta_kernel, X, X)
+    factor = factorise(K, noise.variance(theta_noise, X))
+    return GaussianProcess(
+        kernel=kernel,
+        noise=noise,
+        theta=optimum.theta,
+        X=X,
+        alpha=factor.solve(y - offset),
+        offset=offset,
+        centre=centre,
+        scale=scale,
+        lml=optimum.lml,
+        starts=optimum.starts,
+        jitter=factor.jitter,
+        at_bound=optimum.at_bound,
+    )
+
+
+def check_outputs(y: Array) -> None:
+    """Raise SettingsError if `y` has fewer than 20 rows or does not vary."""
+    if y.size < MINIMUM_ROWS or np.ptp(y) == 0:
+        span = float(np.ptp(y)) if y.size else 0.0
+        raise SettingsError(
+            f"No Gaussian process from {y.size} samples spanning {span:.3g} N "
+            f"(at least {MINIMUM_ROWS} that differ).",
+            hint="Record more motion inside the window of velocities.",
+        )

@@ -1,0 +1,242 @@
+"""The search for hyperparameters: bounded quasi-Newton from three starts, always.
+
+One start misses the best optimum of a Gaussian process in every fourth fit or so, and
+no three fixed ones suit all data. The first two are therefore chosen among the points
+that a kernel offers, by the likelihood of a part of the rows. The third is chosen when
+these have reached their tops: as the noise is known by then, the likelihood of all rows
+tells where another top may be. A start that comes to stand just below a top that was
+reached before is left there.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.gp.kernels import Kernel
+from analysis.gp.noise import Noise
+
+Objective = Callable[[Array], tuple[float, Array]]
+Score = Callable[[Array], float]
+
+_HOPELESS = 1e25  # objective where no jitter helps
+_AT_BOUND = 1e-3
+_NOISE_STEP = 0.1  # the likelihood bends most along the noise: its steps are shorter
+_APART = 1.5  # of starts in one of the shape: two steps of the lengths offered
+_ELSEWHERE = 1.0  # a start nearer to a known top leads back to it
+_FLAT = 3.0  # logarithm from which on a length or bias makes no difference
+_SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
+
+
+class Scores(NamedTuple):
+    """What tells a search where to start; either may raise SettingsError.
+
+    Attributes:
+        rough: theta -> likelihood of a part of the rows.
+        exact: theta -> likelihood of all rows.
+    """
+
+    rough: Score
+    exact: Score
+
+
+class Start(NamedTuple):
+    """One start of the search and what it reached.
+
+    Attributes:
+        theta: hyperparameters at its end: a top, or just below the top of another.
+        lml: log marginal likelihood there, or a bound on it, priors included.
+        evaluations: how often the likelihood was evaluated.
+    """
+
+    theta: tuple[float, ...]
+    lml: float
+    evaluations: int
+
+
+class Optimum(NamedTuple):
+    """The best hyperparameters found and every start's result.
+
+    Attributes:
+        theta: hyperparameters of largest likelihood.
+        lml: log marginal likelihood there, or a bound on it, priors included.
+        starts: where every start ended.
+        began: where it began.
+        at_bound: hyperparameters at the edge of the search.
+    """
+
+    theta: Array
+    lml: float
+    starts: tuple[Start, ...]
+    began: tuple[Array, ...]
+    at_bound: tuple[str, ...]
+
+
+def maximise(
+    model: tuple[Kernel, Noise],
+    objective: Objective,
+    X: Array,
+    sd_y: float,
+    scores: Scores | None = None,
+) -> Optimum:
+    """Return the hyperparameters of largest likelihood.
+
+    Args:
+        model: kernel and noise; theta is the kernel's, then the noise's.
+        objective: theta -> likelihood and its slope; may raise SettingsError.
+        X: inputs, shape (n, d); they set the scale of starts and bounds.
+        sd_y: standard deviation of the outputs.
+        scores: what starts are chosen by, by default the objective itself.
+    """
+    kernel, noise = model
+    sd_x = spread(X)
+    bounds = np.vstack([kernel.bounds(sd_y, sd_x), noise.bounds(sd_y)])
+    steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
+    rough, exact = scores or (lambda theta: objective(theta)[0],) * 2
+    offered = [
+        np.concatenate([point, noise.start(sd_y)])
+        for point in kernel.design(sd_y, sd_x)
+    ]
+    began = _first_starts(kernel, offered, rough)
+    reached: list[Start] = []
+    for start in began:
+        reached.append(_climb(objective, start, (bounds, steps), reached))
+    began.append(_last_start(kernel, offered, exact, (began, reached), bounds))
+    reached.append(_climb(objective, began[-1], (bounds, steps), reached))
+    best = _finish(objective, (bounds, steps), reached)
+    theta = np.array(best.theta)
+    is_edge = np.abs(bounds - theta[:, None]).min(axis=1) < _AT_BOUND
+    edges = np.array([*kernel.names, *noise.names])[is_edge]
+    return Optimum(
+        theta, best.lml, tuple(reached), tuple(began), tuple(map(str, edges))
+    )
+
+
+def spread(X: Array) -> Array:
+    """Return the standard deviation of every column, 1 where it does not vary."""
+    sd = X.std(axis=0)
+    return np.where(np.ptp(X, axis=0) > 0, sd, 1.0)
+
+
+def _first_starts(
+    kernel: Kernel, offered: Sequence[Array], rough: Score
+) -> list[Array]:
+    """Return two of the points offered: the best, and the best that is far from it."""
+    ranked = sorted(offered, key=lambda theta: -_scored(rough, theta))
+    first, *others = ranked
+    far = [theta for theta in others if _gap(kernel, theta, [first]) >= _APART]
+    return [first, (far or others)[0]]
+
+
+def _last_start(
+    kernel: Kernel,
+    offered: Sequence[Array],
+    exact: Score,
+    known: tuple[Sequence[Array], Sequence[Start]],
+    bounds: Array,
+) -> Array:
+    """Return the likeliest point that may belong to another top.
+
+    That is a move from the best top that the kernel knows, or where it knows none, one
+    of the points offered; with the noise of that top.
+
+    Args:
+        kernel: its moves.
+        offered: points that a search may start with.
+        exact: theta -> likelihood of all rows.
+        known: where other starts began, and what they reached.
+        bounds: of theta, shape (p, 2).
+    """
+    began, reached = known
+    count = len(kernel.names)
+    tops = [np.array(top.theta) for top in reached]
+    best = tops[int(np.argmax([top.lml for top in reached]))]
+    moved = kernel.moves(best[:count])
+    unused = [t[:count] for t in offered if _gap(kernel, t, began) >= _APART]
+    points = [
+        np.clip(np.concatenate([point, best[count:]]), *bounds.T)
+        for point in moved or unused
+    ]
+    far = [point for point in points if _gap(kernel, point, tops) >= _ELSEWHERE]
+    return max(far or offered, key=lambda theta: _scored(exact, theta))
+
+
+def _gap(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
+    """Return how far theta is from the nearest of others in one of the shape."""
+    shape = [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
+    flat = np.minimum(np.vstack([theta, *others])[:, shape], _FLAT)
+    return float(np.abs(flat[1:] - flat[0]).max(axis=1).min())
+
+
+def _scored(score: Score, theta: Array) -> float:
+    try:
+        return score(theta)
+    except SettingsError:
+        return -np.inf
+
+
+def _climb(
+    objective: Objective,
+    start: Array,
+    box: tuple[Array, Array],
+    known: Sequence[Start],
+) -> Start:
+    """Return where a start ends: on a top, or just below one of those known.
+
+    Args:
+        objective: theta -> likelihood and its slope.
+        start: theta to begin with.
+        box: bounds of theta, shape (p, 2), and the size of its steps, shape (p,).
+        known: what other starts have reached.
+    """
+    from scipy.optimize import OptimizeResult, minimize
+
+    bounds, steps = box
+
+    def downhill(x: Array) -> tuple[float, Array]:
+        try:
+            lml, slope = objective(x * steps)
+        except SettingsError:
+            return _HOPELESS, np.zeros_like(x)
+        return -lml, -slope * steps
+
+    def look(intermediate_result: OptimizeResult) -> None:
+        if _is_below(intermediate_result.x * steps, -intermediate_result.fun, known):
+            raise StopIteration
+
+    found = minimize(
+        downhill,
+        np.clip(start, bounds[:, 0], bounds[:, 1]) / steps,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=bounds / steps[:, None],
+        callback=look,
+        options={"maxiter": 200, "gtol": 1e-5, "ftol": 2e-9},
+    )
+    theta = tuple(float(value) for value in found.x * steps)
+    return Start(theta, -float(found.fun), int(found.nfev))
+
+
+def _finish(
+    objective: Objective, box: tuple[Array, Array], reached: list[Start]
+) -> Start:
+    """Climb on from the best end, put what that reaches in its place and return it.
+
+    On a ridge a climb may stop short of the top; without its memory it goes on.
+    """
+    k = int(np.argmax([start.lml for start in reached]))
+    end, more = reached[k], _climb(objective, np.array(reached[k].theta), box, [])
+    best = max(end, more, key=lambda start: start.lml)
+    reached[k] = best._replace(evaluations=end.evaluations + more.evaluations)
+    return reached[k]
+
+
+def _is_below(theta: Array, lml: float, known: Sequence[Start]) -> bool:
+    """Return whether theta is just below a known top."""
+    near, low = _SAME_TOP
+    return any(
+        top.lml - low < lml <= top.lml and np.abs(theta - top.theta).max() < near
+        for top in known
+    )

@@ -1,0 +1,206 @@
+"""Tables of the report beyond the paper's: uncertainty, comparisons, trends."""
+
+from collections.abc import Sequence
+
+from analysis.findings.findings import Findings
+from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
+from analysis.report.page_model import ReportTable, Section
+from analysis.study.comparison import Paired, compare
+from analysis.study.models import TITLES
+from analysis.study.study import Study, TerrainResult, mean_of
+from analysis.terrains.identify import LEVELS
+
+_KEPT_PER_SECOND = 100
+_SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
+_HEADS = (
+    "RMSE [N]",
+    "NLPD [log N]",
+    "CRPS [N]",
+    "inside 50% band",
+    "90%",
+    "95%",
+    "variance [N²]",
+)
+
+
+def beyond_tables(found: Findings) -> list[ReportTable]:
+    """Return the tables beyond the paper's; one without rows is left out."""
+    study = found.study
+    tables = [
+        uncertainty(study),
+        *(paired_table(study, key, unit) for key, unit in _MEASURES),
+        noise_table(found),
+        *recognition_tables(found),
+        trend_table(found),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def uncertainty(study: Study) -> ReportTable:
+    """Return how honest the predicted uncertainties were."""
+    rows = [
+        [name, TITLES[model], *_cells(result, model)]
+        for name, result in study.terrains.items()
+        for model in study.options.fit.models
+        if result.models(model)
+    ]
+    return ReportTable(
+        name="Predicted uncertainty",
+        header=("terrain", "model", *_HEADS),
+        rows=rows,
+        note="Means over the trials left out. NLPD: negative log predictive density; "
+        "CRPS: continuous ranked probability score; both reward an honest spread, less "
+        "is better. A band that holds much less than it promises is too narrow. The "
+        "variance is that of a measurement, noise included.",
+        section=Section.BEYOND,
+    )
+
+
+def paired_table(study: Study, key: str, unit: str) -> ReportTable:
+    """Return every model against the first one, trial by trial."""
+    first, *others = study.options.fit.models
+    rows = [
+        [
+            name,
+            *(
+                paired_cell(
+                    compare(result.scores(first, key), result.scores(model, key))
+                )
+                for model in others
+            ),
+        ]
+        for name, result in study.terrains.items()
+        if others and result.models(first)
+    ]
+    return ReportTable(
+        name=f"{key.upper()} against {TITLES[first]}, trial by trial",
+        header=("terrain", *(f"{TITLES[model]} [{unit}]" for model in others)),
+        rows=rows,
+        note=f"Difference to {TITLES[first]} ± its standard error over the trials; "
+        "below zero is better. p: how often chance alone makes a difference as large, "
+        "by all patterns of signs.",
+        section=Section.BEYOND,
+    )
+
+
+def paired_cell(paired: Paired | None) -> str:
+    """Return a comparison as text."""
+    if paired is None:
+        return "–"
+    error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
+    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g})"
+
+
+def noise_table(found: Findings) -> ReportTable:
+    """Return which noise was chosen per terrain, and NLPD before and after."""
+    rows = [
+        [
+            s.terrain,
+            ", ".join(f"{name} in {n}" for name, n in s.counts.items() if n),
+            f"{s.before:.3f}",
+            f"{s.after:.3f}",
+            paired_cell(s.paired),
+        ]
+        for s in found.noise
+    ]
+    return ReportTable(
+        name="Noise chosen",
+        header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
+        rows=rows,
+        section=Section.BEYOND,
+    )
+
+
+def recognition_tables(found: Findings) -> list[ReportTable]:
+    """Return how well windows of motion tell the terrains apart; none for one."""
+    identification = found.identification
+    if identification is None:
+        return []
+    rules = (identification.by_density, identification.by_error)
+    rows = [
+        (
+            f"{size / _KEPT_PER_SECOND:g} s",
+            *(
+                f"{rule[size][level].accuracy:.2f}"
+                for rule in rules
+                for level in LEVELS
+            ),
+        )
+        for size in identification.sizes
+    ]
+    names = ("each terrain", "size of stones", "flat or rocky")
+    return [
+        ReportTable(
+            "Telling terrains apart",
+            (
+                "window",
+                *(f"by density: {name}" for name in names),
+                *(f"by error: {name}" for name in names),
+            ),
+            rows,
+            note="Share of windows recognised by models that never saw the trial, mean "
+            "over kinds. By error, the paper's rule: the model with the smallest mean "
+            "absolute error.",
+            section=Section.BEYOND,
+        )
+    ]
+
+
+def trend_table(found: Findings) -> ReportTable:
+    """Return repeatability and first-to-last trend of every terrain."""
+    rows = []
+    for name, trends in found.trends.items():
+        force, load, ratio = (
+            trends[key] for key in (MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO)
+        )
+        if force.means.size < 2:
+            continue
+        rows.append(
+            [
+                name,
+                str(force.means.size),
+                f"{force.means.mean():.2f} ± {force.spread:.2f}",
+                slope_cell(force),
+                f"{ratio.means.mean():.2f} ± {ratio.spread:.2f}",
+                slope_cell(ratio),
+                f"{load.means.mean():.2f} ± {load.spread:.2f}",
+            ]
+        )
+    return ReportTable(
+        name="Repeatability, and change from first to last trial",
+        header=(
+            "terrain",
+            "trials",
+            "F_t [N]",
+            "F_t per trial [N]",
+            "F_t/F_n",
+            "F_t/F_n per trial",
+            "F_n [N]",
+        ),
+        rows=rows,
+        note="Means of the trials ± their standard deviation; slopes ± standard error. "
+        "A slope of more than two standard errors points to wear of the terrain.",
+        section=Section.BEYOND,
+    )
+
+
+def slope_cell(trend: Trend) -> str:
+    """Return a slope with its standard error as text, – where there is none."""
+    if trend.slope is None or trend.slope_error is None:
+        return "–"
+    return f"{trend.slope:+.3f} ± {trend.slope_error:.3f}"
+
+
+_MEASURES: Sequence[tuple[str, str]] = (("mae", "N"), ("nlpd", "log N"))
+
+
+def _cells(result: TerrainResult, model: str) -> list[str]:
+    scores = {key: mean_of(result.scores(model, key)) for key in _SHOWN}
+    return [
+        "–"
+        if value is None
+        else f"{value:.1%}"
+        if key.startswith("coverage")
+        else f"{value:.3f}"
+        for key, value in scores.items()
+    ]

@@ -1,0 +1,181 @@
+"""The report: one HTML file that needs nothing else, and every number beside it.
+
+The one door to jinja2.
+"""
+
+import base64
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from analysis.findings.as_numbers import findings_rows, plain_findings
+from analysis.findings.findings import Findings, find
+from analysis.findings.rig_health import RigTrial
+from analysis.report.further_tables import beyond_tables
+from analysis.report.gallery import exhibits
+from analysis.report.page_model import Exhibit, ReportTable, Section
+from analysis.report.paper_tables import (
+    choices,
+    parameters,
+    summary,
+    table_one,
+    velocity_shares,
+    verdicts,
+)
+from analysis.report.rig_tables import rig_tables
+from analysis.study.atomic_files import write_atomic
+from analysis.study.fits import to_csv, to_fits, to_plain
+from analysis.study.jobs import available_cores
+from analysis.study.study import Study
+
+__all__ = ["ReportContext", "ReportTable", "write_report"]
+
+_MOST_DRAWING = 4  # processes
+_MANY_TERRAINS = 4  # from which on they pay
+_NO_RIG = (
+    "The tables do not tell how the rig behaved: its health and its limits are unknown."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ReportContext:
+    """What a report says beyond the study itself.
+
+    Attributes:
+        title: heading of the page.
+        subtitle: line below it.
+        is_simulated: the trials were simulated; marks the page.
+        is_foreign: the tables come from elsewhere, not from this rig.
+        generated_utc: when the report was made, as text.
+        tables: further tables, each for its section.
+        warnings: further warnings, shown first.
+        rig: health of the rig by trial.
+        facts: further plain values for fits.json, by name.
+    """
+
+    title: str
+    subtitle: str
+    is_simulated: bool
+    is_foreign: bool
+    generated_utc: str
+    tables: Sequence[ReportTable] = field(default=())
+    warnings: Sequence[str] = field(default=())
+    rig: Sequence[RigTrial] = field(default=())
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """SIMULATED, FOREIGN or LIVE."""
+        if self.is_simulated:
+            return "SIMULATED"
+        return "FOREIGN" if self.is_foreign else "LIVE"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One section of the page with everything in it.
+
+    Attributes:
+        section: which one.
+        sentences: what it says first.
+        tables: its tables, before the figures.
+        exhibits: its figures.
+    """
+
+    section: Section
+    sentences: Sequence[str]
+    tables: Sequence[ReportTable]
+    exhibits: Sequence[Exhibit]
+
+
+def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
+    """Write the report of a study and return the path of its page.
+
+    Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, *.pdf;
+    each file is replaced whole, the page last.
+
+    Raises:
+        SettingsError: the folder cannot be written.
+    """
+    found = find(study, context.rig)
+    fits = json.dumps(all_numbers(found, context), allow_nan=False, indent=1)
+    write_atomic(out_dir / "fits.json", fits.encode())
+    table = to_csv(study, findings_rows(found))
+    write_atomic(out_dir / "fits.csv", table.encode())
+    shown = exhibits(found, _processes(study))
+    for exhibit in shown:
+        picture = exhibit.picture
+        write_atomic(out_dir / "figures" / f"{picture.key}.png", picture.png)
+        write_atomic(out_dir / "figures" / f"{picture.key}.pdf", picture.pdf)
+    page = out_dir / "report" / "index.html"
+    write_atomic(page, render_page(found, shown, context).encode())
+    return page
+
+
+def _processes(study: Study) -> int:
+    """Return how many processes draw; few panels cost less than starting one."""
+    if len(study.terrains) < _MANY_TERRAINS:
+        return 1
+    return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)
+
+
+def all_numbers(found: Findings, context: ReportContext) -> dict[str, Any]:
+    """Return everything that the report shows as plain values, for fits.json."""
+    tables = [
+        asdict(table) | {"section": table.section.value} for table in context.tables
+    ]
+    further = {"findings": plain_findings(found), "tables": tables, **context.facts}
+    return to_fits(found.study) | to_plain(further)
+
+
+def render_page(
+    found: Findings, shown: Sequence[Exhibit], context: ReportContext
+) -> str:
+    """Return the page as HTML; every text is escaped, every picture embedded."""
+    environment = Environment(
+        loader=PackageLoader("analysis"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
+    environment.filters["unbroken"] = lambda text: text.replace(" ± ", "\u00a0±\u00a0")
+    study = found.study
+    return environment.get_template("report.html.j2").render(
+        context=context,
+        parts=parts(found, shown, context),
+        warnings=[*context.warnings, *study.warnings],
+        notes=[*study.notes, *([] if context.rig else [_NO_RIG])],
+    )
+
+
+def parts(
+    found: Findings, shown: Sequence[Exhibit], context: ReportContext
+) -> list[Part]:
+    """Return the sections that have something to show, in the order of the page."""
+    study = found.study
+    tables = [
+        summary(study),
+        parameters(study),
+        table_one(study),
+        *beyond_tables(found),
+        velocity_shares(study),
+        *rig_tables(found),
+        choices(study, is_foreign=context.is_foreign),
+        *context.tables,
+    ]
+    every = [
+        Part(
+            section,
+            verdicts(study) if section is Section.SUMMARY else (),
+            [table for table in tables if table.section is section],
+            [exhibit for exhibit in shown if exhibit.section is section],
+        )
+        for section in Section
+    ]
+    return [part for part in every if part.tables or part.exhibits]

@@ -1,0 +1,114 @@
+"""How well predictions met measurements."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.data.series import Array
+
+_SMALLEST_SD = 1e-6  # N; a fit without any error is scored as if it had this one
+
+
+class Prediction(NamedTuple):
+    """A predicted F_t with its uncertainty.
+
+    Attributes:
+        mean: predicted F_t [N], shape (n,).
+        sd: standard deviation of a measurement around it [N], noise included, (n,).
+        nu: degrees of freedom of Student's t, above 2; infinite for a normal.
+    """
+
+    mean: Array
+    sd: Array
+    nu: float = np.inf
+
+    @property
+    def scale(self) -> Array:
+        """Scale of Student's t with this standard deviation [N]; sd for a normal."""
+        factor = 1.0 if np.isinf(self.nu) else np.sqrt((self.nu - 2.0) / self.nu)
+        return factor * np.maximum(self.sd, _SMALLEST_SD)
+
+
+class Score(NamedTuple):
+    """Errors of one model on one trial.
+
+    Attributes:
+        mae: mean absolute error [N].
+        rmse: root mean square error [N].
+        coverage95: share of measurements inside the 95 % band [-].
+        variance: mean predictive variance, noise included [N^2].
+        nlpd: mean negative log predictive density [log of N].
+        crps: mean continuous ranked probability score [N].
+        coverage50: share of measurements inside the 50 % band [-].
+        coverage90: share of measurements inside the 90 % band [-].
+    """
+
+    mae: float
+    rmse: float
+    coverage95: float
+    variance: float
+    nlpd: float
+    crps: float
+    coverage50: float
+    coverage90: float
+
+
+def score(F_t: Array, prediction: Prediction) -> Score:
+    """Return the errors of a prediction of F_t [N], shape (n,) with n >= 1."""
+    error = np.abs(F_t - prediction.mean)
+    return Score(
+        mae=float(error.mean()),
+        rmse=float(np.sqrt(np.mean(error**2))),
+        coverage95=coverage(F_t, prediction, 0.95),
+        variance=float(np.mean(prediction.sd**2)),
+        nlpd=float(-np.mean(log_density(F_t, prediction))),
+        crps=float(np.mean(ranked_probability(F_t, prediction))),
+        coverage50=coverage(F_t, prediction, 0.50),
+        coverage90=coverage(F_t, prediction, 0.90),
+    )
+
+
+def coverage(F_t: Array, prediction: Prediction, share: float) -> float:
+    """Return how many of F_t [N] lie in the central band that should hold `share`."""
+    from scipy.special import ndtri, stdtrit
+
+    upper = 0.5 * (1.0 + share)
+    is_normal = np.isinf(prediction.nu)
+    width = float(ndtri(upper) if is_normal else stdtrit(prediction.nu, upper))
+    return float(np.mean(np.abs(F_t - prediction.mean) <= width * prediction.scale))
+
+
+def log_density(F_t: Array, prediction: Prediction) -> Array:
+    """Return the log density of every measurement F_t [N], shape (n,)."""
+    from scipy.special import gammaln
+
+    scale, nu = prediction.scale, prediction.nu
+    z2 = ((F_t - prediction.mean) / scale) ** 2
+    if np.isinf(nu):
+        return -0.5 * z2 - np.log(scale) - 0.5 * np.log(2.0 * np.pi)
+    constant = gammaln(0.5 * (nu + 1.0)) - gammaln(0.5 * nu) - 0.5 * np.log(nu * np.pi)
+    return constant - 0.5 * (nu + 1.0) * np.log1p(z2 / nu) - np.log(scale)
+
+
+def ranked_probability(F_t: Array, prediction: Prediction) -> Array:
+    """Return the continuous ranked probability score [N] of every F_t, shape (n,).
+
+    The integral of (distribution - step)^2: normal and Student's t in closed form
+    (Gneiting and Raftery 2007; Jordan, Krueger and Lerch 2019).
+    """
+    from scipy.special import beta, ndtr, stdtr
+
+    scale, nu = prediction.scale, prediction.nu
+    z = (F_t - prediction.mean) / scale
+    density = scale * np.exp(log_density(F_t, prediction))
+    if np.isinf(nu):
+        return scale * (z * (2.0 * ndtr(z) - 1.0) + 2.0 * density - 1 / np.sqrt(np.pi))
+    spread = 2.0 * np.sqrt(nu) / (nu - 1.0) * beta(0.5, nu - 0.5)
+    spread /= beta(0.5, 0.5 * nu) ** 2
+    tail = 2.0 * density * (nu + z * z) / (nu - 1.0)
+    return scale * (z * (2.0 * stdtr(nu, z) - 1.0) + tail - spread)
+
+
+def mean_absolute_error(F_t: Array, mean: Array) -> float:
+    """Return the mean absolute error [N] of predicted means."""
+    return float(np.mean(np.abs(F_t - mean)))

@@ -1,0 +1,258 @@
+"""The models of a study by name, each fitted to the same rows.
+
+The five of Fig. 9 are the default; two more go beyond the paper: noise chosen per
+terrain, and all samples through a sparse process.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import lru_cache
+from typing import Any, Protocol
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.rows import Training
+from analysis.data.series import Array
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import Kernel, SquaredExponential
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import GaussianProcess, fit_gp
+from analysis.gp.sparse import INDUCING, SparseProcess, fit_sparse
+from analysis.study.metrics import Prediction
+from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
+from analysis.tustin.model import TustinBounds, TustinFit, TustinForm, fit_tustin
+
+TUSTIN = "tustin"
+GP_SE = "gp_se"
+GP_NN = "gp_nn"
+GP_SE_TUSTIN = "gp_se_tustin"
+GP_NN_TUSTIN = "gp_nn_tustin"
+GP_SE_NOISE = "gp_se_noise"
+GP_SE_ALL = "gp_se_all"
+TITLES = {
+    TUSTIN: "Tustin",
+    GP_SE: "GP (SE)",
+    GP_NN: "GP (NN)",
+    GP_SE_TUSTIN: "GP (SE, Tustin mean)",
+    GP_NN_TUSTIN: "GP (NN, Tustin mean)",
+    GP_SE_NOISE: "GP (SE, noise chosen)",
+    GP_SE_ALL: "GP (SE, all samples)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class FitOptions:
+    """How models are fitted.
+
+    Attributes:
+        bounds: box of the Tustin fit.
+        gp_points: number of training rows of a Gaussian process.
+        seed: seed of the choice of those rows.
+        models: names of the models, by default the five of Fig. 9.
+        form: variant and loss of the Tustin fit.
+        is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
+        inducing: inducing points of the process of all samples.
+        draws: mixtures of trials for the intervals of Tustin parameters; 0 for none.
+
+    Raises:
+        SettingsError: an unknown model, or fewer than one point.
+    """
+
+    bounds: TustinBounds = field(default_factory=TustinBounds)
+    gp_points: int = 300
+    seed: int = 0
+    models: tuple[str, ...] = (TUSTIN, GP_SE, GP_NN, GP_SE_TUSTIN, GP_NN_TUSTIN)
+    form: TustinForm = field(default_factory=TustinForm)
+    is_nn_as_printed: bool = False
+    inducing: int = INDUCING
+    draws: int = 200
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.models if name not in TITLES]
+        if unknown or min(self.gp_points, self.inducing) < 1:
+            raise SettingsError(
+                f"No study of {', '.join(unknown) or 'the models'} with "
+                f"{self.gp_points} points, {self.inducing} of them inducing.",
+                hint=f"The models are {', '.join(TITLES)}; give at least one point.",
+            )
+
+
+class FittedModel(Protocol):
+    """A model of F_t over (F_n, v_t), fitted."""
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What a reader must know before believing its parameters."""
+        ...
+
+    def mean(self, F_n: Array, v_t: Array) -> Array:
+        """Return the predicted F_t [N], shape (n,)."""
+        ...
+
+    def predict(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return the predicted F_t and its standard deviation [N], shape (n,)."""
+        ...
+
+    def describe(self) -> dict[str, Any]:
+        """Return parameters and record of the fit as plain values."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class TustinModel:
+    """The Tustin curve with the constant spread of its residual."""
+
+    fit: TustinFit
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Flags of the fit."""
+        return self.fit.flags
+
+    def mean(self, F_n: Array, v_t: Array) -> Array:
+        """Return F_t [N] by eq. (1)."""
+        return self.fit.mean(F_n, v_t)
+
+    def predict(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return the curve and the residual's standard deviation [N]."""
+        mean = self.mean(F_n, v_t)
+        return Prediction(mean, np.full(mean.shape, self.fit.residual_sd))
+
+    def describe(self) -> dict[str, Any]:
+        """Return the five parameters."""
+        return asdict(self.fit.parameters)
+
+
+@dataclass(frozen=True, slots=True)
+class GpModel:
+    """A Gaussian process over (F_n, v_t), alone or around a Tustin curve.
+
+    Attributes:
+        process: the process of F_t, or of its residual around the curve.
+        curve: Tustin fit that is its mean function.
+        tails: Student's t in the place of the normal noise.
+        choice: how its noise was chosen.
+    """
+
+    process: GaussianProcess | SparseProcess
+    curve: TustinFit | None = None
+    tails: TailedNoise | None = None
+    choice: NoiseChoice | None = None
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Hyperparameters at the edge of the search; a long length = input unused."""
+        is_sparse = isinstance(self.process, SparseProcess)  # needs its jitter always
+        jitter = ("jitter added",) if self.process.jitter and not is_sparse else ()
+        return tuple(f"{name} at bound" for name in self.process.at_bound) + jitter
+
+    def mean(self, F_n: Array, v_t: Array) -> Array:
+        """Return the predictive mean [N]."""
+        return self._around(self.process.mean(np.column_stack([F_n, v_t])), F_n, v_t)
+
+    def predict(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return the predictive mean and standard deviation [N], noise included."""
+        mean, variance = self.process.predict(np.column_stack([F_n, v_t]))
+        normal = Prediction(self._around(mean, F_n, v_t), np.sqrt(variance))
+        return normal if self.tails is None else self.tails.applied_to(normal)
+
+    def describe(self) -> dict[str, Any]:
+        """Return hyperparameters, likelihood, starts, jitter and standardisation."""
+        gp = self.process
+        names = (*gp.kernel.names, *gp.noise.names)
+        return {
+            "theta": dict(zip(names, gp.theta.tolist(), strict=True)),
+            "lml": gp.lml,
+            "starts": [s._asdict() | {"theta": list(s.theta)} for s in gp.starts],
+            "jitter": gp.jitter,
+            "centre": gp.centre.tolist(),
+            "scale": gp.scale.tolist(),
+            "offset": gp.offset,
+            "curve": None if self.curve is None else asdict(self.curve.parameters),
+            "tails": None if self.tails is None else self.tails._asdict(),
+            "noise": None if self.choice is None else self.choice._asdict(),
+        }
+
+    def _around(self, mean: Array, F_n: Array, v_t: Array) -> Array:
+        return mean if self.curve is None else mean + self.curve.mean(F_n, v_t)
+
+
+Fitter = Callable[[Training, FitOptions], FittedModel]
+
+
+@lru_cache(maxsize=1)  # three models of a fold share it
+def tustin_of(training: Training, options: FitOptions) -> TustinFit:
+    """Return the Tustin fit of all training rows."""
+    rows = training.rows
+    return fit_tustin(rows.F_n, rows.v_t, rows.F_t, options.bounds, options.form)
+
+
+def _fit_tustin(training: Training, options: FitOptions) -> FittedModel:
+    return TustinModel(tustin_of(training, options))
+
+
+def _fit_gp(kernel: Kernel, training: Training) -> GpModel:
+    return GpModel(fit_gp(training.subset.inputs, training.subset.F_t, kernel))
+
+
+def _fit_around_tustin(
+    kernel: Kernel, training: Training, options: FitOptions
+) -> GpModel:
+    """Tustin by all rows, then a zero-mean process on the residuals of the chosen."""
+    curve, subset = tustin_of(training, options), training.subset
+    residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
+    process = fit_gp(subset.inputs, residual, kernel, is_centred=False)
+    return GpModel(process, curve)
+
+
+def _fit_with_chosen_noise(training: Training, options: FitOptions) -> FittedModel:
+    choice = choose_noise(training, options.gp_points, options.seed)
+    noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
+    process = fit_gp(training.subset.inputs, training.subset.F_t, None, noise)
+    tails = None
+    if choice.chosen == "student":
+        tails = TailedNoise.of(process, training)
+    return GpModel(process, tails=tails, choice=choice)
+
+
+def _fit_all_samples(training: Training, options: FitOptions) -> FittedModel:
+    rows = training.rows
+    return GpModel(fit_sparse(rows.inputs, rows.F_t, inducing=options.inducing))
+
+
+def _nn(options: FitOptions) -> Arcsine:
+    return Arcsine(as_printed=options.is_nn_as_printed)
+
+
+_SE = SquaredExponential()
+
+# the five of Fig. 9, in its order
+FITTERS: Mapping[str, Fitter] = {
+    TUSTIN: _fit_tustin,
+    GP_SE: lambda training, _: _fit_gp(_SE, training),
+    GP_NN: lambda training, options: _fit_gp(_nn(options), training),
+    GP_SE_TUSTIN: lambda training, options: _fit_around_tustin(_SE, training, options),
+    GP_NN_TUSTIN: lambda training, options: _fit_around_tustin(
+        _nn(options), training, options
+    ),
+}
+# beyond the paper, where FitOptions.models asks for them
+BEYOND: Mapping[str, Fitter] = {
+    GP_SE_NOISE: _fit_with_chosen_noise,
+    GP_SE_ALL: _fit_all_samples,
+}
+
+
+def fit_model(name: str, training: Training, options: FitOptions) -> FittedModel:
+    """Return the model `name` fitted to the training rows.
+
+    Raises:
+        SettingsError: no such model, or rows that it cannot be fitted to.
+    """
+    fit = FITTERS.get(name) or BEYOND.get(name)
+    if fit is None:
+        raise SettingsError(
+            f"There is no model {name!r}.", hint=f"The models are {', '.join(TITLES)}."
+        )
+    return fit(training, options)

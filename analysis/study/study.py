@@ -1,0 +1,250 @@
+"""A study: all terrains prepared, folded, fitted and compared."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.events import Slip, find_slips
+from analysis.data.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
+from analysis.data.rows import Rows
+from analysis.data.series import TractionSeries
+from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
+from analysis.study.jobs import Progress, Store, Workers, run_tasks
+from analysis.study.models import FitOptions
+from analysis.study.terrain_fit import TerrainFit, TerrainTask, fit_terrain
+
+LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
+
+
+@dataclass(frozen=True, slots=True)
+class StudyOptions:
+    """Every choice of a study.
+
+    Attributes:
+        prepare: smoothing, thinning and window.
+        fit: bounds, number of points and seed.
+        n_jobs: worker processes; None = one per core. Does not change the results.
+        scheduler: address of a Dask scheduler to work for; None = this machine. Does
+            not change them either.
+    """
+
+    prepare: PrepareOptions = field(default_factory=PrepareOptions)
+    fit: FitOptions = field(default_factory=FitOptions)
+    n_jobs: int | None = None
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainResult:
+    """One terrain of a study.
+
+    Attributes:
+        terrain: its name.
+        trials: its prepared trials.
+        slips: the slips of every trial.
+        folds: its folds; a trial without kept samples has none.
+        whole: the Tustin fit of all its trials, with intervals.
+    """
+
+    terrain: str
+    trials: tuple[PreparedTrial, ...]
+    slips: tuple[tuple[Slip, ...], ...]
+    folds: tuple[FoldResult, ...]
+    whole: TerrainFit
+
+    def per_trial(
+        self, model: str, measure: Callable[[ModelFold], float]
+    ) -> list[float | None]:
+        """Return a measure of a model's fold for every trial, None where missing."""
+        values: list[float | None] = [None] * len(self.trials)
+        for fold in self.folds:
+            if model in fold.models:
+                values[fold.fold] = measure(fold.models[model])
+        return values
+
+    def scores(self, model: str, key: str) -> list[float | None]:
+        """Return the measure `key` of a model on every trial, None where missing."""
+        return self.per_trial(model, lambda fold: getattr(fold.score, key))
+
+    def maes(self, model: str) -> list[float | None]:
+        """Return the mean absolute error [N] on every trial, left out in turn."""
+        return self.scores(model, "mae")
+
+    def mae(self, model: str) -> float | None:
+        """Return the mean over folds of the mean absolute error [N]."""
+        return mean_of(self.maes(model))
+
+    @property
+    def constant_mae(self) -> float | None:
+        """Error [N] of always predicting the training rows' median F_t."""
+        return mean_of([fold.constant_mae for fold in self.folds])
+
+    @property
+    def kept(self) -> int:
+        """Number of kept samples of all trials."""
+        return sum(trial.kept for trial in self.trials)
+
+    @property
+    def lifted_share(self) -> float:
+        """Share of the kept samples with F_n <= 0: the foot off the ground."""
+        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
+        return lifted / self.kept if self.kept else 0.0
+
+    def models(self, name: str) -> list[ModelFold]:
+        """Return the folds of the model `name`."""
+        return [fold.models[name] for fold in self.folds if name in fold.models]
+
+
+@dataclass(frozen=True, slots=True)
+class Study:
+    """The one result object of an analysis.
+
+    Attributes:
+        simulated: the trials were simulated.
+        options: every choice that was made.
+        terrains: results by terrain, in the order given.
+        notes: what could not be done, and why.
+        warnings: what a reader should doubt.
+    """
+
+    simulated: bool
+    options: StudyOptions
+    terrains: Mapping[str, TerrainResult]
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def cross(self, model: str) -> dict[str, dict[str, float | None]]:
+        """Return the mean absolute errors [N]: model's terrain -> tested terrain."""
+        return {
+            name: {
+                tested: result.mae(model)
+                if tested == name
+                else _cross_mae(result, model, tested)
+                for tested in self.terrains
+            }
+            for name, result in self.terrains.items()
+            if result.models(model)
+        }
+
+
+def run_study(
+    trials: Mapping[str, Sequence[TractionSeries]],
+    options: StudyOptions,
+    simulated: bool,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> Study:
+    """Return the analysis of all trials.
+
+    Args:
+        trials: recorded trials by terrain.
+        options: every choice.
+        simulated: the trials were simulated; marks every product.
+        progress: called with (fits done, fits in all): folds, then whole terrains.
+        store: results of earlier runs, so that an interrupted study resumes.
+
+    Raises:
+        SettingsError: there is no trial at all.
+    """
+    if not any(trials.values()):
+        raise SettingsError("There is no trial to analyse.", hint="Record some first.")
+    prepared = {
+        terrain: tuple(prepare(series, options.prepare) for series in recorded)
+        for terrain, recorded in trials.items()
+    }
+    tasks, notes = plan_folds(prepared, options.fit)
+    workers, whole_tasks = (
+        Workers(options.n_jobs, options.scheduler),
+        _wholes(prepared, options),
+    )
+    first, second = _in_turn(progress, len(tasks), len(whole_tasks))
+    folds = run_tasks(run_fold, tasks, workers, first, store)
+    wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
+    notes += [note for fold in folds for note in fold.notes]
+    results = {
+        terrain: TerrainResult(
+            terrain=terrain,
+            trials=kept,
+            slips=tuple(find_slips(trial.smooth) for trial in kept),
+            folds=tuple(fold for fold in folds if fold.terrain == terrain),
+            whole=whole,
+        )
+        for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
+    }
+    warnings = tuple(
+        warning
+        for result in results.values()
+        for warning in _warnings(result, options.prepare.container_travel is not None)
+    )
+    return Study(simulated, options, results, tuple(notes), warnings)
+
+
+def _in_turn(
+    progress: Progress | None, first: int, second: int
+) -> tuple[Progress | None, Progress | None]:
+    """Return one progress as that of two runs of tasks, one after the other."""
+    if progress is None:
+        return None, None
+    total = first + second
+    return (
+        lambda done, _: progress(done, total),
+        lambda done, _: progress(first + done, total),
+    )
+
+
+def _wholes(
+    prepared: Mapping[str, Sequence[PreparedTrial]], options: StudyOptions
+) -> list[TerrainTask]:
+    return [
+        TerrainTask(terrain, tuple(Rows.of([t]) for t in trials if t.kept), options.fit)
+        for terrain, trials in prepared.items()
+    ]
+
+
+def mean_of(values: Sequence[float | None]) -> float | None:
+    """Return the mean of the values that exist, None if none does."""
+    present = [value for value in values if value is not None]
+    return float(np.mean(present)) if present else None
+
+
+def _cross_mae(result: TerrainResult, model: str, tested: str) -> float | None:
+    errors = [e for fold in result.models(model) for e in fold.cross[tested]]
+    return mean_of(errors)
+
+
+def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
+    warnings = []
+    if result.lifted_share > LIFTED_WARNING:
+        warnings.append(
+            f"{result.terrain}: F_n <= 0 in {result.lifted_share:.1%} of the kept "
+            f"samples (limit {LIFTED_WARNING:.0%}). Suspect the tare or the plane of "
+            "the terrain."
+        )
+    short = [k + 1 for k, t in enumerate(result.trials) if not t.is_countable]
+    if short:
+        warnings.append(
+            f"{result.terrain}: too short to count - under {MINIMUM_KEPT} kept samples"
+            f"{', or the container not crossed' if has_container else ''} - in "
+            f"{len(short)} of {len(result.trials)} trials, analysed all the same "
+            f"(trial {', '.join(map(str, short))})."
+        )
+    dropped = sum(trial.dropped_rows for trial in result.trials)
+    if dropped:
+        warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
+    repeated = sum(trial.repeated_rows for trial in result.trials)
+    if repeated:
+        warnings.append(f"{result.terrain}: {repeated} rows were there twice; dropped.")
+    constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
+    if constant:
+        warnings.append(
+            f"{result.terrain}: {' and '.join(constant)} never varies, so no model "
+            "can tell what it does."
+        )
+    return warnings
+
+
+def _is_constant(trials: Sequence[PreparedTrial], column: str) -> bool:
+    values = np.concatenate([getattr(trial, column) for trial in trials])
+    return values.size > 1 and float(np.ptp(values)) == 0.0

@@ -1,0 +1,242 @@
+"""The terrain database: fitted models of terrains in one file for other programs.
+
+A JSON object, nothing that is executed:
+
+    format "traction-terrain-db", version 1, made_utc, simulated, default (a model)
+    axes   F_n [N] and v_t [m/s], increasing, the points of every table
+    terrains NAME: kind, trials, samples, rho (correlation of neighbouring residuals),
+        limits {window: mean strain that 99 % of its own windows stay below},
+        models MODEL: title, parameters, mean [N] and sd [N], one row per F_n
+
+Between the points of a table values are linear; outside of it they are those of its
+edge. `load` checks everything before it believes it.
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.errors import SettingsError
+from analysis.data.series import Array
+from analysis.study.metrics import Prediction
+from analysis.terrains.table import Table
+
+FORMAT, VERSION = "traction-terrain-db", 1
+_LARGEST = 64_000_000  # bytes
+_MOST_POINTS = 400  # of an axis
+_MOST_TERRAINS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What is to be expected of a terrain at one point.
+
+    Attributes:
+        mean: traction [N].
+        sd: its standard deviation [N], noise included.
+    """
+
+    mean: float
+    sd: float
+
+    def quantile(self, share: float) -> float:
+        """Return the traction [N] that is not reached with probability `share`."""
+        from scipy.special import ndtri
+
+        return self.mean + self.sd * float(ndtri(share))
+
+
+@dataclass(frozen=True, slots=True)
+class KnownTerrain:
+    """One terrain of a database.
+
+    Attributes:
+        name: of the terrain.
+        kind: "small", "big", "flat" or a word of its own.
+        trials: it was fitted to so many trials,
+        samples: with so many samples.
+        rho: correlation of its residuals from one kept sample to the next.
+        limits: mean strain by window size that its own windows stay below.
+        tables: by name of the model.
+        parameters: of every model, as fitted.
+        default: name of the model that answers.
+    """
+
+    name: str
+    kind: str
+    trials: int
+    samples: int
+    rho: float
+    limits: Mapping[int, float]
+    tables: Mapping[str, Table]
+    parameters: Mapping[str, Any]
+    default: str
+
+    def predict(self, F_n: float, v_t: float, model: str = "") -> Answer:
+        """Return the traction to expect.
+
+        Args:
+            F_n: normal force [N].
+            v_t: slip velocity [m/s].
+            model: name of a model; "" = the default.
+
+        Raises:
+            SettingsError: there is no such model.
+        """
+        return Answer(*self._table(model).at(F_n, v_t))
+
+    def predict_many(self, F_n: Array, v_t: Array, model: str = "") -> Prediction:
+        """Return the same for many points, shape (n,)."""
+        return self._table(model).over(np.asarray(F_n), np.asarray(v_t))
+
+    def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> float:
+        """Return the probability that less than `required` [N] of traction is there.
+
+        What a walking controller asks before it puts its weight on: at a load F_n [N],
+        is the traction that the step needs available? Velocities below the slowest one
+        that was measured count as that.
+        """
+        mean, sd = self._table("").at(F_n, v_t)
+        return 0.5 * math.erfc((mean - required) / (math.sqrt(2.0) * max(sd, 1e-9)))
+
+    def _table(self, model: str) -> Table:
+        found = self.tables.get(model or self.default)
+        if found is None:
+            raise SettingsError(
+                f"{self.name}: there is no model {model!r}.",
+                hint=f"Models: {', '.join(self.tables)}.",
+            )
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainDatabase:
+    """Terrains by name.
+
+    Attributes:
+        terrains: every terrain.
+        is_simulated: the trials were simulated.
+        made_utc: when.
+    """
+
+    terrains: Mapping[str, KnownTerrain]
+    is_simulated: bool
+    made_utc: str
+
+    def terrain(self, name: str) -> KnownTerrain:
+        """Return a terrain.
+
+        Raises:
+            SettingsError: there is none of that name.
+        """
+        if name not in self.terrains:
+            raise SettingsError(
+                f"There is no terrain {name!r} in the database.",
+                hint=f"Terrains: {', '.join(self.terrains)}.",
+            )
+        return self.terrains[name]
+
+
+def load(path: Path | str) -> TerrainDatabase:
+    """Return the database in a file.
+
+    Raises:
+        SettingsError: it cannot be read or is none.
+    """
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise ValueError(f"it is larger than {_LARGEST / 1e6:.0f} MB")
+        return _database(json.loads(path.read_bytes()))
+    except OSError as error:
+        raise SettingsError(
+            f"{path} cannot be read ({error.strerror}).",
+            hint="Make it with: traction export --terrain-db FILE.",
+        ) from error
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as error:
+        what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise SettingsError(
+            f"{path} is no terrain database: {what}.",
+            hint="Make it with: traction export --terrain-db FILE.",
+        ) from error
+
+
+def _database(content: Any) -> TerrainDatabase:  # noqa: ANN401
+    if content["format"] != FORMAT or content["version"] != VERSION:
+        raise ValueError("it is of another format or version")
+    axes = tuple(_axis(content["axes"][name]) for name in ("F_n", "v_t"))
+    terrains = dict(content["terrains"])
+    if not 0 < len(terrains) <= _MOST_TERRAINS:
+        raise ValueError(f"{len(terrains)} terrains")
+    default = str(content["default"])
+    return TerrainDatabase(
+        {str(n): _terrain(str(n), t, axes, default) for n, t in terrains.items()},
+        bool(content["simulated"]),
+        str(content["made_utc"]),
+    )
+
+
+def _terrain(
+    name: str,
+    content: Any,  # noqa: ANN401
+    axes: tuple[tuple[float, ...], ...],
+    default: str,
+) -> KnownTerrain:
+    models = dict(content["models"])
+    if default not in models:
+        raise ValueError(f"{name} lacks the model {default}")
+    shape = (len(axes[0]), len(axes[1]))
+    tables = {
+        str(key): Table(
+            axes[0],
+            axes[1],
+            _rows(model["mean"], shape, least=-np.inf),
+            _rows(model["sd"], shape, least=0.0),
+        )
+        for key, model in models.items()
+    }
+    return KnownTerrain(
+        name=name,
+        kind=str(content["kind"]),
+        trials=int(content["trials"]),
+        samples=int(content["samples"]),
+        rho=_share(content["rho"]),
+        limits={int(k): float(v) for k, v in dict(content["limits"]).items()},
+        tables=tables,
+        parameters={str(key): model["parameters"] for key, model in models.items()},
+        default=default,
+    )
+
+
+def _share(value: Any) -> float:  # noqa: ANN401
+    number = float(value)
+    if not 0.0 <= number < 1.0:
+        raise ValueError(f"a correlation of {number}")
+    return number
+
+
+def _axis(values: Any) -> tuple[float, ...]:  # noqa: ANN401
+    axis = np.array(values, dtype=np.float64)
+    if axis.ndim != 1 or not 2 <= axis.size <= _MOST_POINTS:
+        raise ValueError("an axis needs 2 to 400 points")
+    if not bool(np.isfinite(axis).all()) or not bool((np.diff(axis) > 0).all()):
+        raise ValueError("an axis does not increase")
+    return tuple(axis.tolist())
+
+
+def _rows(
+    values: Any,  # noqa: ANN401
+    shape: tuple[int, int],
+    least: float,
+) -> tuple[tuple[float, ...], ...]:
+    table = np.array(values, dtype=np.float64)
+    if table.shape != shape or not bool(np.isfinite(table).all()):
+        raise ValueError(f"a table is not {shape[0]} x {shape[1]} finite numbers")
+    if bool((table < least).any()):
+        raise ValueError("a standard deviation is negative")
+    return tuple(tuple(row) for row in table.tolist())

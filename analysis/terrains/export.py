@@ -1,0 +1,166 @@
+"""From trials to a terrain database: models of all trials, tabulated."""
+
+import json
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acquisition.errors import SettingsError, TractionError
+from analysis.data.prepare import PreparedTrial, PrepareOptions
+from analysis.data.rows import Rows, Training
+from analysis.data.series import Array
+from analysis.study.jobs import Store, Workers, run_tasks
+from analysis.study.models import BEYOND, FITTERS, GP_SE, TITLES, FitOptions
+from analysis.study.study import Study
+from analysis.terrains.database import FORMAT, VERSION
+from analysis.terrains.identify import Identification, kind_of
+
+POINTS = 48  # of each axis
+_REACH = 99.8  # percentile of F_n up to which the tables reach, with a margin
+_MARGIN = 1.2
+_DIGITS = 6  # of a tabulated number
+_STREAM = 2_000_000  # apart from folds and terrain fits
+
+
+@dataclass(frozen=True, slots=True)
+class TableTask:
+    """Everything the tables of one terrain need.
+
+    Attributes:
+        terrain: its name.
+        trials: kept samples of every trial that has any.
+        axes: points of the tables: F_n [N] and v_t [m/s].
+        options: how to fit.
+    """
+
+    terrain: str
+    trials: tuple[Rows, ...]
+    axes: tuple[Array, Array]
+    options: FitOptions
+
+
+def tabulate(task: TableTask) -> dict[str, Any]:
+    """Return models of all trials of a terrain as tables; a pure function of the task.
+
+    A model that cannot be fitted is left out.
+    """
+    columns = [(rows.F_n, rows.v_t, rows.F_t) for rows in task.trials]
+    rows = Rows(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+    key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
+    count = min(task.options.gp_points, rows.count)
+    chosen = np.random.default_rng(key).choice(rows.count, count, replace=False)
+    training = Training(rows, tuple(trial.count for trial in task.trials), chosen)
+    F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
+    models: dict[str, Any] = {}
+    for name in task.options.models:
+        fit = FITTERS[name] if name in FITTERS else BEYOND[name]
+        try:
+            model = fit(training, task.options)
+        except TractionError:
+            continue
+        found = model.predict(F_n, v_t)
+        models[name] = {
+            "title": TITLES[name],
+            "parameters": model.describe(),
+            "mean": _rounded(found.mean, task.axes),
+            "sd": _rounded(found.sd, task.axes),
+        }
+    return models
+
+
+def database_of(
+    study: Study,
+    found: Identification | None,
+    made_utc: str,
+    workers: Workers | int | None = None,
+    store: Store | None = None,
+) -> str:
+    """Return the text of a terrain database of every terrain of a study.
+
+    Args:
+        study: the trials and how models are fitted.
+        found: how well they can be told apart; gives correlations and limits.
+        made_utc: when.
+        workers: where the models are fitted.
+        store: results of earlier runs.
+
+    Raises:
+        SettingsError: no terrain has kept samples.
+    """
+    axes, tasks = _tasks(study)
+    tables = run_tasks(tabulate, tasks, workers, store=store)
+    models = study.options.fit.models
+    default = GP_SE if GP_SE in models else models[0]
+    content = {
+        "format": FORMAT,
+        "version": VERSION,
+        "made_utc": made_utc,
+        "simulated": study.simulated,
+        "default": default,
+        "units": {"F_n": "N", "v_t": "m/s", "mean": "N", "sd": "N"},
+        "axes": {"F_n": axes[0].tolist(), "v_t": axes[1].tolist()},
+        "terrains": {
+            task.terrain: _facts(task, found) | {"models": fitted}
+            for task, fitted in zip(tasks, tables, strict=True)
+            if default in fitted
+        },
+    }
+    return json.dumps(content, default=str)
+
+
+def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
+    """Return the axes of all tables, and one task per terrain with kept samples."""
+    trials = {
+        name: tuple(trial for trial in result.trials if trial.kept)
+        for name, result in study.terrains.items()
+    }
+    trials = {name: of for name, of in trials.items() if of}
+    if not trials:
+        raise SettingsError("No terrain has kept samples.", hint="Record some trials.")
+    axes = _axes([t for of in trials.values() for t in of], study.options.prepare)
+    return axes, [
+        TableTask(
+            name, tuple(Rows.of([trial]) for trial in of), axes, study.options.fit
+        )
+        for name, of in trials.items()
+    ]
+
+
+def _facts(task: TableTask, found: Identification | None) -> dict[str, Any]:
+    """Return what the database says of a terrain besides its models."""
+    return {
+        "kind": kind_of(task.terrain),
+        "trials": len(task.trials),
+        "samples": sum(rows.count for rows in task.trials),
+        "rho": 0.0 if found is None else round(found.rho[task.terrain], 4),
+        "limits": _limits(found, task.terrain),
+    }
+
+
+def _axes(
+    trials: Sequence[PreparedTrial], options: PrepareOptions
+) -> tuple[Array, Array]:
+    """Return F_n [N] up to nearly all of it, v_t [m/s] finer where it is slow."""
+    loads = np.concatenate([trial.F_n for trial in trials])
+    most = max(_MARGIN * float(np.percentile(loads, _REACH)), 1.0)
+    least = min(float(np.percentile(loads, 100.0 - _REACH)), 0.0)
+    v_t = np.geomspace(options.slowest, options.fastest, POINTS)
+    return np.round(np.linspace(least, most, POINTS), 6), np.round(v_t, 8)
+
+
+def _limits(found: Identification | None, terrain: str) -> Mapping[str, float]:
+    if found is None:
+        return {}
+    return {
+        str(size): round(limits[terrain], 4)
+        for size, limits in found.limits.items()
+        if terrain in limits and np.isfinite(limits[terrain])
+    }
+
+
+def _rounded(values: Array, axes: tuple[Array, Array]) -> list[list[float]]:
+    table = values.reshape(axes[0].size, axes[1].size)
+    return [[float(f"{value:.{_DIGITS}g}") for value in row] for row in table.tolist()]

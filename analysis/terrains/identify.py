@@ -1,0 +1,286 @@
+"""Which terrain is this? Log densities of windows under every terrain's model.
+
+Neighbouring samples repeat each other, so a sample is judged by what it adds: with the
+standardised residual z_i = (y_i - m_i) / s_i and its correlation rho from one sample to
+the next
+
+    ll = sum_i log N(z_i; rho z_{i-1}, 1 - rho^2) - log s_i
+
+(a first-order process; after a gap, and at first, log N(z_i; 0, 1)). Single terms are
+held above a floor, which keeps one spike from deciding. The posterior is the softmax of
+ll / tau: what is left of the correlation makes plain sums overconfident.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.prepare import PreparedTrial
+from analysis.data.series import Array
+from analysis.study.jobs import run_tasks
+from analysis.study.metrics import Prediction
+from analysis.study.models import GP_SE
+from analysis.study.study import Study, TerrainResult
+from analysis.terrains.confusion import Confusion, confusion_of
+
+WINDOWS = (50, 100, 200)  # kept samples: 0.5, 1 and 2 s of motion
+NONE = "none"  # of the known terrains
+RARE = 0.01  # share of a terrain's own windows that strain it beyond the limit
+TAU = 10.0  # samples that count as one
+_SMALLEST_SD = 1e-6  # N
+_SPIKE = 10.0  # standard deviations beyond which a sample says no more
+_KINDS = {"S": "small", "B": "big", "T": "flat"}
+Predictor = Callable[[Array, Array], Prediction]
+Kind = Callable[[str], str]
+
+
+def kind_of(terrain: str) -> str:
+    """Return "small", "big" or "flat" by the paper's names; others are of their own."""
+    return _KINDS.get(terrain[:1], terrain)
+
+
+def surface_of(terrain: str) -> str:
+    """Return "flat" or "rocky"."""
+    return "flat" if kind_of(terrain) == "flat" else "rocky"
+
+
+LEVELS: Mapping[str, Kind] = {
+    "terrain": lambda terrain: terrain,
+    "stones": kind_of,
+    "surface": surface_of,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Expert:
+    """What one terrain would say.
+
+    Attributes:
+        predict: F_t of given (F_n, v_t).
+        rho: correlation of its standardised residual from one sample to the next.
+    """
+
+    predict: Predictor
+    rho: float
+
+
+def log_densities(trial: PreparedTrial, prediction: Prediction, rho: float) -> Array:
+    """Return the log density of every kept sample given the one before, shape (n,)."""
+    sd = np.maximum(prediction.sd, _SMALLEST_SD)
+    z = (trial.F_t - prediction.mean) / sd
+    before = np.where(_is_next(trial), rho, 0.0)
+    spread = 1.0 - before**2
+    innovation = z.copy()
+    innovation[1:] -= before[1:] * z[:-1]
+    squares = np.minimum(innovation**2 / spread, _SPIKE**2)
+    return -0.5 * (squares + np.log(2.0 * np.pi * spread)) - np.log(sd)
+
+
+def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Prediction]]) -> float:
+    """Return rho of trials under their own terrain's models, 0 to 0.99."""
+    products = squares = 0.0
+    for trial, prediction in pairs:
+        z = (trial.F_t - prediction.mean) / np.maximum(prediction.sd, _SMALLEST_SD)
+        is_next = _is_next(trial)[1:]
+        products += float((z[1:] * z[:-1])[is_next].sum())
+        squares += float((z[:-1] ** 2)[is_next].sum())
+    return min(max(products / squares, 0.0), 0.99) if squares > 0.0 else 0.0
+
+
+def _is_next(trial: PreparedTrial) -> np.ndarray:
+    """Return which kept samples follow the one before without a gap, shape (n,)."""
+    steps = np.diff(trial.indices)
+    usual = int(steps.min()) if steps.size else 1
+    return np.concatenate([[False], steps == usual])[: trial.kept]
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """How a trial fits each terrain, sample by sample.
+
+    Attributes:
+        terrains: names, m of them.
+        log_density: of every kept sample, shape (n, m).
+        error: absolute error of every kept sample [N], shape (n, m).
+        strain: squared error over the predicted variance, shape (n, m); 1 on average
+            where the model is right.
+    """
+
+    terrains: tuple[str, ...]
+    log_density: Array
+    error: Array
+    strain: Array
+
+    def windows(self, size: int) -> "list[slice]":
+        """Return consecutive windows of `size` kept samples; a rest is left out."""
+        return [
+            slice(k, k + size) for k in range(0, len(self.log_density) - size + 1, size)
+        ]
+
+    def posterior(self, rows: slice) -> Array:
+        """Return the probability of each terrain after the samples `rows`, (m,)."""
+        total = self.log_density[rows].sum(axis=0) / TAU
+        weight = np.exp(total - total.max())
+        return weight / weight.sum()
+
+    def least_error(self, rows: slice) -> str:
+        """Return the terrain whose model is nearest on average: the paper's rule."""
+        return self.terrains[int(self.error[rows].mean(axis=0).argmin())]
+
+    def likeliest(self, rows: slice) -> str:
+        """Return the terrain of the largest log density."""
+        return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
+
+    def likeliest_kind(self, rows: slice, kind: Kind) -> str:
+        """Return the kind whose terrains have most of the posterior together."""
+        total: dict[str, float] = {}
+        for name, share in zip(self.terrains, self.posterior(rows), strict=True):
+            total[kind(name)] = total.get(kind(name), 0.0) + float(share)
+        return max(total, key=lambda name: total[name])
+
+
+def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> Scores:
+    """Return how `trial` fits what every expert expects."""
+    found = [
+        (expert.predict(trial.F_n, trial.v_t), expert.rho)
+        for expert in experts.values()
+    ]
+    empty = np.zeros((trial.kept, 0))
+    density = [log_densities(trial, p, rho) for p, rho in found]
+    error = [np.abs(trial.F_t - p.mean) for p, _ in found]
+    strain = [
+        ((trial.F_t - p.mean) / np.maximum(p.sd, _SMALLEST_SD)) ** 2 for p, _ in found
+    ]
+    columns = [
+        np.column_stack(values) if values else empty
+        for values in (density, error, strain)
+    ]
+    return Scores(tuple(experts), *columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """How well the terrains of a study can be told apart.
+
+    Attributes:
+        rho: correlation of neighbouring residuals by terrain.
+        by_density: confusions by window size [kept samples] and level ("terrain",
+            "stones", "surface"), by posterior.
+        by_error: the same by the smallest mean absolute error: the paper's rule.
+        limits: by window size and terrain: the mean strain that nearly none of the
+            terrain's own windows exceed.
+    """
+
+    rho: Mapping[str, float]
+    by_density: Mapping[int, Mapping[str, Confusion]]
+    by_error: Mapping[int, Mapping[str, Confusion]]
+    limits: Mapping[int, Mapping[str, float]]
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Sizes that at least one trial has a window of."""
+        return tuple(
+            size
+            for size, levels in self.by_density.items()
+            if levels["terrain"].counts.any()
+        )
+
+
+def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
+    """Return how well windows of trials are recognised by models that never saw them.
+
+    Trial k of every terrain is scored by the models of fold k. None where no fold has
+    the model for two terrains or more.
+    """
+    rho = _correlations(study, model)
+    scored = _score_folds(study, model, rho)
+    names = tuple(name for name in study.terrains if name in scored)
+    if len(names) < 2:
+        return None
+    density, error, limits = {}, {}, {}
+    for size in WINDOWS:
+        windows = [
+            (truth, scores, rows)
+            for truth in names
+            for scores in scored[truth]
+            for rows in scores.windows(size)
+        ]
+        density[size], error[size] = {}, {}
+        for level, kind in LEVELS.items():
+            density[size][level] = confusion_of(
+                [(kind(t), s.likeliest_kind(r, kind)) for t, s, r in windows]
+            )
+            error[size][level] = confusion_of(
+                [(kind(t), kind(s.least_error(r))) for t, s, r in windows]
+            )
+        limits[size] = {name: own_limit(scored[name], name, size) for name in names}
+    return Identification(rho, density, error, limits)
+
+
+def own_limit(scored: Sequence[Scores], terrain: str, size: int) -> float:
+    """Return the mean strain that 99 % of a terrain's own windows stay below."""
+    means = [
+        float(scores.strain[rows, scores.terrains.index(terrain)].mean())
+        for scores in scored
+        for rows in scores.windows(size)
+    ]
+    return float(np.quantile(means, 1.0 - RARE)) if means else np.inf
+
+
+def _correlations(study: Study, model: str) -> dict[str, float]:
+    """Return rho of every terrain, from trials that its models never saw."""
+    return {
+        name: neighbour_correlation(
+            [
+                (trial, predictor(trial.F_n, trial.v_t))
+                for trial, predictor in _held_out(result, model)
+            ]
+        )
+        for name, result in study.terrains.items()
+    }
+
+
+def _held_out(
+    result: TerrainResult, model: str
+) -> list[tuple[PreparedTrial, Predictor]]:
+    return [
+        (result.trials[fold.fold], fold.models[model].model.predict)
+        for fold in result.folds
+        if model in fold.models
+    ]
+
+
+def _score_folds(
+    study: Study, model: str, rho: Mapping[str, float]
+) -> dict[str, list[Scores]]:
+    experts: dict[int, dict[str, Expert]] = {}
+    for name, result in study.terrains.items():
+        for fold in result.folds:
+            if model in fold.models:
+                found = experts.setdefault(fold.fold, {})
+                found[name] = Expert(fold.models[model].model.predict, rho[name])
+    tasks = [
+        ScoreTask(trial, experts[k])
+        for name, result in study.terrains.items()
+        for k, trial in enumerate(result.trials)
+        if name in experts.get(k, {}) and len(experts[k]) > 1 and trial.kept
+    ]
+    scored: dict[str, list[Scores]] = {}
+    done = run_tasks(run_score, tasks, study.options.n_jobs)
+    for task, scores in zip(tasks, done, strict=True):
+        scored.setdefault(task.trial.terrain, []).append(scores)
+    return scored
+
+
+@dataclass(frozen=True, slots=True)
+class ScoreTask:
+    """A trial and the experts that score it."""
+
+    trial: PreparedTrial
+    experts: Mapping[str, Expert]
+
+
+def run_score(task: ScoreTask) -> Scores:
+    """Return how the trial fits what every expert expects."""
+    return score_trial(task.trial, task.experts)

@@ -1,0 +1,70 @@
+"""A table of traction over load and velocity, read at any point between its own."""
+
+from bisect import bisect_right
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.series import Array
+from analysis.study.metrics import Prediction
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Mean and spread of F_t on a grid of F_n and v_t.
+
+    Attributes:
+        F_n: normal forces [N], shape (n,), increasing.
+        v_t: velocities [m/s], shape (m,), increasing.
+        mean: F_t [N], n rows of m.
+        sd: its standard deviation [N], n rows of m.
+    """
+
+    F_n: tuple[float, ...]
+    v_t: tuple[float, ...]
+    mean: tuple[tuple[float, ...], ...]
+    sd: tuple[tuple[float, ...], ...]
+
+    def at(self, F_n: float, v_t: float) -> tuple[float, float]:
+        """Return (mean, standard deviation) [N] at one point; a few microseconds."""
+        i, a = _place(self.F_n, F_n)
+        j, b = _place(self.v_t, v_t)
+        return _blend(self.mean, i, a, j, b), _blend(self.sd, i, a, j, b)
+
+    def over(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return mean and standard deviation [N] at many points, shape (n,)."""
+        i, a = _places(self.F_n, F_n)
+        j, b = _places(self.v_t, v_t)
+        values = []
+        for rows in (self.mean, self.sd):
+            table = np.array(rows)
+            low = table[i, j] + b * (table[i, j + 1] - table[i, j])
+            high = table[i + 1, j] + b * (table[i + 1, j + 1] - table[i + 1, j])
+            values.append(low + a * (high - low))
+        return Prediction(*values)
+
+
+def _place(axis: tuple[float, ...], value: float) -> tuple[int, float]:
+    """Return (lower point, share of the way to the next), clamped to the axis."""
+    if value <= axis[0]:
+        return 0, 0.0
+    if value >= axis[-1]:
+        return len(axis) - 2, 1.0
+    i = bisect_right(axis, value) - 1
+    return i, (value - axis[i]) / (axis[i + 1] - axis[i])
+
+
+def _places(axis: tuple[float, ...], values: Array) -> tuple[np.ndarray, Array]:
+    points = np.array(axis)
+    inside = np.clip(values, points[0], points[-1])
+    i = np.clip(np.searchsorted(points, inside, "right") - 1, 0, points.size - 2)
+    return i, (inside - points[i]) / (points[i + 1] - points[i])
+
+
+def _blend(
+    rows: tuple[tuple[float, ...], ...], i: int, a: float, j: int, b: float
+) -> float:
+    low, high = rows[i], rows[i + 1]
+    left = low[j] + b * (low[j + 1] - low[j])
+    right = high[j] + b * (high[j + 1] - high[j])
+    return left + a * (right - left)

@@ -1,0 +1,120 @@
+"""The samples of a Tustin fit as sums over narrow bins of velocity.
+
+Given (v_s, delta_s) the normal equations need the samples only through e(v) times
+products of F_n, v_t, F_t and 1. Sums of those over bins of 2 % of velocity, one set per
+trial, make a fit of any mixture of trials as cheap as a few hundred rows: profiles and
+hundreds of bootstrap draws at once. Single fits use the samples themselves.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.data.series import Array
+from analysis.tustin.box_least_squares import solve_in_box
+from analysis.tustin.identifiability import Interval, Profiles, independent_samples
+from analysis.tustin.varpro import LARGEST_LOG_POWER, Box, Point, Problem
+
+_BIN = 0.02  # width in log velocity
+_MOST_BINS = 300
+_CHI2_95 = 3.841458820694124  # of one degree of freedom
+_POINTS, _ACROSS = 25, 24  # of a profile: along it, and minimised over
+
+
+class Moments(NamedTuple):
+    """Sums over trials and bins.
+
+    Attributes:
+        v: mean velocity of every bin [m/s], shape (k,).
+        sums: of the ten products of (F_n, static column, v_t, F_t), shape
+            (trials, k, 10) in the order of `_PAIRS`.
+    """
+
+    v: Array
+    sums: Array
+
+    @classmethod
+    def of(cls, problem: Problem, lengths: Sequence[int]) -> "Moments":
+        """Return the moments of a problem whose trials have `lengths` rows."""
+        log_v = problem.log_v
+        width = max(_BIN, float(np.ptp(log_v)) / _MOST_BINS)
+        index = np.floor((log_v - log_v.min()) / width).astype(np.intp)
+        used, index = np.unique(index, return_inverse=True)
+        static = problem.F_n if problem.is_proportional else np.ones(log_v.size)
+        columns = (problem.F_n, static, problem.v_t, problem.F_t)
+        trial = np.repeat(np.arange(len(lengths)), lengths)
+        place, size = trial * used.size + index, len(lengths) * used.size
+        sums = [
+            np.bincount(place, problem.weights * columns[a] * columns[b], size)
+            for a, b in _PAIRS
+        ]
+        count = np.bincount(index, minlength=used.size)
+        v = np.exp(np.bincount(index, log_v, used.size) / count)
+        stacked = np.stack(sums, axis=1).astype(np.float64)
+        return cls(v, stacked.reshape(len(lengths), used.size, 10))
+
+
+# (0, 0) is F_n F_n, (0, 3) F_n F_t and so on
+_PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
+
+
+def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Array]:
+    """Return the best linear parameters at every q and their sums of squares.
+
+    Args:
+        sums: moments of one mixture of trials, (k, 10), or one per q, (g, k, 10).
+        v: velocity of the bins [m/s], shape (k,).
+        q: points (log v_s, log delta_s), shape (g, 2).
+        box: bounds of the linear parameters.
+
+    Returns:
+        (mu, F_s, b), shape (g, 3), and SSE [N^2], shape (g,).
+    """
+    power = np.exp(q[:, 1:]) * (np.log(v) - q[:, :1])
+    e = np.exp(-np.exp(np.minimum(power, LARGEST_LOG_POWER)))
+    share = {0: 1.0 - e, 1: e, 2: np.ones_like(e), 3: np.ones_like(e)}
+    gram = np.empty((q.shape[0], 4, 4))
+    for k, (a, b) in enumerate(_PAIRS):
+        weight = share[a] * share[b]
+        column = sums[..., k]
+        value = weight @ column if sums.ndim == 2 else np.sum(weight * column, axis=1)
+        gram[:, a, b] = gram[:, b, a] = value
+    G, c, yy = gram[:, :3, :3], gram[:, :3, 3], gram[:, 3, 3]
+    p = solve_in_box(G, c, box.lower, box.upper)
+    quadratic = np.einsum("gi,gij,gj->g", p, G, p)
+    return p, yy - 2.0 * np.einsum("gi,gi->g", c, p) + quadratic
+
+
+def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profiles:
+    """Return the 95 % profile intervals of v_s and delta_s.
+
+    One of the two is held on 25 values, the rest minimised over; kept is where
+    SSE < SSE_min (1 + chi2_95/n_eff), n_eff from the correlation of the residual.
+    """
+    limit = point.sse * (1.0 + _CHI2_95 / independent_samples(residual))
+    sums = moments.sums.sum(axis=0)
+    ends = [_profile(sums, moments.v, box, point, (k, limit)) for k in (0, 1)]
+    touches = any(
+        abs(end - edge) < 1e-9
+        for pair, edges in zip(ends, box.logarithmic, strict=True)
+        for end, edge in zip(pair, edges, strict=True)
+    )
+    v_s, delta_s = (Interval(*(float(np.exp(end)) for end in pair)) for pair in ends)
+    return Profiles(v_s, delta_s, touches)
+
+
+def _profile(
+    sums: Array, v: Array, box: Box, point: Point, choice: tuple[int, float]
+) -> tuple[float, float]:
+    """Return the ends, in logarithms, of where the profile is below the limit."""
+    held, limit = choice
+    (low, high), (bottom, top) = box.logarithmic[[held, 1 - held]]
+    along = np.linspace(low, high, _POINTS)
+    across = np.linspace(bottom, top, _ACROSS)
+    grid = np.empty((_POINTS, _ACROSS, 2))
+    grid[..., held], grid[..., 1 - held] = along[:, None], across
+    sse = solve_moments(sums, v, grid.reshape(-1, 2), box)[1]
+    kept = along[sse.reshape(_POINTS, _ACROSS).min(axis=1) < limit]
+    inside = np.append(kept, point.q[held])  # the optimum itself always belongs to it
+    return float(inside.min()), float(inside.max())

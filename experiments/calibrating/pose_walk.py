@@ -1,0 +1,106 @@
+"""An arm that walks through poses by itself while a person keeps out of its way."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from acquisition.errors import PreflightError
+from experiments.operator.prompts import Prompt
+from experiments.run.activation import activate
+from experiments.run.console_loop import TICK, Stage
+from wam.calibration.poses import APPROACH_SPEED, Halt, way_seconds
+from wam.control.joint_move import JointMove
+from wam.model.constants import Array
+
+SETTLE = 0.5  # s after a move
+CLEARANCE = 0.10  # m that sole, plate and elbow stay above the highest container
+STILL = 0.02  # rad/s, largest joint speed while something is averaged
+ATTEMPTS = 4  # at an arm that does not come to rest
+
+Plan = Callable[[Array, float], Sequence[Halt]]
+
+
+class Walk:
+    """Moves the arm from halt to halt and knows where it was sent last.
+
+    At 0.5 rad/s and 0.3 m/s at most, after a person has said that the space is clear.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self.stage = stage
+        self._rig = stage.rig
+        self._console = stage.company.console
+        self._here = np.zeros(7)
+
+    def begin(self, plan: Plan, seconds_per_pose: float) -> Sequence[Halt]:
+        """Activate the arm, plan the way and ask for free space; return the halts.
+
+        Args:
+            plan: returns the halts, from where the arm is (7,) [rad] and the height
+                that nothing may come below [m].
+            seconds_per_pose: how long the arm stops in each pose [s].
+
+        Raises:
+            SettingsError: no safe way.
+            PreflightError: not activated.
+            StopAskedError, FaultedError: as `Stage.tick`.
+        """
+        activate(self.stage)
+        start = self._rig.crew.desk.latest()["position"][0].copy()
+        rows = self._rig.settings.matrix.terrains
+        floor = max(row.far_end[2] for row in rows) + CLEARANCE
+        halts = self.stage.aside(lambda: plan(start, floor))
+        number = len({halt.pose for halt in halts} - {None})
+        stops = len(halts) * SETTLE + number * seconds_per_pose
+        # Held by position: the weight may not be known yet, and the hand lets go.
+        self._here = start
+        self.go_to(Halt(start, APPROACH_SPEED, None))
+        self.ask(
+            f"The arm will move by itself through {number} poses, about "
+            f"{(way_seconds(start, halts) + stops) / 60:.1f} min. Let go of it and "
+            "clear the space. [space] when clear.",
+            Prompt.CLEAR,
+        )
+        return halts
+
+    def go_to(self, halt: Halt) -> None:
+        """Move to a halt and wait until the arm has settled."""
+        self._rig.crew.desk.move_to(halt.q.tolist(), halt.speed)
+        self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
+        self._here = halt.q
+
+    def end(self) -> None:
+        """Ask for support and idle the arm; nobody need hold it afterwards."""
+        self.ask("Support the arm, it goes idle. [space]", Prompt.SUPPORT)
+        self.stage.make_safe()
+
+    def rest(self, seconds: float) -> tuple[Array, Array]:
+        """Return mean (positions [rad], torques [N m]) of `seconds` at rest, (7,) each.
+
+        Raises:
+            PreflightError: the arm does not come to rest.
+        """
+        speed = np.zeros(7)
+        for _ in range(ATTEMPTS):
+            self.wait(seconds)
+            records = self._rig.crew.desk.last(seconds)
+            q = records["position"]
+            speed = np.abs(q[-1] - q[0]) / seconds
+            if speed.max() <= STILL:
+                return q.mean(axis=0), records["torque_command"].mean(axis=0)
+        raise PreflightError(
+            f"Joint {speed.argmax() + 1} moved at {speed.max():.3f} rad/s while it was "
+            f"weighed (limit {STILL}).",
+            hint="Nobody may touch the arm. Start again.",
+        )
+
+    def ask(self, text: str, prompt: Prompt) -> None:
+        """Say `text` and wait for [space]."""
+        self._console.say(text)
+        while self.stage.tick(prompt) != " ":
+            pass
+
+    def wait(self, seconds: float) -> None:
+        """Let `seconds` pass."""
+        for _ in range(round(seconds / TICK) + 1):
+            self.stage.tick(Prompt.MOVING)

@@ -1,0 +1,115 @@
+"""What can befall the computer of a rehearsed session: disk, lock, kill, bug."""
+
+import fcntl
+import os
+import resource
+import signal
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from experiments.rig.rig import Rig
+from experiments.session.lock import LOCK_FILE, sign
+from experiments.session.store import SessionFolder
+
+COMPUTER_FAULTS = ("bug", "crash", "disk-full", "locked", "write-failed")
+_ALMOST_NOTHING = 2_100_000_000  # bytes free, less than any session is allowed
+_ROOM = 4096  # bytes that a full disk still takes of a running trial
+
+
+class RehearsedBugError(Exception):
+    """A bug that was asked for."""
+
+
+@dataclass(slots=True)
+class Computer:
+    """Lets the computer fail as it does in earnest, and ends it all in `undo`.
+
+    Attributes:
+        rig: whose computer it is.
+        folder: of the session; None before there is one.
+        is_locked: another process has the session open before this one does.
+    """
+
+    rig: Rig
+    folder: SessionFolder | None = None
+    is_locked: bool = False
+    _undo: ExitStack = field(default_factory=ExitStack)
+
+    def strike(self, name: str, trial: int) -> None:
+        """Let a fault happen while `trial` is recorded, or before everything (0)."""
+        if name == "crash":
+            os.kill(os.getpid(), signal.SIGKILL)
+        elif name == "locked":
+            self.is_locked = True
+        elif name == "disk-full" and trial == 0:
+            self.rig.free_bytes = lambda _: _ALMOST_NOTHING
+        elif name == "disk-full":
+            self._undo.enter_context(_full_disk(self.rig, self._partial(trial)))
+        elif name == "write-failed":
+            _flip_a_bit(self._partial(trial))
+        else:
+            raise RehearsedBugError("rehearsed")
+
+    def undo(self) -> None:
+        """End what has not ended by itself; safe to repeat."""
+        self._undo.close()
+
+    def occupy(self, folder: SessionFolder) -> None:
+        """Hold the lock of a new session, as another process would, if planned."""
+        self.folder = folder
+        if self.is_locked:
+            self._undo.enter_context(_occupied(folder.path / LOCK_FILE))
+
+    def _partial(self, trial: int) -> Path:
+        assert self.folder is not None
+        return self.folder.trials / f"T{trial:02d}.mcap.partial"
+
+
+@contextmanager
+def _occupied(path: Path) -> Generator[None]:
+    """Hold a lock of one's own: a lock belongs to whoever opened the file."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        sign(descriptor)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def _full_disk(rig: Rig, path: Path) -> Generator[None]:
+    """Let no file of the process that records grow beyond what `path` has now.
+
+    The kernel then refuses to write, as it does on a full disk. Journal and sidecars
+    are far smaller and stay writable, as the last blocks of a disk often are.
+    """
+    number = rig.crew.recorder_pid
+    before = resource.prlimit(number, resource.RLIMIT_FSIZE)
+    size = path.stat().st_size + _ROOM
+    limits = (size, before[1])
+    resource.prlimit(number, resource.RLIMIT_FSIZE, limits)
+    try:
+        yield
+    finally:
+        _quietly(lambda: resource.prlimit(number, resource.RLIMIT_FSIZE, before))
+
+
+def _quietly(action: Callable[[], object]) -> None:
+    """Do something to a process that may have gone."""
+    try:
+        action()
+    except ProcessLookupError:
+        return
+
+
+def _flip_a_bit(path: Path) -> None:
+    """Change one bit in the middle of what the disk has of a running trial."""
+    with path.open("r+b") as file:
+        place = path.stat().st_size // 2
+        file.seek(place)
+        byte = file.read(1)[0]
+        file.seek(place)
+        file.write(bytes((byte ^ 0x10,)))

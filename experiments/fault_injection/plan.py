@@ -1,0 +1,126 @@
+"""Which faults a rehearsal raises, and when."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from acquisition.errors import SettingsError
+from experiments.fault_injection.host_faults import COMPUTER_FAULTS, Computer
+from experiments.rig.simulation import Rehearsing
+
+_PATTERN = re.compile(
+    r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
+)
+# What the preflight is there to find.
+AT_PREFLIGHT = frozenset(
+    {"can-down", "ft-silent", "locked", "not-zeroed"}
+    | {"puck-missing", "puck-hot", "puck-error"}
+)
+
+
+class Moment(Enum):
+    """What a fault comes into, and from which its seconds are counted."""
+
+    TARE = "tare"
+    RECORDING = "recording"
+
+
+_AT_TARE = frozenset({"tare-moved", "residual"})
+_USUALLY_AFTER = {Moment.TARE: 0.0, Moment.RECORDING: 2.0}  # s
+
+
+@dataclass(frozen=True, slots=True)
+class FaultPlan:
+    """A fault and its moment.
+
+    Attributes:
+        name: as in the message catalogue.
+        trial: number of the trial it comes in; 0 = before the preflight.
+        seconds: after the start of the recording, or of the tare before it.
+    """
+
+    name: str
+    trial: int
+    seconds: float
+
+    @property
+    def moment(self) -> Moment:
+        """What it comes into."""
+        return Moment.TARE if self.name in _AT_TARE else Moment.RECORDING
+
+    def text(self) -> str:
+        """Return it as it is written on the command line."""
+        return f"{self.name}@T{self.trial}+{self.seconds:g}s"
+
+
+@dataclass(slots=True)
+class Faults:
+    """The faults of a rehearsal, raised one by one as their moments come.
+
+    Attributes:
+        plans: those that have not come yet.
+        devices: what fails in the simulated rig.
+        computer: what befalls the computer.
+    """
+
+    plans: list[FaultPlan]
+    devices: Rehearsing
+    computer: Computer
+
+    def raise_due(self, moment: Moment, trial: int, seconds: float) -> None:
+        """Raise what is due `seconds` after the beginning of a moment in `trial`."""
+        for plan in [p for p in self.plans if (p.trial, p.moment) == (trial, moment)]:
+            if seconds >= plan.seconds:
+                self.plans.remove(plan)
+                self._raise(plan)
+
+    def raise_first(self) -> None:
+        """Raise those that come before the preflight."""
+        for plan in [plan for plan in self.plans if plan.trial == 0]:
+            self.plans.remove(plan)
+            self._raise(plan)
+
+    def _raise(self, plan: FaultPlan) -> None:
+        if plan.name in COMPUTER_FAULTS:
+            self.computer.strike(plan.name, plan.trial)
+        else:
+            self.devices.inject(plan.name)
+
+
+def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
+    """Return the plan of `NAME[@Tn+SECONDSs]`.
+
+    Raises:
+        SettingsError: the text is not of that form, or the name is unknown.
+    """
+    match = _PATTERN.match(text)
+    if match is None or match["name"] not in known:
+        raise SettingsError(
+            f"--fault {text!r} is not a fault that can be raised.",
+            hint="Use NAME or NAME@T2+3.5s with NAME one of: "
+            f"{', '.join(sorted(known))}. Nothing was started.",
+        )
+    name = match["name"]
+    if match["trial"]:
+        return FaultPlan(name, int(match["trial"]), float(match["seconds"]))
+    if name in AT_PREFLIGHT:
+        return FaultPlan(name, 0, 0.0)
+    plan = FaultPlan(name, 1, 0.0)
+    return FaultPlan(name, 1, _USUALLY_AFTER[plan.moment])
+
+
+def plan_faults(
+    texts: Sequence[str], rehearsal: Rehearsing | None, computer: Computer
+) -> Faults | None:
+    """Return the faults of a rehearsal; those of the preflight are raised at once.
+
+    Raises:
+        SettingsError: as `parse_fault`.
+    """
+    if rehearsal is None:
+        return None
+    known = (*rehearsal.fault_names, *COMPUTER_FAULTS)
+    faults = Faults([parse_fault(t, known) for t in texts], rehearsal, computer)
+    faults.raise_first()
+    return faults

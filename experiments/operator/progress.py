@@ -1,0 +1,66 @@
+"""How far a long computation is and how long it still takes, on one line."""
+
+from acquisition.clock import Clock
+from experiments.operator.console import Console
+
+_STEP = 0.1  # of the whole between two plain lines
+_BAR = 30  # characters
+_SECOND = 1_000_000_000
+
+
+class ProgressLine:
+    """Shows (done, total) as a bar with the time left; plain lines off a terminal.
+
+    Args:
+        console: where it is shown.
+        clock: tells how long it has taken so far.
+        what: what is counted, e.g. "fits".
+    """
+
+    def __init__(self, console: Console, clock: Clock, what: str) -> None:
+        self._console, self._clock, self._what = console, clock, what
+        self._began_ns = clock.now_ns()
+        self._at_first: int | None = None
+        self._said = 0.0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Show that `done` of `total` are done."""
+        if self._at_first is None:
+            # results of an earlier run are there at once and say nothing of the speed
+            self._at_first = done - 1 if done == 1 else done
+        elapsed = (self._clock.now_ns() - self._began_ns) / _SECOND
+        left = time_left(done - self._at_first, total - done, elapsed)
+        text = progress_text(done, total, left, self._what)
+        if self._console.is_live:
+            self._console.panel([text])
+        elif done == total or done / total >= self._said + _STEP:
+            self._said = done / total
+            self._console.say(text)
+
+    def end(self) -> None:
+        """Take the bar away; a second call does nothing."""
+        self._console.end_panel()
+
+
+def time_left(finished: int, left: int, elapsed: float) -> float | None:
+    """Return how long the rest takes [s] at the pace so far; None before there is one.
+
+    Args:
+        finished: how many were finished in `elapsed`.
+        left: how many are not done yet.
+        elapsed: time since the first began [s].
+    """
+    if left == 0:
+        return 0.0
+    return elapsed / finished * left if finished > 0 else None
+
+
+def progress_text(done: int, total: int, left: float | None, what: str) -> str:
+    """Return e.g. "━━━━━╺───── 40 of 88 fits, 1 min 5 s left"."""
+    filled = _BAR * done // max(total, 1)
+    bar = "━" * filled + "─" * (_BAR - filled)
+    if left is None or done >= total:
+        return f"{bar} {done} of {total} {what}"
+    minutes, seconds = divmod(round(left), 60)
+    words = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+    return f"{bar} {done} of {total} {what}, {words} left"

@@ -1,0 +1,208 @@
+"""What the live part of the screen shows, as lines of text; pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import NDArray
+
+from experiments.operator.prompts import REJECT_REASONS
+
+_BARS = "▁▂▃▄▅▆▇█"
+_ABSURD = 1e9  # nothing a sensor or an encoder can mean
+_NARROW, _WIDE = 10, 40  # characters of a sparkline
+READY_KEYS = "[space] record   [n]ote   [v]iew last   [p]ause   [q]uit after this"
+NOTE_KEYS = "Type the note: Enter ends it, Esc gives it up."
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingView:
+    """A running trial.
+
+    Attributes:
+        trial: its name.
+        seconds: since the start [s].
+        displacement: of the foot along the container [m].
+        travel: length of the container [m].
+        rate: cycles per second of the last second [Hz].
+        missed: cycles that were missed in this trial.
+        is_arm_fine: every motor answered in the last cycle.
+        is_sensor_fine: the last force sample was fresh and within its range.
+        traction: v_t, F_t, F_n of the last seconds [m/s, N, N], shape (n, 3).
+    """
+
+    trial: str
+    seconds: float
+    displacement: float
+    travel: float
+    rate: float
+    missed: int
+    is_arm_fine: bool
+    is_sensor_fine: bool
+    traction: NDArray[np.float64]
+
+
+def sparkline(values: Sequence[float] | NDArray[np.float64], width: int) -> str:
+    """Return `values` as `width` bars between their smallest and largest.
+
+    Each bar is the largest magnitude of its share, so that a short slip shows.
+    """
+    data = np.asarray(values, dtype=np.float64)
+    data = data[np.abs(data) < _ABSURD]  # no NaN is
+    if not len(data):
+        return " " * width
+    parts = [part for part in np.array_split(data, width) if len(part)]
+    peaks = np.array([part[np.argmax(np.abs(part))] for part in parts])
+    low, high = float(min(peaks.min(), 0.0)), float(peaks.max())
+    span = high - low
+    if span <= 0.0:
+        return (_BARS[0] * len(peaks)).rjust(width)
+    steps = (peaks - low) / span * (len(_BARS) - 1)
+    return "".join(_BARS[round(float(step))] for step in steps).rjust(width)
+
+
+def recording_lines(view: RecordingView, width: int) -> list[str]:
+    """Return the screen of a running trial for a terminal of `width` characters."""
+    bars = _WIDE if width >= 3 * (_WIDE + 14) else _NARROW
+    newest = view.traction[-1] if len(view.traction) else np.zeros(3)
+    v_t, F_t, F_n = (float(value) for value in newest)
+    columns = (
+        ("F_n", view.traction[:, 2], f"{F_n:.1f} N"),
+        ("F_t", view.traction[:, 1], f"{F_t:.1f} N"),
+        ("v_t", view.traction[:, 0], f"{v_t:.3f} m/s"),
+    )
+    return [
+        f"● REC {view.trial}  {view.seconds:04.1f} s  {view.displacement:.2f} of "
+        f"{view.travel:.2f} m  {view.rate:.1f} Hz  missed {view.missed}   "
+        f"CAN {_fine(view.is_arm_fine)}   F/T {_fine(view.is_sensor_fine)}",
+        "   ".join(
+            f"{name} {sparkline(values, bars)} {text}" for name, values, text in columns
+        ),
+        "[space] stop early    Ctrl-C finish safely, twice = stop now",
+    ]
+
+
+def live_line(
+    trial: str,
+    where: tuple[float, float, float],
+    traction: tuple[float, float, float],
+    late: int,
+) -> str:
+    """Return a running trial in one line, for where nothing can be drawn.
+
+    Args:
+        trial: its name.
+        where: time since the start [s], displacement and travel [m].
+        traction: v_t, F_t, F_n [m/s, N, N].
+        late: cycles that were late.
+    """
+    seconds, displacement, travel = where
+    v_t, F_t, F_n = traction
+    return (
+        f"● REC {trial}  {seconds:4.1f} s  {displacement:.2f} of {travel:.2f} m  "
+        f"F_n {F_n:.1f} N  F_t {F_t:.1f} N  v_t {v_t:.3f} m/s  late {late}"
+    )
+
+
+def review_keys() -> str:
+    """Return the keys of the review; there is no default on purpose."""
+    reasons = "  ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
+    return f"[k]eep   [r]edo: {reasons}   [n]ote"
+
+
+@dataclass(frozen=True, slots=True)
+class ReadyView:
+    """Between two trials.
+
+    Attributes:
+        session: its id.
+        terrain: its terrain.
+        trial: number of the next trial.
+        wanted: how many are to be kept.
+        kept: how many are.
+        rejected: how many were not.
+        elapsed: since the session was opened [s].
+        left: how long the missing ones will take [s]; None = nobody knows yet.
+        reset: what is to be done to the terrain before each trial.
+        suggestion: of the next push; empty if there is none.
+    """
+
+    session: str
+    terrain: str
+    trial: int
+    wanted: int
+    kept: int
+    rejected: int
+    elapsed: float
+    left: float | None
+    reset: tuple[str, ...]
+    suggestion: str
+
+
+def ready_lines(view: ReadyView) -> list[str]:
+    """Return the screen between two trials."""
+    left = "" if view.left is None else f" · left about {ceil(view.left / 60)} min"
+    lines = [
+        f"{view.session} {view.terrain} · trial {view.trial} of {view.wanted} · kept "
+        f"{view.kept} · rejected {view.rejected}    ARM: floating",
+        f"Elapsed {_clock(view.elapsed)}{left}",
+    ]
+    if view.reset:
+        lines.append("Reset: " + " ".join(f"☐ {step}" for step in view.reset))
+    if view.suggestion:
+        lines.append(f"Suggested next: {view.suggestion}")
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class EndView:
+    """A session that has nothing left to record.
+
+    Attributes:
+        session: its id.
+        terrain: its terrain.
+        kept: how many trials are kept.
+        wanted: how many are to be.
+        rejected: how many were not.
+        elapsed: how long this opening took [s].
+        estimate: how long it looked like taking after its first kept trial [s].
+        drift: of the force between first and last tare [N]; empty = not known.
+    """
+
+    session: str
+    terrain: str
+    kept: int
+    wanted: int
+    rejected: int
+    elapsed: float
+    estimate: float | None
+    drift: tuple[float, ...]
+
+
+def end_lines(view: EndView) -> list[str]:
+    """Return the page at the end of a session."""
+    estimate = ""
+    if view.estimate is not None:
+        estimate = f" · estimated after the first trial: {_clock(view.estimate)}"
+    lines = [
+        f"{view.session} {view.terrain} · kept {view.kept} of {view.wanted} · rejected "
+        f"{view.rejected}",
+        f"Took {_clock(view.elapsed)}{estimate}",
+    ]
+    if view.drift:
+        axes = "  ".join(
+            f"{axis} {value:+.2f}"
+            for axis, value in zip(("fx", "fy", "fz"), view.drift, strict=True)
+        )
+        lines.append(f"Force drifted between first and last tare [N]: {axes}")
+    return lines
+
+
+def _fine(is_fine: bool) -> str:
+    return "ok" if is_fine else "✘"
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(int(seconds), 60)
+    return f"{minutes}:{rest:02d}"

@@ -1,0 +1,156 @@
+"""Single keys from a terminal, which is given back as it was whatever happens."""
+
+import atexit
+import codecs
+import contextlib
+import os
+import select
+import termios
+import tty
+from types import TracebackType
+from typing import Self
+
+from experiments.operator.prompts import REJECT_REASONS, Asked, Keys, Prompt
+
+_AT_ONCE = 256  # bytes
+LONGEST_LINE = 500  # characters of a note
+_ESCAPE, _BACKSPACE = "\x1b", "\x7f\x08"
+
+
+class Cbreak:
+    """A terminal without line editing and echo while this lasts.
+
+    Leaving it twice, or through an exit handler, restores the same settings once.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._before: list[int | list[bytes | int]] | None = None
+
+    def __enter__(self) -> Self:
+        """Switch the terminal over; one that has gone is left alone."""
+        with contextlib.suppress(termios.error):
+            self._before = termios.tcgetattr(self._descriptor)
+            tty.setcbreak(self._descriptor, termios.TCSADRAIN)
+            atexit.register(self.restore)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give the terminal back."""
+        del kind, error, trace
+        self.restore()
+
+    def restore(self) -> None:
+        """Give the terminal back as it was; a second call does nothing."""
+        before, self._before = self._before, None
+        if before is not None:
+            atexit.unregister(self.restore)
+            with contextlib.suppress(termios.error):
+                termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
+
+
+def keyboard(keys: Keys) -> contextlib.AbstractContextManager[object]:
+    """Return what switches the terminal over while `keys` come from it."""
+    if isinstance(keys, TerminalKeys):
+        return Cbreak(keys.descriptor)
+    return contextlib.nullcontext()
+
+
+class TerminalKeys:
+    """Keys as they are pressed, from a keyboard or anything that looks like one.
+
+    A pedal that types a space or a letter is a keyboard too. `r` waits for the digit
+    of the reason; any other key takes the `r` back.
+
+    Attributes:
+        descriptor: of the terminal.
+        draft: what has been typed of a line so far.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+        self.draft = ""
+        self._waiting = ""
+        self._decoder = codecs.getincrementaldecoder("utf-8")("ignore")
+        self._is_end = False
+        self._is_rejecting = False
+        self._prompt: Prompt | None = None
+
+    def answer(self, asked: Asked) -> str:
+        """Return the next key that was pressed, "" for none, q when all have gone.
+
+        What was typed before the prompt came was not meant for it and is forgotten.
+        """
+        self._hear(asked.prompt)
+        while self._waiting:
+            found = self._take(self._next().lower(), asked.prompt)
+            if found:
+                return found
+        return "q" if self._is_end else ""
+
+    def line(self, asked: Asked) -> str | None:
+        """Return the line when Enter ends it, "" when Esc gives it up, None before.
+
+        Backspace takes a character back. An arrow key, which begins like Esc, does
+        nothing.
+        """
+        self._hear(asked.prompt)
+        while self._waiting:
+            key = self._next()
+            if key in "\r\n":
+                found, self.draft = self.draft, ""
+                return found
+            if key == _ESCAPE and not self._skip_sequence():
+                self.draft = ""
+                return ""
+            if key in _BACKSPACE:
+                self.draft = self.draft[:-1]
+            elif key.isprintable() and len(self.draft) < LONGEST_LINE:
+                self.draft += key
+        return "" if self._is_end else None
+
+    def _hear(self, prompt: Prompt) -> None:
+        """Read what is there; what came before `prompt` is forgotten."""
+        self._read()
+        if prompt is not self._prompt:
+            self._prompt = prompt
+            self._waiting, self._is_rejecting = "", False
+            self.draft = ""
+
+    def _next(self) -> str:
+        key, self._waiting = self._waiting[0], self._waiting[1:]
+        return key
+
+    def _skip_sequence(self) -> bool:
+        """Pass over the rest of an arrow or function key; return whether it was one."""
+        if self._waiting[:1] not in ("[", "O"):
+            return False
+        self._next()
+        while self._waiting and not (key := self._next()).isalpha() and key != "~":
+            pass
+        return True
+
+    def _read(self) -> None:
+        while not self._is_end and select.select([self.descriptor], [], [], 0)[0]:
+            try:
+                data = os.read(self.descriptor, _AT_ONCE)
+            except OSError:
+                data = b""
+            self._is_end = not data
+            self._waiting += self._decoder.decode(data)
+
+    def _take(self, key: str, prompt: Prompt) -> str:
+        if key in "\r\n":
+            key = " "  # Enter confirms like space
+        if self._is_rejecting:
+            self._is_rejecting = False
+            return f"r{key}" if key in REJECT_REASONS else ""
+        if key == "r" and prompt is Prompt.REVIEW:
+            self._is_rejecting = True
+            return ""
+        return key if key.isprintable() else ""

@@ -1,0 +1,105 @@
+"""What the preflight says of the computer and of the running force sensor."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.sample import Record
+from experiments.operator.console import BAD, GOOD, WARNING
+from ft_sensor.reading import axis_names, largest_traction
+from ft_sensor.serial_line.sensor import BURSTY
+
+CPUS = Path("/sys/devices/system/cpu")
+FAST = "performance"
+OLD_MS = 6.0  # ms, a force sample that is older counts as stale
+NOISY = 0.5  # N, several times what a quiet sensor shows
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the page."""
+
+    mark: str
+    name: str
+    text: str
+
+
+def check_governor(cpus: Path = CPUS) -> Finding:
+    """Grade how the processors' clocks are governed."""
+    found: set[str] = set()
+    for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
+        try:
+            found.add(path.read_text(encoding="ascii", errors="replace").strip())
+        except OSError:
+            continue
+    if not found:
+        return Finding(GOOD, "CPU governor", "none on this machine")
+    if found == {FAST}:
+        return Finding(GOOD, "CPU governor", FAST)
+    names = ", ".join(sorted(found))
+    fix = "cpupower frequency-set -g performance"
+    return Finding(WARNING, "CPU governor", f"{names}: {fix}")
+
+
+def check_code(facts: dict[str, str]) -> Finding:
+    """Grade the version of the program; `facts` are those of provenance."""
+    commit = facts["commit"][:10]
+    if facts["dirty"] == "true":
+        text = f"{facts['software']} {commit}, changed since: the diff is recorded"
+        return Finding(WARNING, "code", text)
+    return Finding(GOOD, "code", f"{facts['software']} {commit}")
+
+
+def check_wrenches(samples: Record, now_ns: int) -> Finding:
+    """Grade rate, age and noise of force samples.
+
+    Args:
+        samples: newest records of the board's ring of wrenches, oldest first.
+        now_ns: monotonic time [ns].
+    """
+    name = "F/T samples"
+    times = samples["t_ns"].astype(np.int64) * 1e-9
+    if len(samples) < 2 or times[-1] <= times[0]:
+        return Finding(WARNING, name, f"{len(samples)} while the loop was tested")
+    rate = (len(samples) - 1) / float(times[-1] - times[0])
+    age = (now_ns - int(samples["t_ns"][-1])) * 1e-6
+    forces = samples["wrench"][-max(2, int(rate * 0.2)) :, :3]
+    noise = float(forces.std(axis=0).max())
+    saturated = int((samples["saturated"] != 0).sum())
+    text = f"{rate:.0f} Hz, age {age:.1f} ms, noise {noise:.2f} N"
+    if saturated:
+        axes = axis_names(int(np.bitwise_or.reduce(samples["saturated"])))
+        text += f", {saturated} saturated ({', '.join(axes)})"
+    is_fine = age < OLD_MS and noise < NOISY and not saturated
+    return Finding(GOOD if is_fine else WARNING, name, text)
+
+
+def reach_words(facts: Mapping[str, str], lever: float) -> str:
+    """Return the largest traction that a sensor with these facts can measure.
+
+    Args:
+        facts: what it says about itself; "ranges" has six numbers [N, N m].
+        lever: how far below its origin the sole is [m].
+    """
+    fx, fy, fz, tx, ty, tz = map(float, facts["ranges"].split())
+    most = largest_traction((fx, fy, fz, tx, ty, tz), lever)
+    return f"F_t up to {most:.0f} N"
+
+
+def check_stream(facts: Mapping[str, str]) -> Finding | None:
+    """Grade a serial stream by what became of it; None for a sensor on the bus."""
+    name = "F/T stream"
+    if "frames" not in facts and "trouble" not in facts:
+        return None
+    if facts.get("trouble"):
+        return Finding(BAD, name, facts["trouble"])
+    text = f"{facts['lost']} of {int(facts['frames']) + int(facts['lost'])} lost"
+    text += f", {facts['bad_checks']} damaged"
+    bursts, reads = int(facts["bursts"]), int(facts["reads"])
+    is_bursty = bursts > BURSTY * reads
+    if is_bursty:
+        text += ", comes in bursts: latency timer of the adapter to 1 ms"
+    is_fine = not is_bursty and facts["lost"] == facts["bad_checks"] == "0"
+    return Finding(GOOD if is_fine else WARNING, name, text)

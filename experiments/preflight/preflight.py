@@ -1,0 +1,270 @@
+"""Is the rig fit to run? Every check graded, with what to do beside it."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
+from acquisition.devices import SafetyMode
+from acquisition.errors import (
+    LinkError,
+    LinkTimeoutError,
+    PreflightError,
+    TractionError,
+)
+from experiments import provenance
+from experiments.messages import preflight_error
+from experiments.operator.console import BAD, GOOD, WARNING, Console
+from experiments.preflight.host_checks import (
+    Finding,
+    check_code,
+    check_governor,
+    check_stream,
+    check_wrenches,
+    reach_words,
+)
+from experiments.rig.backend import EXCHANGE_CYCLES
+from experiments.rig.gravity import gravity_words
+from experiments.rig.rig import FakeOptions, Rig, build_rig
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from wam.driver.health import complaints, temperature_range
+
+LOOP_TEST = 5.0  # s
+STEPPED_TEST = 0.3  # s
+Add = Callable[[str, str, str], None]
+SESSION_GB = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One line of the page: mark, name, what was found."""
+
+    mark: str
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Preflight:
+    """The page, and what the devices said about themselves."""
+
+    checks: tuple[Check, ...]
+    devices: dict[str, str]
+
+    def after(self, finding: Finding) -> "Preflight":
+        """Return the page with what was found before it."""
+        first = Check(finding.mark, finding.name, finding.text)
+        return replace(self, checks=(first, *self.checks))
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the page for preflight.json."""
+        return {"checks": [asdict(check) for check in self.checks]}
+
+
+def connect_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
+    """Return the rig with its bus open.
+
+    Raises:
+        PreflightError: the CAN interface cannot be used.
+    """
+    try:
+        return build_rig(settings, row, fake)
+    except LinkError as error:
+        raise _not_reached(error, settings.rig) from error
+
+
+def run_preflight(
+    rig: Rig, data: Path, console: Console, seconds: float = LOOP_TEST
+) -> Preflight:
+    """Check configuration, arm, sensor, loop and disk; print one line each.
+
+    The loop runs afterwards, the arm idle. `seconds`: how long it is tested.
+
+    Raises:
+        PreflightError: a check failed.
+    """
+    checks: list[Check] = []
+
+    def add(mark: str, name: str, text: str) -> None:
+        checks.append(Check(mark, name, text))
+        console.check(mark, name, text)
+
+    def note(finding: Finding) -> None:
+        add(finding.mark, finding.name, finding.text)
+
+    weight = gravity_words(rig.settings.rig, rig.gravity_text, rig.row.foot)
+    add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, gravity {weight}")
+    note(check_code(provenance.collect()))
+    if not rig.is_stepped:
+        note(check_governor())
+    check_disk(rig, data, add)
+    _check_arm(rig, add)
+    sensor = _check_sensor(rig, add)
+    _check_exchange(rig, add)
+    grants = _check_rights(rig, add)
+    wrenches = rig.board.wrenches.reader()
+    rig.crew.begin()
+    _check_loop(rig, seconds, add)
+    note(check_wrenches(wrenches.read(), rig.clock.now_ns()))
+    _check_stream(rig, note)
+    devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
+    return Preflight(tuple(checks), {**devices, **grants})
+
+
+def _check_arm(rig: Rig, add: Add) -> None:
+    try:
+        info = rig.crew.start_arm()
+    except TractionError as error:
+        add(BAD, "arm", str(error))
+        raise _not_reached(error, rig.settings.rig) from error
+    versions = sorted({puck.vers for puck in info.pucks})
+    woken = sum(puck.was_asleep for puck in info.pucks)
+    parts = [f"firmware {', '.join(map(str, versions))}"]
+    parts += [f"{woken} woken"] if woken else []
+    parts += ["zeroed"] if info.is_zeroed else []
+    health, now_ns = [puck.health for puck in info.pucks], rig.clock.now_ns()
+    ill = complaints(health, now_ns)
+    parts += [temperature_range(health, now_ns), *ill]
+    add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
+    if not info.is_zeroed:
+        add(BAD, "zero", "not zeroed")
+        raise preflight_error("not-zeroed")
+    faults = [f"{fault} fault: press Shift-idle" for fault in info.pendant.faults]
+    is_calm = info.safety_mode is SafetyMode.IDLE and not faults
+    name = info.safety_mode.name.lower().replace("_", "-")
+    parts = [name, f"firmware {info.safety_vers}", *faults]
+    add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
+
+
+def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
+    try:
+        facts = rig.crew.open_sensor()
+    except TractionError as error:
+        add(BAD, "F/T sensor", str(error))
+        raise _as_preflight(error, "idle") from error
+    name = f"{facts['model']}, {facts['measured_rate']}"
+    add(GOOD, "F/T sensor", f"{name}, {reach_words(facts, _lever(rig))}")
+    return facts
+
+
+def _lever(rig: Rig) -> float:
+    """Return how far below the sensor's origin the sole is [m]."""
+    tool = rig.model.tool
+    assert tool is not None
+    return float(tool.sole[2] - tool.sensor_height)
+
+
+def _check_stream(rig: Rig, note: Callable[[Finding], None]) -> None:
+    """Grade what became of the sensor's stream while the loop was tested."""
+    facts = rig.crew.sensor_facts()
+    found = check_stream(facts)
+    if found is None:
+        return
+    note(found)
+    if found.mark == BAD:
+        raise preflight_error("ft-lost", why=facts["trouble"].rstrip("."))
+
+
+def start_devices(rig: Rig) -> None:
+    """Start arm, sensor and loop without a page of checks.
+
+    Raises:
+        PreflightError: the arm or the sensor is not fit.
+    """
+    try:
+        rig.crew.start_arm()
+        rig.crew.open_sensor()
+    except TractionError as error:
+        raise _as_preflight(error, "not touched") from error
+    rig.crew.begin()
+
+
+def _check_exchange(rig: Rig, add: Add) -> None:
+    """Grade the way from the request to the seventh position over this adapter."""
+    times = np.array(rig.crew.measure_exchange())
+    lost = EXCHANGE_CYCLES - len(times)
+    if len(times) < EXCHANGE_CYCLES // 2:
+        add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
+        raise preflight_error("exchange", lost=lost, cycles=EXCHANGE_CYCLES)
+    p50, p99 = np.percentile(times, (50, 99)) / 1e6
+    text = f"7 positions after {p50:.2f} ms (p99 {p99:.2f}), {lost} incomplete"
+    is_slow = p99 * 1e6 > SLOW_EXCHANGE_NS or lost > 1
+    slow = f": slow adapter, limit {SLOW_EXCHANGE_NS / 1e6:.1f} ms" if is_slow else ""
+    add(WARNING if is_slow else GOOD, "exchange", text + slow)
+
+
+def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
+    """Say what the kernel refused to each process; return it for the recording."""
+    facts: dict[str, str] = {}
+    refused: list[str] = []
+    for process, grants in rig.crew.grants().items():
+        words = [
+            grant.what if grant.is_granted else f"no {grant.what} ({grant.reason})"
+            for grant in grants
+        ]
+        facts[f"scheduler:{process}"] = ", ".join(words) or "ordinary"
+        refused += [
+            f"{process}: {w}"
+            for w, g in zip(words, grants, strict=True)
+            if not g.is_granted
+        ]
+    if facts:
+        text = "; ".join(refused) or "real-time scheduling, memory locked"
+        add(WARNING if refused else GOOD, "scheduler", text)
+    return facts
+
+
+def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
+    """Run the loop for a while, the arm idle, and grade its cadence."""
+    seconds = STEPPED_TEST if rig.is_stepped else seconds
+    timings = rig.crew.desk.timings()
+    rig.crew.desk.advance(seconds)
+    report = loop_report(timings.read())
+    if report is None:
+        add(BAD, "loop", "no cycle ran")
+        raise preflight_error("loop-dead")
+    worst = rig.settings.rig.limits.late_per_second
+    text = (
+        f"{report.rate:.1f} Hz · p99.9 late {report.late.p999 / 1000:.2f} ms · "
+        f"missed {report.missed}/{report.cycles}"
+    )
+    is_late = report.missed > worst * seconds
+    add(WARNING if is_late else GOOD, f"loop {seconds:g} s", text)
+
+
+def check_disk(rig: Rig, data: Path, add: Add) -> None:
+    """Grade the free space below `data`.
+
+    Raises:
+        PreflightError: less than the limit is free.
+    """
+    folder = data
+    while not folder.exists():
+        folder = folder.parent
+    free = rig.free_bytes(folder) / 1e9
+    limit = rig.settings.rig.limits.free_disk_gb
+    if free < max(limit, SESSION_GB):
+        add(BAD, "disk", f"{free:.1f} GB free")
+        raise preflight_error("disk-full", free=free, need=SESSION_GB, limit=limit)
+    add(GOOD, "disk", f"{free:.0f} GB free")
+
+
+def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
+    """Return the refusal of an arm that cannot be reached, or answers wrongly.
+
+    A bus that is down is told in the catalogue's words, with the command that helps.
+    """
+    is_bus = isinstance(error, LinkError) and not isinstance(error, LinkTimeoutError)
+    can = settings.can
+    if not is_bus or can.interface != "socketcan":
+        return _as_preflight(error, "not touched")
+    facts = {"channel": can.channel, "bitrate": can.bitrate}
+    return preflight_error("can-down", detail=error.message, **facts)
+
+
+def _as_preflight(error: TractionError, arm_state: str) -> PreflightError:
+    return PreflightError(error.message, hint=error.hint, arm_state=arm_state)

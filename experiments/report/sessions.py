@@ -1,0 +1,247 @@
+"""From sessions to a report: which trials, what is said about them."""
+
+from collections.abc import Generator, Iterable, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError, TrialFileError
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions
+from analysis.findings.rig_health import rig_health
+from analysis.report.page import ReportContext, write_report
+from analysis.report.what_if import Choice, plain_choice, side_by_side
+from analysis.study.fold_store import ResultStore
+from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, FitOptions
+from analysis.study.study import Study, StudyOptions, run_study
+from analysis.terrains.export import database_of
+from analysis.terrains.identify import identify_study
+from experiments.messages import CATALOGUE
+from experiments.operator.console import Console
+from experiments.operator.progress import ProgressLine
+from experiments.report.tables import report_tables
+from experiments.report.truth_tables import truth_tables
+from experiments.session.store import (
+    SessionFolder,
+    find_session,
+    iso_utc,
+    list_sessions,
+    write_new_text,
+)
+
+FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
+REPORTED = (*FITTERS, GP_SE_NOISE)  # the models of a report: Fig. 9, and chosen noise
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """How a report is made.
+
+    Attributes:
+        terrains: names in the matrix's order.
+        seed: seed of the points of the Gaussian processes.
+        scheduler: address of a Dask scheduler to fit on; None for this machine.
+        choices: what the study is repeated under.
+    """
+
+    terrains: Sequence[str]
+    seed: int
+    scheduler: str | None = None
+    choices: Sequence[Choice] = ()
+
+    def sorted(self, names: Iterable[str]) -> list[str]:
+        """Return `names` in the matrix's order, others last by name."""
+        place = {name: i for i, name in enumerate(self.terrains)}
+        return sorted(names, key=lambda name: (place.get(name, len(place)), name))
+
+
+def choose_sessions(
+    data: Path, names: Sequence[str], *, every: bool
+) -> list[SessionFolder]:
+    """Return the sessions to report, of one kind only.
+
+    Raises:
+        SessionError: none are named or found, or live and simulated ones are mixed.
+    """
+    if bool(names) == every:
+        raise SessionError(
+            "Name the sessions to report, or use --all.",
+            hint="For example: traction report S012",
+        )
+    if every:
+        sessions = [s for s in list_sessions(data) if s.kept_trials()]
+    else:
+        sessions = [find_session(data, name) for name in dict.fromkeys(names)]
+    if not sessions:
+        raise SessionError(
+            f"There are no kept trials in {data}.",
+            hint="Record some: traction run S0 --fake --fast",
+        )
+    simulated = [s for s in sessions if s.is_simulated]
+    if simulated and len(simulated) < len(sessions):
+        message, facts = CATALOGUE["mixed"], {"session": simulated[0].id}
+        raise SessionError(
+            message.what.format_map(facts), hint=message.do.format_map(facts)
+        )
+    return sessions
+
+
+def _load_trials(
+    sessions: Sequence[SessionFolder], console: Console
+) -> tuple[dict[str, list[RecordedTrial]], list[str]]:
+    """Return (kept trials by terrain, oldest session first; what was left out)."""
+    trials: dict[str, list[RecordedTrial]] = {}
+    problems: list[str] = []
+    for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
+        for path in session.kept_trials():
+            try:
+                trial = load_trial(path)
+            except TrialFileError as error:
+                problems.append(str(error))
+                console.say(f"▲ left out: {error}")
+                continue
+            if trial.is_simulated is not session.is_simulated:
+                raise SessionError(
+                    f"{path.name} of {session.id} is "
+                    f"{'' if trial.is_simulated else 'not '}simulated, its folder says "
+                    "otherwise. Reports do not mix.",
+                    hint="Put the file back where it came from.",
+                )
+            trials.setdefault(trial.terrain, []).append(trial)
+    return trials, problems
+
+
+@dataclass(frozen=True, slots=True)
+class Studied:
+    """Sessions and what a study makes of them.
+
+    Attributes:
+        study: the result.
+        trials: the kept trials by terrain, in the matrix's order.
+        problems: what was left out, and why.
+    """
+
+    study: Study
+    trials: dict[str, list[RecordedTrial]]
+    problems: list[str]
+
+
+def study_sessions(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    order: Order,
+    console: Console,
+    fit: FitOptions,
+) -> Studied:
+    """Load the kept trials and fit; finished folds are kept below `data`.
+
+    Raises:
+        SessionError: no session has a kept trial.
+    """
+    trials, problems = _load_trials(sessions, console)
+    count = sum(len(group) for group in trials.values())
+    if not count:
+        raise SessionError(
+            f"{', '.join(s.id for s in sessions)}: no kept trials to report."
+        )
+    trials = {name: trials[name] for name in order.sorted(trials)}
+    console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
+    is_simulated = sessions[0].is_simulated
+    travel = min(t.frame.travel for group in trials.values() for t in group)
+    options = StudyOptions(
+        prepare=PrepareOptions(container_travel=travel),
+        fit=fit,
+        scheduler=order.scheduler,
+    )
+    series = {name: [t.series() for t in group] for name, group in trials.items()}
+    with fitting(console) as progress:
+        study = run_study(
+            series, options, is_simulated, progress, ResultStore(data / FOLDS)
+        )
+    return Studied(study, trials, problems)
+
+
+@contextmanager
+def fitting(console: Console) -> Generator[ProgressLine]:
+    """Show the progress of the fits inside the block."""
+    progress = ProgressLine(console, SystemClock(), "fits")
+    try:
+        yield progress
+    finally:
+        progress.end()
+
+
+def repeated(done: Studied, choice: Choice, data: Path, console: Console) -> Study:
+    """Return the study once more under a choice."""
+    console.say(f"What if {choice.text}: fitting ...")
+    series = {
+        name: [t.series(choice.frame) for t in group]
+        for name, group in done.trials.items()
+    }
+    options = choice.options(done.study.options)
+    with fitting(console) as progress:
+        return run_study(
+            series, options, done.study.simulated, progress, ResultStore(data / FOLDS)
+        )
+
+
+def export_terrains(
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    out: Path,
+    order: Order,
+    console: Console,
+) -> None:
+    """Write a terrain database of all models of the sessions' terrains to `out`.
+
+    Raises:
+        SessionError: no session has a kept trial.
+        TrialFileError: `out` exists or cannot be written.
+    """
+    judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
+    done = study_sessions(sessions, data, order, console, judged)
+    study = done.study
+    options = replace(study.options, fit=FitOptions(seed=order.seed, draws=0))
+    text = database_of(
+        replace(study, options=options),
+        identify_study(study),
+        iso_utc(SystemClock().utc_ns()),
+        store=ResultStore(data / FOLDS),
+    )
+    write_new_text(out, text)
+    console.say(f"{len(study.terrains)} terrains: {out}")
+
+
+def report_sessions(
+    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
+) -> Path:
+    """Load the kept trials, fit, and write the report; return the page.
+
+    One session is reported into its own folder, several into `data`/study.
+
+    Raises:
+        SessionError: no session has a kept trial.
+    """
+    fit = FitOptions(seed=order.seed, models=REPORTED)
+    done = study_sessions(sessions, data, order, console, fit)
+    study, trials = done.study, done.trials
+    others = [(c, repeated(done, c, data, console)) for c in order.choices]
+    count = sum(len(group) for group in trials.values())
+    out = sessions[0].path if len(sessions) == 1 else data / "study"
+    context = ReportContext(
+        title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
+        subtitle=f"{count} trials on {', '.join(trials)}",
+        is_simulated=study.simulated,
+        is_foreign=False,
+        generated_utc=iso_utc(SystemClock().utc_ns()),
+        tables=[
+            *(side_by_side(choice, study, other) for choice, other in others),
+            *truth_tables(study, trials),
+            *report_tables(sessions, trials),
+        ],
+        facts={"what_if": [plain_choice(c, study, other) for c, other in others]},
+        warnings=done.problems,
+        rig=rig_health([trial for group in trials.values() for trial in group]),
+    )
+    return write_report(study, out, context)

@@ -1,0 +1,145 @@
+"""What a report says of sessions, settings and provenance, beyond the models."""
+
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+from analysis.data.load import RecordedTrial
+from analysis.report.page_model import ReportTable, Section
+from experiments.session.store import SessionFolder, read_json
+
+_ROW = (
+    ("incline_deg", "incline [°]"),
+    ("stone_size", "stones"),
+    ("tread", "tread"),
+    ("effective_mass_kg", "virtual mass [kg]"),
+    ("foot_mass_kg", "foot [kg]"),
+    ("gravity_model", "gravity"),
+)
+
+
+def report_tables(
+    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[RecordedTrial]]
+) -> list[ReportTable]:
+    """Return sessions, rejected trials, preflight, settings, provenance and files."""
+    every = [trial for group in trials.values() for trial in group]
+    return [
+        _session_table(sessions),
+        _rejected_table(sessions),
+        _preflight_table(sessions),
+        _matrix_table(trials),
+        _provenance(every),
+        _files(sessions),
+    ]
+
+
+def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+    rows = [
+        (
+            s.id,
+            s.terrain,
+            s.path.name[:10],
+            "SIMULATED" if s.is_simulated else "LIVE",
+            str(len(list(s.trials.glob("T??.mcap")))),
+            str(len(s.rejected_sidecars())),
+        )
+        for s in sessions
+    ]
+    return ReportTable(
+        "Sessions",
+        ("session", "terrain", "date", "kind", "kept", "rejected"),
+        rows,
+        section=Section.SUMMARY,
+    )
+
+
+def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+    rows = [
+        (
+            s.id,
+            f"{facts.get('trial', '?')} attempt {facts.get('attempt', '?')}",
+            str(facts.get("status", "")),
+            str(facts.get("reason", "")),
+            str(facts.get("who", "")),
+            str(facts.get("when", "")),
+        )
+        for s in sessions
+        for facts in s.rejected_sidecars()
+    ]
+    return ReportTable(
+        "Acceptance: rejected and interrupted trials",
+        ("session", "trial", "status", "reason", "who", "when (UTC)"),
+        rows,
+        note="" if rows else "None: every recorded trial was kept.",
+        section=Section.HEALTH,
+    )
+
+
+def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
+    said: dict[tuple[str, ...], list[str]] = {}
+    for session in sessions:
+        checks = read_json(session.path / "preflight.json").get("checks", [])
+        for check in cast("list[object]", checks) if isinstance(checks, list) else []:
+            if isinstance(check, dict):
+                facts = cast("dict[str, object]", check)
+                found = tuple(str(facts.get(k, "")) for k in ("name", "mark", "text"))
+                said.setdefault(found, []).append(session.id)
+    return ReportTable(
+        "Checks before the sessions",
+        ("check", "", "found", "sessions"),
+        [(*found, ", ".join(ids)) for found, ids in sorted(said.items())],
+        section=Section.HEALTH,
+    )
+
+
+def _matrix_table(trials: Mapping[str, Sequence[RecordedTrial]]) -> ReportTable:
+    rows = [
+        (
+            name,
+            *(
+                " | ".join(
+                    sorted({trial.metadata["trial"].get(key, "?") for trial in group})
+                )
+                for key, _ in _ROW
+            ),
+            " | ".join(sorted({f"{trial.frame.travel:g}" for trial in group})),
+        )
+        for name, group in trials.items()
+    ]
+    return ReportTable(
+        "Settings of the terrains",
+        ("terrain", *(head for _, head in _ROW), "travel [m]"),
+        rows,
+    )
+
+
+def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
+    facts: dict[str, set[str]] = {}
+    for trial in trials:
+        for key, value in trial.metadata["provenance"].items():
+            facts.setdefault(key, set()).add(value)
+    rows = [(key, _few(values)) for key, values in facts.items()]
+    return ReportTable(
+        "Provenance",
+        ("what", "value"),
+        rows,
+        note="As recorded in the trials: code, packages, machine, firmware, and the "
+        "checksums of the settings that every trial file contains.",
+    )
+
+
+def _few(values: set[str]) -> str:
+    """Return the values in order; many, as of checksums per trial, are counted."""
+    if len(values) <= 3:
+        return " | ".join(sorted(values))
+    return f"{len(values)} different values, in the trial files"
+
+
+def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
+    rows: list[tuple[str, str, str]] = []
+    for session in sessions:
+        for path in sorted(session.trials.glob("T*.json")):
+            facts = read_json(path)
+            name = f"{session.path.name}/trials/{path.stem}.mcap"
+            digest, size = (str(facts.get(key, "?")) for key in ("sha256", "size"))
+            rows.append((name, size, digest))
+    return ReportTable("Trial files", ("file", "bytes", "SHA-256"), rows)

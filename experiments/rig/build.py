@@ -1,0 +1,213 @@
+"""Settings in, parts of a rig out: tool, limits, arm, sensor, the work of a cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.guard import Limits
+from acquisition.devices import WrenchSample, WrenchSensor
+from acquisition.errors import SettingsError
+from acquisition.ipc.frame_tape import FrameTape
+from acquisition.ipc.layout import Board
+from acquisition.ipc.loop_server import Attendant, Surroundings, no_bell
+from acquisition.ipc.shared_sensor import SharedSensor, publish
+from acquisition.sample import Flag
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import FootSection, RigSettings
+from experiments.settings.sensor import build_device
+from ft_sensor.observer import LiveFoot
+from ft_sensor.payload import TerrainFrame, payload_of
+from ft_sensor.serial_line.link import SerialLink, SerialPort
+from ft_sensor.serial_line.sensor import SerialSensor
+from ft_sensor.vendors.barrett import BarrettSensor
+from wam.bus.link import CanLink
+from wam.bus.tap import FrameTap
+from wam.control.controller import FootController
+from wam.control.joint_lock import LockGains
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.driver.arm import WamArm
+from wam.driver.health import health_facts
+from wam.driver.safety_limits import WARNING_SHARE, SafetyLimits
+from wam.driver.settings import ArmSettings
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Body
+from wam.model.tool import Tool, sensor_body
+
+MS = 1_000_000
+
+
+def terrain_frame(row: TerrainRow) -> TerrainFrame:
+    """Return the frame of a row of the matrix."""
+    return TerrainFrame(
+        incline=float(np.radians(row.incline_deg)),
+        heading=float(np.radians(row.heading_deg)),
+        far_end=row.far_end,
+        travel=row.travel,
+    )
+
+
+def build_tool(rig: RigSettings, foot: str) -> Tool:
+    """Return sensor and foot as rig.toml describes them."""
+    section: FootSection = rig.feet.tread if foot == "tread" else rig.feet.bare
+    sensor = rig.ft_sensor
+    body = sensor_body()
+    return Tool(
+        sensor=Body(sensor.mass, body.com, body.inertia),
+        foot=Body(
+            section.mass, np.array(section.com), np.diag(np.array(section.inertia))
+        ),
+        sole=np.array(section.sole),
+        sensor_height=sensor.height,
+        sensor_angle=float(np.radians(sensor.angle_deg)),
+        sensor_sign=float(sensor.sign),
+    )
+
+
+def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
+    """Return the guard's limits of rig.toml."""
+    limits = rig.limits
+    return Limits(
+        q_lower=tuple(constants.q_lower.tolist()),
+        q_upper=tuple(constants.q_upper.tolist()),
+        qd=limits.speed,
+        tau=limits.torque,
+        foot_speed=limits.foot_speed,
+        joint7=limits.joint7_mrad * 1e-3,
+        ft_stale_ns=round(limits.ft_stale_ms * MS),
+        ft_stop_ns=round(limits.ft_stop_ms * MS),
+        late_per_second=limits.late_per_second,
+    )
+
+
+def build_walls(rig: RigSettings, constants: ArmConstants) -> Walls:
+    """Return the soft walls before the joint stops."""
+    return Walls(
+        lower=tuple(constants.q_lower.tolist()),
+        upper=tuple(constants.q_upper.tolist()),
+        torque=rig.limits.torque,
+        damping=tuple(constants.kd.tolist()),
+    )
+
+
+def build_safety_limits(rig: RigSettings) -> SafetyLimits:
+    """Return what the safety module is told; see [safety] of rig.toml."""
+    safety = rig.safety
+    speed, torque = safety.speed_warning, safety.torque_warning_units
+    if speed is None:
+        speed = WARNING_SHARE * safety.speed_fault
+    if torque is None:
+        torque = int(WARNING_SHARE * safety.torque_fault_units)
+    return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
+
+
+def build_arm(
+    rig: RigSettings,
+    constants: ArmConstants,
+    link: CanLink,
+    board: Board,
+    clock: Clock,
+) -> WamArm:
+    """Return the driver of the arm on `link`; every frame goes onto the board."""
+    link.tap = FrameTap(FrameTape(board.frames), clock)
+    settings = ArmSettings(j2mp=constants.j2mp, safety_limits=build_safety_limits(rig))
+    return WamArm(link, clock, settings)
+
+
+def open_bus_sensor(arm: WamArm, link: CanLink, clock: Clock) -> BarrettSensor:
+    """Open the wrist sensor on the arm's bus; it is asked along from then on.
+
+    Raises:
+        LinkError: it is silent.
+        DeviceFaultError: it is not well.
+    """
+    sensor = BarrettSensor(link, clock)
+    sensor.open()
+    arm.accompany(sensor)
+    return sensor
+
+
+def build_sensor(
+    rig: RigSettings, port: SerialPort, clock: Clock, *, is_simulated: bool
+) -> SerialSensor:
+    """Return the wrist sensor on `port`, not opened yet.
+
+    Raises:
+        SettingsError: the sensor is not a serial one.
+    """
+    device = build_device(rig.ft_sensor, is_simulated=is_simulated)
+    if device is None:
+        raise SettingsError(
+            "The F/T sensor has no serial line.", hint="Check ft_sensor.kind."
+        )
+    return SerialSensor(SerialLink(port), clock, device)
+
+
+@dataclass(frozen=True, slots=True)
+class LoopParts:
+    """What a loop is made of.
+
+    Attributes:
+        rig: rig.toml.
+        row: row of the matrix.
+        model: the arm with its tool, for everything but its weight.
+        law_model: the arm as the control law weighs it.
+        arm: driver of the arm.
+        sensor: the wrist sensor as the loop polls it.
+        board: the shared memory.
+        clock: the loop's time.
+        is_simulated: the devices are simulated.
+        ring: rings a bell for a person.
+    """
+
+    rig: RigSettings
+    row: TerrainRow
+    model: ArmModel
+    law_model: ArmModel
+    arm: WamArm
+    sensor: WrenchSensor
+    board: Board
+    clock: Clock
+    is_simulated: bool
+    ring: Callable[[], None] = no_bell
+
+
+def build_attendant(parts: LoopParts) -> Attendant:
+    """Join arm, sensor, law and guard into a cycle that is ready to run."""
+    control, model, board = parts.rig.control, parts.model, parts.board
+    assert model.tool is not None
+    is_shared = isinstance(parts.sensor, SharedSensor)
+
+    def on_wrench(samples: list[WrenchSample]) -> None:
+        if not is_shared:  # those of a shared sensor are on the board already
+            publish(samples, board.wrenches)
+
+    def facts() -> dict[str, str]:
+        arm = parts.arm
+        return {
+            **health_facts(arm.health(), parts.clock.now_ns()),
+            **arm.counters.facts(),
+            "link": arm.counters.text(),
+        }
+
+    cycle = Cycle(
+        parts.arm,
+        parts.sensor,
+        FootController(
+            parts.law_model,
+            control.virtual_mass,
+            LockGains(kp=control.lock_kp, kd=control.lock_kd),
+            SoftWalls(build_walls(parts.rig, model.constants)),
+        ),
+        LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
+        build_limits(parts.rig, model.constants),
+        board.cycles.write,
+        on_wrench,
+        extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
+    )
+    around = Surroundings(parts.clock.now_ns, facts, parts.ring)
+    return Attendant(cycle, parts.arm, board, around)

@@ -1,0 +1,211 @@
+"""The simulated world under a session: what it is told, and how it is stepped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from acquisition.clock import Clock, SystemClock
+from acquisition.devices import WrenchSensor
+from acquisition.errors import SettingsError
+from acquisition.ipc.layout import Board
+from experiments.rig.backend import Crew
+from experiments.rig.build import (
+    LoopParts,
+    build_arm,
+    build_sensor,
+    build_tool,
+    open_bus_sensor,
+    terrain_frame,
+)
+from experiments.rig.inline import InlineCrew
+from experiments.rig.simulation import Rehearsing
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from experiments.settings.sensor import SensorSection
+from ft_sensor.serial_line.link import SerialPort
+from ft_sensor.serial_line.sensor import SerialSensor
+from wam.bus.link import CanLink
+from wam.model.arm_model import ArmModel
+from wam.model.tool import tool_facts, tool_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fakes.serving.puck_server import PuckServer
+    from fakes.serving.sensor_server import SensorLine, SensorServer
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What is simulated: the settings as written, before any calibration.
+
+    Attributes:
+        rig: rig.toml.
+        row: row of the matrix.
+        seed: of everything random.
+        friction: of the joints, as a share of what was identified on another arm.
+        pace: how the simulated person pushes.
+    """
+
+    rig: RigSettings
+    row: TerrainRow
+    seed: int
+    friction: float
+    pace: str
+
+    def facts(self) -> dict[str, Any]:
+        """Return the world in plain values, for a process of its own."""
+        frame = terrain_frame(self.row)
+        scene = {
+            "terrain": self.row.name,
+            "stones": self.row.stones,
+            "foot": self.row.foot,
+            "frame": {
+                "incline": frame.incline,
+                "heading": frame.heading,
+                "far_end": list(frame.far_end),
+                "travel": frame.travel,
+            },
+            "start_q": list(self.row.start_q),
+            "seed": self.seed,
+            "sensor": sensor_facts(self.rig.ft_sensor),
+        }
+        return {
+            "scene": scene,
+            "tool": tool_facts(build_tool(self.rig, self.row.foot)),
+            "friction": self.friction,
+            "pace": self.pace,
+        }
+
+
+def sensor_facts(section: SensorSection) -> dict[str, Any]:
+    """Return which simulated sensor fits the settings, in plain values."""
+    return {
+        "kind": section.kind,
+        "sinc": section.sinc,
+        "baudrate": section.baudrate,
+        "sensitivity": section.sensitivity,
+        "serial_number": section.serial_number,
+    }
+
+
+def stepped(
+    world: World,
+    settings: Settings,
+    row: TerrainRow,
+    models: tuple[ArmModel, ArmModel],
+    board: Board,
+) -> tuple[Clock, Crew, Rehearsing]:
+    """Return (clock, crew, handle) of a simulation that runs in this thread.
+
+    `models`: the arm with its tool, and as the control law weighs it.
+    """
+    from fakes.clock import SteppedClock
+    from fakes.plant.plant import PlantOptions
+    from fakes.plant.push import PACES
+    from fakes.serving.rig_process import scene_of
+    from fakes.world.rig import FakeRig, Rehearsal
+
+    clock, facts = SteppedClock(), world.facts()
+    model, law_model = models
+    simulation = FakeRig(
+        scene_of(facts["scene"]),
+        model.constants,
+        tool_of(facts["tool"]),
+        clock,
+        options=PlantOptions(friction=facts["friction"]),
+    )
+    clock.world = simulation
+    link = CanLink(simulation.bus)
+    arm = build_arm(settings.rig, model.constants, link, board, clock)
+
+    def sensor() -> WrenchSensor:
+        if settings.rig.ft_sensor.is_on_bus:
+            return open_bus_sensor(arm, link, clock)
+        return _opened_sensor(settings.rig, simulation.open_port(), clock)
+
+    def parts(opened: WrenchSensor) -> LoopParts:
+        return LoopParts(
+            rig=settings.rig,
+            row=row,
+            model=model,
+            law_model=law_model,
+            arm=arm,
+            sensor=opened,
+            board=board,
+            clock=clock,
+            is_simulated=True,
+        )
+
+    crew = InlineCrew(board, clock, arm, sensor, parts)
+    return clock, crew, Rehearsal(simulation, PACES[facts["pace"]])
+
+
+def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSensor:
+    sensor = build_sensor(rig, port, clock, is_simulated=True)
+    sensor.open()
+    return sensor
+
+
+def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
+    """Return a serial sensor of `kind` at `path`, as rig.toml has it if it fits."""
+    from fakes.sensor.kinds import SensorChoice
+    from fakes.serving.sensor_server import SensorLine
+
+    section = settings.rig.ft_sensor
+    facts: dict[str, Any] = {"kind": kind}
+    if section.kind == kind:
+        facts = sensor_facts(section)
+    return SensorLine(path, SensorChoice(**facts))
+
+
+def build_sensor_server(settings: Settings, line: tuple[Path, str]) -> SensorServer:
+    """Return a serial sensor alone, below which a foot hangs.
+
+    `line`: the path it is served at, and its kind.
+
+    Raises:
+        SettingsError: the path is in use or cannot be one.
+    """
+    from fakes.serving.sensor_server import SensorServer, hanging_load
+
+    tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
+    served = _sensor_line(settings, *line)
+    return SensorServer(served, hanging_load(tool), SystemClock())
+
+
+def build_server(
+    settings: Settings,
+    bus: tuple[str, str],
+    line: tuple[Path, str] | None,
+    *,
+    is_idle: bool,
+) -> PuckServer:
+    """Return a simulated arm that serves its pucks to other programs.
+
+    The arm is at its home position, where an operator puts it before zeroing.
+
+    Args:
+        settings: all settings; the first terrain of the matrix names the foot.
+        bus: "traction-fake" or an interface of python-can, and its channel.
+        line: path and kind of a serial sensor; None = the sensor is on the bus.
+        is_idle: it begins powered, idle, pucks asleep; otherwise in E-STOP.
+
+    Raises:
+        SettingsError: the socket's path is in use or cannot be one.
+        LinkError: the bus cannot be opened.
+    """
+    from fakes.serving.puck_server import Home, build_home_server, open_can_port
+
+    row = settings.matrix.terrains[0]
+    port = open_can_port(*bus, settings.rig.can.bitrate)
+    tool = build_tool(settings.rig, row.foot)
+    served = _sensor_line(settings, *line) if line is not None else None
+    found = Home(tool, terrain_frame(row), served, is_idle)
+    try:
+        return build_home_server(port, found, SystemClock())
+    except SettingsError:
+        port.close()
+        raise

@@ -1,0 +1,100 @@
+"""Who works a rig when everything is in this thread."""
+
+import os
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.control_loop.loop import Loop
+from acquisition.control_loop.realtime import Grant
+from acquisition.devices import SafetyMode, WrenchSensor
+from acquisition.ipc.layout import Board
+from acquisition.ipc.loop_client import Desk, InlinePassing
+from acquisition.recording.recorder import Recorder
+from experiments.rig.backend import measure_exchange
+from experiments.rig.build import LoopParts, build_attendant
+from wam.driver.arm import WamArm
+from wam.driver.startup import ArmInfo
+
+
+class InlineCrew:
+    """Arm, sensor, loop and recorder in this thread, on any clock."""
+
+    def __init__(
+        self,
+        board: Board,
+        clock: Clock,
+        arm: WamArm,
+        open_sensor: Callable[[], WrenchSensor],
+        parts: Callable[[WrenchSensor], LoopParts],
+    ) -> None:
+        self.arm = arm
+        self._board = board
+        self._clock = clock
+        self._open_sensor = open_sensor
+        self._parts = parts
+        self._sensor: WrenchSensor | None = None
+        self.recorder = Recorder(board, clock)
+        self.desk = Desk(board, clock, _not_begun)
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of this process, which writes the trials too."""
+        return os.getpid()
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        return self.arm.start()
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque."""
+        return measure_exchange(self.arm, self._clock)
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        self._sensor = self._open_sensor()
+        return self._sensor.describe()
+
+    def sensor_facts(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text."""
+        return self._sensor.stream_facts() if self._sensor is not None else {}
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        self.arm.define_position(np.array(q))
+
+    def begin(self) -> None:
+        """Let the loop run from here on, whenever the console waits."""
+        if self._sensor is None:
+            raise RuntimeError("the sensor was not opened")
+        attendant = build_attendant(self._parts(self._sensor))
+        loop = Loop(attendant, self._clock)
+        attendant.stats = loop.stats
+        self.desk.passing = InlinePassing(loop, self.recorder)
+        self.desk.beat()
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return nothing: this thread asks for nothing."""
+        return {}
+
+    def idle(self) -> bool:
+        """Brake the arm; return whether that is confirmed."""
+        return self.arm.idle()
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        return self.arm.safety_mode()
+
+    def close(self) -> None:
+        """Brake the arm and give bus and port back; safe to repeat."""
+        self.recorder.abandon()
+        self.arm.close()
+        if self._sensor is not None:
+            self._sensor.close()
+            self._sensor = None
+        self._board.close()
+
+
+def _not_begun(cycles: int) -> None:
+    raise RuntimeError(f"the loop does not run yet; {cycles} cycles were waited for")

@@ -1,0 +1,191 @@
+"""Who works a rig with one process for each job."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from acquisition.clock import Clock
+from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.control_loop.realtime import Grant, choose_cores
+from acquisition.devices import SafetyMode
+from acquisition.errors import TractionError
+from acquisition.ipc.child import Child, ProcessLostError
+from acquisition.ipc.layout import Board
+from acquisition.ipc.loop_client import Desk
+from acquisition.recording.recorder_process import RemoteRecorder
+from experiments.rig.backend import ARM_INFO
+from wam.driver.startup import ArmInfo
+
+_GRANTS = TypeAdapter(list[Grant])
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """What the processes are told at their start.
+
+    Attributes:
+        control: settings of the process that has the arm.
+        reader: settings of the process that has the sensor's port; None = the sensor
+            hangs on the arm's bus.
+        fake: settings of the simulated rig; None = the devices are real.
+    """
+
+    control: dict[str, Any]
+    reader: dict[str, Any] | None
+    fake: dict[str, Any] | None
+
+
+class ProcessCrew:
+    """A process for the loop, one for the recorder, one for a serial sensor.
+
+    The simulated devices have a process of their own too. All die with the console;
+    the one with the arm brakes it first.
+    """
+
+    def __init__(self, jobs: Jobs, board: Board, clock: Clock) -> None:
+        self._board = board
+        self._clock = clock
+        self._children: dict[str, Child] = {}
+        self._told: set[str] = set()
+        loop_core, other_core = choose_cores()
+        self._jobs = jobs
+        self.fake: Child | None = None
+        if jobs.fake is not None:
+            self.fake = self._spawn(
+                "fake rig", "fakes.serving.rig_process:main", jobs.fake
+            )
+            devices = self.fake.ask("hello")
+            jobs.control["can"] = devices["can"]
+            if jobs.reader is not None:
+                jobs.reader["port"] = devices["port"]
+        jobs.control["core"] = loop_core
+        self._control = self._spawn(
+            "control", "experiments.rig.workers:control", jobs.control
+        )
+        recorder = self._spawn(
+            "recorder",
+            "acquisition.recording.recorder_process:main",
+            {"core": other_core},
+        )
+        self._reader: Child | None = None
+        if jobs.reader is not None:
+            jobs.reader["core"] = other_core
+            self._reader = self._spawn(
+                "sensor reader", "experiments.rig.workers:reader", jobs.reader
+            )
+        self.recorder = RemoteRecorder(recorder, board)
+        self.desk = Desk(board, clock, self._pass)
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of the process that writes the trials."""
+        return self._children["recorder"].pid
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        return ARM_INFO.validate_python(self._control.ask("start"))
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque."""
+        return self._control.ask("exchange")
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        return (self._reader or self._control).ask("open")
+
+    def sensor_facts(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text.
+
+        Nothing for a sensor on the arm's bus, whose process has a loop to run.
+        """
+        return self._reader.ask("stream") if self._reader is not None else {}
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        self._control.ask("define", list(q))
+
+    def begin(self) -> None:
+        """Let the loop run from here on."""
+        self.desk.beat()
+        self._control.ask("begin")
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return what the kernel granted to each process."""
+        asked = [self._control, *([self._reader] if self._reader else [])]
+        return {
+            child.name: _GRANTS.validate_python(child.ask("grants"))
+            for child in asked
+            if not (child is self._control and self.desk.loop.is_running)
+        }
+
+    @property
+    def bus_path(self) -> str:
+        """Path of the served bus of a simulated rig."""
+        return str(self._jobs.control["can"]["channel"])
+
+    def end_loop(self) -> None:
+        """Let the loop end; the process with the arm answers again."""
+        self.desk.leave()
+        while self.desk.loop.is_running and self._control.is_alive:
+            self._clock.sleep_until(self._clock.now_ns() + PERIOD_NS)
+
+    def processes(self) -> dict[str, int]:
+        """Return the numbers of the processes by name."""
+        return {name: child.pid for name, child in self._children.items()}
+
+    def idle(self) -> bool:
+        """Brake the arm; when its process has died, a new one does it."""
+        if not self._control.is_alive:
+            return self._rescue()
+        if self.desk.loop.is_running:
+            return self.desk.idle()
+        return bool(self._control.ask("idle"))
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        if self.desk.loop.is_running or not self._control.is_alive:
+            return self.desk.status.safety
+        return SafetyMode(self._control.ask("mode"))
+
+    def close(self) -> None:
+        """Brake the arm, let the processes end, the simulated rig last."""
+        if not self._children:
+            return
+        try:
+            self.idle()
+            if self._control.is_alive and self.desk.loop.is_running:
+                self.desk.leave()
+        except TractionError:
+            pass  # the safety module brakes an arm that nobody asks any more
+        finally:
+            for child in reversed(self._children.values()):
+                child.stop()
+            self._children.clear()
+            self._board.close()
+
+    def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
+        child = Child(name, target, settings, self._board)
+        self._children[name] = child
+        return child
+
+    def _pass(self, cycles: int) -> None:
+        """Let time pass; raise once for every process that has died meanwhile."""
+        self._clock.sleep_until(self._clock.now_ns() + cycles * PERIOD_NS)
+        for name, child in self._children.items():
+            if name not in self._told and not child.is_alive:
+                self._told.add(name)
+                raise ProcessLostError(name, child.how_it_ended())
+        self.recorder.check()
+
+    def _rescue(self) -> bool:
+        """Brake the arm of a dead process through a new one."""
+        self._children.pop("control").stop()
+        self._control = self._spawn(
+            "control", "experiments.rig.workers:control", self._jobs.control
+        )
+        try:
+            return bool(self._control.ask("idle"))
+        except TractionError:
+            return False

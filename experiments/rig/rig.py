@@ -1,0 +1,164 @@
+"""The composition root: settings and a row of the matrix in, a rig out."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition.clock import Clock, SystemClock
+from acquisition.ipc.layout import Board
+from experiments.arguments import FRICTION
+from experiments.rig.backend import Crew
+from experiments.rig.build import (
+    build_tool,
+    terrain_frame,
+)
+from experiments.rig.fake import World, stepped
+from experiments.rig.gravity import build_law_model, read_gravity
+from experiments.rig.processes import Jobs, ProcessCrew
+from experiments.rig.simulation import Rehearsing, RemoteRehearsal
+from experiments.settings.calibrations import with_calibrations
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from ft_sensor.payload import Payload, TerrainFrame, payload_of
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+
+
+def free_bytes(folder: Path) -> int:
+    """Return how much room is left where `folder` is [bytes]."""
+    return shutil.disk_usage(folder).free
+
+
+@dataclass(frozen=True, slots=True)
+class FakeOptions:
+    """How a simulated session runs.
+
+    Attributes:
+        is_fast: on stepped time; otherwise on the wall clock.
+        seed: of everything random.
+        friction: of the joints, as a share of what was identified on another arm.
+        pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
+    """
+
+    is_fast: bool
+    seed: int
+    friction: float = FRICTION
+    pace: str = "steady"
+
+
+@dataclass(slots=True)
+class Rig:
+    """Everything a session needs, real or simulated.
+
+    Attributes:
+        clock: the console's time.
+        crew: who works the rig.
+        board: the memory they share.
+        model: the arm with its tool.
+        payload: what the sensor carries, not tared.
+        tared: the same with the bias of the newest tare.
+        frame: where the container stands.
+        row: row of the matrix.
+        settings: all settings.
+        gravity_text: the gravity calibration in use; empty for none.
+        rehearsal: handle of the simulation; None on the real rig.
+        is_stepped: time passes only while the loop runs.
+        free_bytes: tells how much room is left where a folder is.
+    """
+
+    clock: Clock
+    crew: Crew
+    board: Board
+    model: ArmModel
+    payload: Payload
+    tared: Payload
+    frame: TerrainFrame
+    row: TerrainRow
+    settings: Settings
+    gravity_text: str
+    rehearsal: Rehearsing | None
+    is_stepped: bool
+    free_bytes: Callable[[Path], int] = free_bytes
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the devices are simulated."""
+        return self.rehearsal is not None
+
+
+def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
+    """Return the rig for one session: on stepped time in this thread, else processes.
+
+    Raises:
+        SettingsError: a calibration cannot be used.
+        LinkError: a process cannot open its bus or port.
+    """
+    # A simulated world does not know what was calibrated.
+    world: World | None = None
+    if fake is not None:
+        world = World(settings.rig, row, fake.seed, fake.friction, fake.pace)
+    settings = with_calibrations(settings, is_simulated=world is not None)
+    row = settings.row(row.name)
+    tool = build_tool(settings.rig, row.foot)
+    model = ArmModel(load_constants(), tool)
+    gravity_text = read_gravity(settings)
+    law_model = build_law_model(
+        settings.rig, gravity_text, row.foot, is_simulated=world is not None
+    )
+    board = Board.create()
+    rehearsal: Rehearsing | None = None
+    is_stepped = fake is not None and fake.is_fast
+    if world is not None and is_stepped:
+        models = model, law_model
+        clock, crew, rehearsal = stepped(world, settings, row, models, board)
+    else:
+        facts = world.facts() if world is not None else None
+        clock = SystemClock()
+        crew = ProcessCrew(_jobs(settings, row, gravity_text, facts), board, clock)
+        if crew.fake is not None:
+            rehearsal = RemoteRehearsal(crew.fake)
+    payload = payload_of(tool)
+    return Rig(
+        clock=clock,
+        crew=crew,
+        board=board,
+        model=model,
+        payload=payload,
+        tared=payload,
+        frame=terrain_frame(row),
+        row=row,
+        settings=settings,
+        gravity_text=gravity_text,
+        rehearsal=rehearsal,
+        is_stepped=is_stepped,
+    )
+
+
+def _jobs(
+    settings: Settings,
+    row: TerrainRow,
+    gravity_text: str,
+    world: dict[str, Any] | None,
+) -> Jobs:
+    """Return what the processes are told; `world` is of the simulated rig."""
+    rig = settings.rig
+    common: dict[str, Any] = {
+        "rig": rig.model_dump(mode="json"),
+        "is_simulated": world is not None,
+    }
+    control = {
+        **common,
+        "row": row.model_dump(mode="json"),
+        "gravity": gravity_text,
+        "can": rig.can.model_dump(mode="json"),
+        "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
+    }
+    sensor = rig.ft_sensor
+    reader = None if sensor.is_on_bus else {**common, "port": sensor.port}
+    return Jobs(control, reader, world)

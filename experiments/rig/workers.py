@@ -1,0 +1,229 @@
+"""What the processes beside the console do: one has the arm, one the sensor."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from acquisition.clock import SystemClock
+from acquisition.control_loop.loop import Loop
+from acquisition.control_loop.realtime import Wish, request
+from acquisition.devices import WrenchSensor
+from acquisition.errors import TractionError
+from acquisition.ipc.child import Station, name_process
+from acquisition.ipc.layout import Role
+from acquisition.ipc.loop_server import Attendant
+from acquisition.ipc.rpc import ChannelClosedError
+from acquisition.ipc.shared_sensor import SharedSensor, publish
+from experiments.rig.backend import ARM_INFO, measure_exchange
+from experiments.rig.build import (
+    LoopParts,
+    build_arm,
+    build_attendant,
+    build_sensor,
+    build_tool,
+    open_bus_sensor,
+)
+from experiments.rig.gravity import build_law_model
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from ft_sensor.serial_line.link import open_port
+from ft_sensor.serial_line.reconnect import SensorKeeper, stream_facts
+from ft_sensor.serial_line.sensor import SerialSensor
+from wam.bus.link import CanLink, open_bus
+from wam.driver.arm import WamArm
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+
+CONTROL_PRIORITY = 80
+READER_PRIORITY = 60
+READ_NS = 20_000_000  # the reader shows being alive this often
+
+
+def control(station: Station) -> None:
+    """Drive the arm: answer the console, then run the loop until it says so."""
+    name_process("traction-control")
+    ControlStation(station).serve()
+
+
+class ControlStation:
+    """The process that has the arm; one thread."""
+
+    def __init__(self, station: Station) -> None:
+        settings = station.settings
+        self._station = station
+        self._rig = RigSettings.model_validate(settings["rig"])
+        self._clock = SystemClock(round(self._rig.loop.spin_us * 1e3))
+        self._row = TerrainRow.model_validate(settings["row"])
+        self._is_simulated = bool(settings["is_simulated"])
+        constants = load_constants()
+        tool = build_tool(self._rig, self._row.foot)
+        self._model = ArmModel(constants, tool)
+        self._law_model = build_law_model(
+            self._rig,
+            settings["gravity"],
+            self._row.foot,
+            is_simulated=self._is_simulated,
+        )
+        self._constants = constants
+        self._arm: WamArm | None = None
+        self._link: CanLink | None = None
+        self._sensor: WrenchSensor = SharedSensor(station.board.wrenches)
+        self._attendant: Attendant | None = None
+        self._is_orphaned = False
+        signal.signal(signal.SIGTERM, self._note_orphaned)
+        wish = Wish(CONTROL_PRIORITY, settings.get("core"), is_locked=True)
+        self._grants = request(wish)
+
+    def serve(self) -> None:
+        """Answer until the console hangs up; the arm is braked then."""
+        handlers: dict[str, Callable[[Any], Any]] = {
+            "start": lambda _: ARM_INFO.dump_python(
+                self._opened().start(), mode="json"
+            ),
+            "exchange": lambda _: measure_exchange(self._opened(), self._clock),
+            "define": lambda q: self._opened().define_position(np.array(q)),
+            "begin": lambda _: self._prepare(self._opened()),
+            "idle": lambda _: self._opened().idle(),
+            "mode": lambda _: int(self._opened().safety_mode()),
+            "open": lambda _: self._open_sensor(),
+            "grants": lambda _: [grant.as_dict() for grant in self._grants],
+        }
+        try:
+            while not self._is_orphaned:
+                self._station.channel.answer(handlers)
+                if self._attendant is not None:
+                    self._run(self._attendant)
+                    self._attendant = None
+        except ChannelClosedError:
+            pass
+        finally:
+            if self._arm is not None:
+                self._arm.close()
+
+    def _open_sensor(self) -> dict[str, str]:
+        """Open a wrist sensor on the arm's bus."""
+        arm = self._opened()
+        assert self._link is not None
+        self._sensor = open_bus_sensor(arm, self._link, self._clock)
+        return self._sensor.describe()
+
+    def _opened(self) -> WamArm:
+        """Return the arm, its bus open; raises LinkError."""
+        if self._arm is None:
+            can = self._station.settings["can"]
+            link = self._link = CanLink(
+                open_bus(can["interface"], can["channel"], can["bitrate"])
+            )
+            board = self._station.board
+            self._arm = build_arm(self._rig, self._constants, link, board, self._clock)
+        return self._arm
+
+    def _prepare(self, arm: WamArm) -> None:
+        parts = LoopParts(
+            rig=self._rig,
+            row=self._row,
+            model=self._model,
+            law_model=self._law_model,
+            arm=arm,
+            sensor=self._sensor,
+            board=self._station.board,
+            clock=self._clock,
+            is_simulated=self._is_simulated,
+            ring=self._ring_bell,
+        )
+        self._attendant = build_attendant(parts)
+
+    def _run(self, attendant: Attendant) -> None:
+        """Run the loop; whatever ends it, the arm is braked."""
+        self._station.board.memory.touch()
+        loop = Loop(attendant, self._clock)
+        attendant.stats = loop.stats
+        try:
+            while not attendant.is_over:
+                attendant.is_orphaned = self._is_orphaned
+                loop.step()
+        finally:
+            self._opened().idle()
+            attendant.leave()
+
+    def _ring_bell(self) -> None:
+        """Ring the bell of the console's terminal, if it has one."""
+        path = self._station.settings.get("terminal")
+        if not path:
+            return
+        with contextlib.suppress(OSError):
+            terminal = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
+            os.write(terminal, b"\a")
+            os.close(terminal)
+
+    def _note_orphaned(self, *_: object) -> None:
+        self._is_orphaned = True
+
+
+def reader(station: Station) -> None:
+    """Read a serial wrist sensor and put every sample onto the board."""
+    name_process("traction-reader")
+    ReaderStation(station).serve()
+
+
+class ReaderStation:
+    """The process that has the sensor's port."""
+
+    def __init__(self, station: Station) -> None:
+        self._station = station
+        self._clock = SystemClock()
+        self._keeper = SensorKeeper(self._connect, self._clock)
+        self._is_open = False
+        self._grants = request(Wish(READER_PRIORITY, station.settings.get("core")))
+
+    def serve(self) -> None:
+        """Answer the console and read what comes until it hangs up."""
+        channel = self._station.channel
+        handlers: dict[str, Callable[[Any], Any]] = {
+            "open": lambda _: self._open(),
+            "stream": lambda _: self._stream(),
+            "grants": lambda _: [grant.as_dict() for grant in self._grants],
+        }
+        try:
+            while True:
+                if not self._is_open or channel.is_readable():
+                    channel.answer(handlers)
+                else:
+                    self._read()
+        except ChannelClosedError:
+            self._keeper.close()
+
+    def _open(self) -> dict[str, str]:
+        facts = self._keeper.open()
+        self._is_open = True
+        return facts
+
+    def _connect(self) -> SerialSensor:
+        settings = self._station.settings
+        rig = RigSettings.model_validate(settings["rig"])
+        port = open_port(settings["port"], rig.ft_sensor.baudrate).port
+        is_simulated = bool(settings["is_simulated"])
+        return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
+
+    def _stream(self) -> dict[str, str]:
+        """Return what became of the stream, as text."""
+        return stream_facts(self._keeper)
+
+    def _read(self) -> None:
+        """Publish what arrives within 20 ms; what is lost is looked for."""
+        clock, board = self._clock, self._station.board
+        deadline_ns = clock.now_ns() + READ_NS
+        if self._keeper.sensor is None:
+            clock.sleep_until(deadline_ns)
+        else:
+            # A port that has gone is readable, and says so when it is read.
+            with contextlib.suppress(TractionError):
+                clock.wait(self._keeper.sensor, deadline_ns)
+        publish(self._keeper.poll(clock.now_ns()), board.wrenches)
+        board.beats.beat(Role.READER, clock.now_ns())

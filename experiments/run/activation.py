@@ -1,0 +1,54 @@
+"""The pendant activates the arm: torques are ready before, a person says when."""
+
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import SafetyMode
+from acquisition.sample import MOTOR_FRESH_SHIFT
+from experiments.messages import preflight_error, pucks_have
+from experiments.operator.prompts import Prompt
+from experiments.run.console_loop import Stage
+
+PATIENCE = 120.0  # how long a person may take to activate the arm [s]
+_READY_SECONDS = 0.1  # from the request for hold to its first torques
+
+
+def activate(stage: Stage) -> None:
+    """Get torques ready, then wait for the pendant and for [space].
+
+    Raises:
+        PreflightError: no torques can be made ready, or the arm was not activated
+            within two minutes.
+        StopAskedError, FaultedError: as `Stage.tick`.
+    """
+    control, clock = stage.control, stage.rig.clock
+    control.request(ArmState.HOLD)
+    control.advance(_READY_SECONDS)
+    _require_torques(stage)
+    stage.company.console.say(
+        "Press Shift-activate on the pendant, support the arm, then [space]."
+    )
+    is_ready = False
+    start_ns = clock.now_ns()
+    while True:
+        is_ready = stage.tick(Prompt.SUPPORT) == " " or is_ready
+        if is_ready and control.status.safety is SafetyMode.ACTIVE:
+            return
+        if (clock.now_ns() - start_ns) * 1e-9 > PATIENCE:
+            raise preflight_error("not-active", seconds=PATIENCE)
+
+
+def _require_torques(stage: Stage) -> None:
+    """Refuse to ask for the pendant while the arm would be active and fall.
+
+    Hold begins with a complete reading; without one no torque would be there.
+    """
+    control = stage.control
+    loop = control.loop
+    if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
+        return  # ready, or the next tick tells why not
+    if loop.control.safety is SafetyMode.E_STOP:
+        raise preflight_error("no-power")
+    silent = ~int(control.latest()["flags"][0]) >> MOTOR_FRESH_SHIFT & 0x7F
+    detail = f"{pucks_have(silent)} not answered for {_READY_SECONDS * 1e3:.0f} ms."
+    if loop.is_bus_down:
+        detail = "The CAN interface refuses to send and receive."
+    raise preflight_error("not-ready", detail=detail)

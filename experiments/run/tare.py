@@ -1,0 +1,158 @@
+"""The tare: the foot is lifted and still, and the sensor shows what it should."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from acquisition.errors import PreflightError, TractionError
+from acquisition.ipc.layout import unpack_wrenches
+from experiments.fault_injection.plan import Moment
+from experiments.messages import CATALOGUE, preflight_error
+from experiments.operator.prompts import Prompt
+from experiments.rig.rig import Rig
+from experiments.run.console_loop import TICK
+from experiments.run.context import Sitting
+from experiments.run.participants import FaultedError, StopAskedError
+from experiments.session.states import Event
+from experiments.trial.header import TrialName
+from ft_sensor.calibration.sensor_file import sensor_from_toml
+from ft_sensor.payload import Payload
+from ft_sensor.tare import TareError, TareResult, tare
+from wam.model.constants import Array
+
+TARE_SECONDS = 1.0
+STILL_SECONDS = 0.3
+STILL_SPEED = 0.01  # m/s
+LIFTED = 0.03  # the foot counts as lifted this far above the plane [m]
+MOST_TARES = 5  # refused in a row: something is wrong that patience cannot mend
+_CALIBRATION = "calibration:"  # before the name of a file in the settings
+
+
+def take_tare(sitting: Sitting, name: TrialName) -> None:
+    """Wait until the foot is lifted and still, tare, and try again if it moved.
+
+    Raises:
+        PreflightError: five tares in a row were refused.
+        FaultedError, StopAskedError: as `Stage.tick`.
+    """
+    sitting.say("Lift the foot clear of everything and keep it still.")
+    for left in reversed(range(MOST_TARES)):
+        sitting.stage.raise_faults(Moment.TARE, name.number, 0.0)
+        try:
+            _accept(sitting, name, _measure(sitting, name))
+        except PreflightError as error:
+            if not left:
+                raise
+            sitting.tell(error)
+            sitting.stage.mend()
+        else:
+            return
+
+
+def take_end_tare(sitting: Sitting) -> None:
+    """Tare once more, so that two tares bracket the drift of the session.
+
+    Everything is kept already: whatever goes wrong costs the bracket only.
+    """
+    try:
+        take_tare(sitting, TrialName(0, 1))
+    except StopAskedError:
+        detail = "left out as asked."
+    except FaultedError as fault:
+        detail = sitting.fault_text(fault.verdict)
+    except TractionError as error:
+        detail = error.message
+    else:
+        return
+    sitting.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
+
+
+def residual_force(payload: Payload, known: Array) -> float:
+    """Return how far a tared `payload` is from the `known` bias of the sensor [N].
+
+    A tare hides a wrong mass of the foot in this pose and leaves it in all others;
+    only a sensor whose own bias is known can tell.
+    """
+    return float(np.linalg.norm(payload.bias[:3] - known[:3]))
+
+
+def known_bias(
+    calibrations: Mapping[str, str], foot: str, *, is_simulated: bool
+) -> Array | None:
+    """Return what the sensor shows without any load [N, N m], shape (6,).
+
+    It is in a calibration with this foot; a simulated sensor that nobody calibrated
+    has none by construction. None where nobody knows.
+    """
+    for name, text in calibrations.items():
+        if not name.startswith(_CALIBRATION) or "readings" not in text:
+            continue  # of a container
+        found = sensor_from_toml(text, name.removeprefix(_CALIBRATION))
+        if found.foot == foot:
+            return found.fit.bias
+    return np.zeros(6) if is_simulated else None
+
+
+def _measure(sitting: Sitting, name: TrialName) -> TareResult:
+    """Return the tare of one second.
+
+    Raises:
+        PreflightError: the force varied, or samples were lost or flagged.
+    """
+    _wait_still(sitting, name)
+    stage, rig = sitting.stage, sitting.rig
+    reader = sitting.control.wrenches()
+    for tick in range(round(TARE_SECONDS / TICK) + 1):
+        stage.tick(Prompt.LIFT, name)
+        stage.raise_faults(Moment.TARE, name.number, tick * TICK)
+    limit = rig.settings.rig.limits.tare_spread
+    try:
+        return tare(unpack_wrenches(reader.read()), limit)
+    except TareError as error:
+        if error.spread is None:
+            raise preflight_error("tare-poor", detail=error.message) from error
+        facts = {"spread": error.spread, "limit": limit}
+        raise preflight_error("tare-moved", **facts) from error
+
+
+def _accept(sitting: Sitting, name: TrialName, result: TareResult) -> None:
+    """Use the tare from here on.
+
+    Raises:
+        PreflightError: it hides a force that the sensor does not have by itself.
+    """
+    rig = sitting.rig
+    position = sitting.control.latest()["position"][0]
+    rotation = rig.model.sole_pose(position)[1]
+    tared = rig.payload.tared(np.array(result.wrench), rotation)
+    _check_residual(rig, tared)
+    rig.tared = tared
+    bias = tared.bias.tolist()
+    sitting.control.set_bias(bias)
+    sitting.book.note(
+        Event.TARED,
+        trial_number=name.number,
+        bias=[round(v, 4) for v in bias],
+        spread=round(float(result.spread), 3),
+    )
+
+
+def _check_residual(rig: Rig, tared: Payload) -> None:
+    calibrations = rig.settings.calibrations
+    known = known_bias(calibrations, rig.row.foot, is_simulated=rig.is_simulated)
+    limit = rig.settings.rig.limits.residual
+    residual = residual_force(tared, known) if known is not None else 0.0
+    if residual > limit:
+        facts = {"foot": rig.row.foot, "mass": rig.payload.mass}
+        raise preflight_error("residual", residual=residual, limit=limit, **facts)
+
+
+def _wait_still(sitting: Sitting, name: TrialName) -> None:
+    still = 0.0
+    while still < STILL_SECONDS:
+        sitting.stage.tick(Prompt.LIFT, name)
+        record = sitting.control.latest()[0]
+        height = float(sitting.rig.frame.height(record["foot_position"]))
+        speed = float(abs(record["foot_velocity"][:3]).max())
+        is_still = height > LIFTED and speed < STILL_SPEED
+        still = still + TICK if is_still else 0.0

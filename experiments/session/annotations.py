@@ -1,0 +1,197 @@
+"""What people say about sessions on the disk: notes, and verdicts changed later."""
+
+import os
+import pwd
+import re
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError
+from experiments.operator.console import WARNING
+from experiments.session.crash_recovery import settle
+from experiments.session.journal import Book, open_book
+from experiments.session.lock import session_lock
+from experiments.session.reducer import KEEP, refusal
+from experiments.session.states import Event
+from experiments.session.store import SessionFolder, sha256_of
+from experiments.session.trial_files import add_remark, find_sidecar
+from experiments.trial.header import TrialName
+
+LONGEST_TEXT = 2000  # characters
+_TRIAL = re.compile(r"^T?0*(?P<number>[1-9]\d?)(?P<letters>[a-z]{0,3})$")
+
+
+def looks_like_trial(text: str) -> bool:
+    """Return whether `text` names a trial, such as T04 or T04a."""
+    return text.startswith("T") and _TRIAL.match(text) is not None
+
+
+def parse_trial(text: str) -> tuple[int, int]:
+    """Return (number, attempt) of a name such as T04b; attempt 0 for T04.
+
+    Raises:
+        SessionError: it is no name of a trial.
+    """
+    match = _TRIAL.match(text)
+    if match is None:
+        raise SessionError(
+            f"{text!r} is no trial.", hint="Name one like T04, or T04a of rejected/."
+        )
+    attempt = 0
+    for letter in match["letters"]:
+        attempt = 26 * attempt + ord(letter) - ord("a") + 1
+    return int(match["number"]), attempt
+
+
+def clean_text(text: str) -> str:
+    """Return `text` on one line, without control characters.
+
+    Raises:
+        SessionError: nothing is left, or it is too long.
+    """
+    words = " ".join(text.split())
+    cleaned = "".join(sign for sign in words if sign.isprintable())
+    if not 0 < len(cleaned) <= LONGEST_TEXT:
+        raise SessionError(
+            f"The text has {len(cleaned)} characters, expected 1 to {LONGEST_TEXT}.",
+            hint="Nothing was written.",
+        )
+    return cleaned
+
+
+def author(name: str) -> str:
+    """Return `name`, or that of the person who is logged in."""
+    if name:
+        return clean_text(name)
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return f"user {os.getuid()}"
+
+
+def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
+    """Write a remark into the journal, and into the sidecar of `trial` if named.
+
+    Raises:
+        SessionError: the session is open elsewhere, was never started, or has no such
+            trial; or there is no text.
+    """
+    text, who = clean_text(text), author(who)
+    with session_lock(folder):
+        book = _book(folder)
+        if not trial:
+            book.note(Event.NOTED, text=text, who=who)
+            return f"Noted on {folder.id}."
+        name = _find_attempt(book, trial)
+        book.note(
+            Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
+        )
+        return f"Noted on {folder.id} {add_remark(folder, name, text, who)}."
+
+
+def change_verdict(
+    folder: SessionFolder, trial: str, verdict: str, reason: str, who: str
+) -> list[str]:
+    """Keep or reject a trial that was recorded before; return what to say.
+
+    Raises:
+        SessionError: the session is open elsewhere, has no such trial, another attempt
+            is kept, or its file is not what was recorded.
+    """
+    reason, who = clean_text(reason), author(who)
+    with session_lock(folder):
+        book = _book(folder)
+        name = _find_attempt(book, trial)
+        facts: dict[str, object] = {
+            "trial": name.number,
+            "attempt": name.attempt,
+            "verdict": verdict,
+            "reason": reason,
+            "who": who,
+        }
+        refused = refusal(book.state, {"event": Event.VERDICT, **facts})
+        if refused:
+            raise SessionError(
+                f"{trial} of {folder.id} cannot get this verdict: {refused}.",
+                hint="Nothing was changed.",
+            )
+        said = _check_file(book, name) if verdict == KEEP else []
+        book.note(Event.VERDICT, **facts)
+        place = f"trials/{name.kept}"
+        if verdict != KEEP:
+            place = f"rejected/{name.rejected}"
+        kept, wanted = len(book.state.kept), book.state.wanted
+        return [*said, f"{place}: {verdict}. {folder.id} has {kept} of {wanted} kept."]
+
+
+def trial_path(folder: SessionFolder, trial: str) -> Path:
+    """Return the file of a trial, kept or rejected, without opening the session.
+
+    Raises:
+        SessionError: there is none.
+    """
+    number, attempt = parse_trial(trial)
+    name = TrialName(number, attempt)
+    path = folder.trials / f"{name.kept}.mcap"
+    if attempt:
+        path = folder.rejected / f"{name.rejected}.mcap"
+    if not path.is_file():
+        files = [*folder.trials.glob("T*.mcap"), *folder.rejected.glob("T*.mcap")]
+        known = sorted(p.stem for p in files if "." not in p.stem)
+        raise SessionError(
+            f"There is no {trial} in {folder.id}.",
+            hint=f"Trials: {' '.join(known) or 'none'}.",
+        )
+    return path
+
+
+def _book(folder: SessionFolder) -> Book:
+    book = open_book(folder, SystemClock())
+    settle(book)
+    return book
+
+
+def _find_attempt(book: Book, trial: str) -> TrialName:
+    """Return the attempt that `trial` means: T04a itself, T04 the kept or only one.
+
+    Raises:
+        SessionError: there is none, or more than one.
+    """
+    number, attempt = parse_trial(trial)
+    last = book.state.attempt(number)
+    kept = book.state.kept_attempt(number)
+    if not attempt and not kept and last > 1:
+        names = [TrialName(number, i).rejected for i in range(1, last + 1)]
+        raise SessionError(
+            f"{trial} was rejected {last} times: {' '.join(names)}.",
+            hint="Name one of them. Nothing was changed.",
+        )
+    attempt = attempt or kept or 1
+    if attempt > last:
+        known = " ".join(f"T{n:02d}" for n, _ in book.state.attempts) or "none yet"
+        raise SessionError(
+            f"There is no {trial} in {book.folder.id}.", hint=f"Trials: {known}."
+        )
+    return TrialName(number, attempt)
+
+
+def _check_file(book: Book, name: TrialName) -> list[str]:
+    """Return what to say of a trial that is to be kept.
+
+    Raises:
+        SessionError: there is no file of it, or another than was recorded.
+    """
+    sidecar = find_sidecar(book.folder, name)
+    is_kept = book.state.kept_attempt(name.number) == name.attempt
+    path = book.folder.rejected / f"{name.rejected}.mcap"
+    if is_kept:
+        path = book.folder.trials / f"{name.kept}.mcap"
+    if not path.is_file() or sha256_of(path) != sidecar.get("sha256"):
+        raise SessionError(
+            f"{path.name} is missing or is not what was recorded.",
+            hint="It cannot count. Nothing was changed.",
+        )
+    status = sidecar.get("status")
+    if status == "complete":
+        return []
+    return [f"{WARNING} {name.rejected} is {status}: {sidecar.get('stop_reason')}."]

@@ -1,0 +1,96 @@
+"""After a crash: files follow the journal again, the trial that ran is put away."""
+
+from pathlib import Path
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.recover import recover, recovered_path
+from acquisition.trial_file.verify import Verified, verify
+from experiments.session.journal import Book
+from experiments.session.states import OPEN, Event, Phase
+from experiments.session.store import SessionFolder, move_file, read_json, write_json
+from experiments.session.trial_files import find_sidecar, last_decisions, shelve
+from experiments.trial.files import Outcome, sidecar_of
+from experiments.trial.header import TrialName
+
+WHO = "traction"  # a verdict that nobody gave
+REASON = "the session ended without closing"
+
+
+def settle(book: Book) -> str:
+    """Bring a session into order whose lock is held; return what was put away.
+
+    Nothing that was kept is touched. The trial that ran is recovered and rejected, so
+    that it is recorded again. A second call changes nothing.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    folder = book.folder
+    _sweep(folder)
+    if book.state.phase in OPEN:
+        book.note(Event.CRASH_FOUND)
+    for decision in last_decisions(folder.events()):
+        if find_sidecar(folder, decision.name):
+            shelve(folder, decision)
+    number = book.state.running
+    if book.state.phase is not Phase.CRASHED or number is None:
+        return ""
+    name = TrialName(number, book.state.attempt(number))
+    _gather(folder, name)
+    book.note(
+        Event.TRIAL_REJECTED,
+        trial=number,
+        attempt=name.attempt,
+        reason=REASON,
+        who=WHO,
+    )
+    return f"{name.kept} will be redone, its data are in rejected/{name.rejected}.*"
+
+
+def _gather(folder: SessionFolder, name: TrialName) -> None:
+    """Give what there is of the trial its names in trials/, with a sidecar."""
+    sidecar = folder.trials / f"{name.kept}.json"
+    if read_json(sidecar).get("attempt") == name.attempt:
+        return
+    path = folder.trials / f"{name.kept}.mcap"
+    partial = path.with_name(path.name + ".partial")
+    if partial.exists() and not path.exists():
+        _recover(partial, path)
+    for source, kind in ((partial, ".partial"), (_truth(partial), ".truth.partial")):
+        if source.exists():
+            move_file(source, folder.rejected / f"{name.rejected}{kind}")
+    write_json(sidecar, sidecar_of(name, _verified(path), Outcome("crash")))
+
+
+def _recover(partial: Path, path: Path) -> None:
+    """Save what is sound of `partial` as `path`; nothing where nothing is."""
+    try:
+        found = recover(partial).path
+    except TrialFileError:
+        return
+    move_file(found, path)
+    path.chmod(0o444)
+
+
+def _verified(path: Path) -> Verified | None:
+    """Return what `path` holds, None where it cannot be read."""
+    try:
+        return verify(path)
+    except TrialFileError:
+        return None
+
+
+def _truth(partial: Path) -> Path:
+    return partial.with_name(partial.name.replace(".mcap", ".truth.mcap"))
+
+
+def _sweep(folder: SessionFolder) -> None:
+    """Take away what a kill in the middle of a replacement has left."""
+    for place in (folder.path, folder.trials, folder.rejected):
+        for path in place.glob("*.json.tmp"):
+            path.unlink()
+    for path in folder.trials.glob("*.mcap.partial"):
+        finished = path.with_suffix("")
+        for other in (path, recovered_path(path)):
+            if other.exists() and finished.exists() and finished.samefile(other):
+                other.unlink()

@@ -1,0 +1,107 @@
+"""One process per session: a lock that its owner's death opens."""
+
+import fcntl
+import json
+import os
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from acquisition.errors import SessionError
+from experiments.messages import CATALOGUE
+from experiments.session.store import SessionFolder, iso_utc, read_json
+
+LOCK_FILE = ".lock"
+_TRIES = 5  # somebody who only looks holds the lock for a moment
+_PAUSE_NS = 10_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Owner:
+    """The living process that has a session open.
+
+    Attributes:
+        pid: its number, 0 where it has not said so yet.
+        since: time of day [UTC] at which it opened the session.
+    """
+
+    pid: int
+    since: str
+
+
+@contextmanager
+def session_lock(folder: SessionFolder) -> Generator[None]:
+    """Keep other processes out of the session while this lasts; a kill ends it too.
+
+    Raises:
+        SessionError: a living process has it open, or the folder cannot be written.
+    """
+    try:
+        descriptor = os.open(folder.path / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise SessionError(
+            f"{folder.path} cannot be written ({error.strerror}).",
+            hint="Is it on a read-only disk? Nothing was changed.",
+        ) from error
+    try:
+        if not _take(descriptor):
+            raise locked_error(folder)
+        sign(descriptor)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def owner_of(folder: SessionFolder) -> Owner | None:
+    """Return the living process that has the session open, None for none."""
+    path = folder.path / LOCK_FILE
+    if not path.is_file():
+        return None
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return _signature(path)
+    except OSError:  # a file system without locks
+        return None
+    finally:
+        os.close(descriptor)
+    return None
+
+
+def locked_error(folder: SessionFolder) -> SessionError:
+    """Return the refusal of a session that another process has open."""
+    owner = _signature(folder.path / LOCK_FILE)
+    message = CATALOGUE["locked"]
+    facts = {"session": folder.id, "pid": owner.pid or "?", "since": owner.since or "?"}
+    return SessionError(message.what.format_map(facts), hint=message.do)
+
+
+def _take(descriptor: int) -> bool:
+    clock = SystemClock()
+    for _ in range(_TRIES):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            clock.sleep_until(clock.now_ns() + _PAUSE_NS)
+        except OSError:  # a file system without locks
+            return True
+        else:
+            return True
+    return False
+
+
+def sign(descriptor: int) -> None:
+    """Write into an open lock file whose it is and since when."""
+    since = iso_utc(SystemClock().utc_ns())
+    text = json.dumps({"pid": os.getpid(), "since": since}).encode()
+    os.ftruncate(descriptor, 0)
+    os.pwrite(descriptor, text, 0)
+
+
+def _signature(path: Path) -> Owner:
+    facts = read_json(path)
+    pid, since = facts.get("pid"), str(facts.get("since", ""))
+    return Owner(pid if type(pid) is int else 0, since[11:16])

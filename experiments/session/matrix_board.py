@@ -1,0 +1,181 @@
+"""The matrix board: kept trials per terrain, counted from verified files only."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from acquisition.errors import SettingsError
+from experiments.arguments import data_option
+from experiments.session.lock import owner_of
+from experiments.session.order import suggest_order
+from experiments.session.store import SessionFolder, list_sessions, read_json, sha256_of
+from experiments.session.unfinished import find_unfinished
+from experiments.settings.matrix import MatrixSettings, TerrainRow
+
+KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
+_Digest = Callable[[Path], str]
+
+
+@dataclass(frozen=True, slots=True)
+class BoardLine:
+    """One terrain, live or simulated: what is kept of what is wanted.
+
+    Attributes:
+        terrain: its name.
+        is_simulated: trials of simulated devices.
+        kept: how many verified trials are kept.
+        wanted: how many there are to be.
+        rejected: how many attempts were rejected or interrupted.
+        sessions: ids of the sessions.
+        trials: in how many sessions T01, T02 ... are kept, in this order.
+    """
+
+    terrain: str
+    is_simulated: bool
+    kept: int
+    wanted: int
+    rejected: int
+    sessions: tuple[str, ...]
+    trials: tuple[int, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the line for JSON."""
+        return asdict(self)
+
+    def cells(self) -> str:
+        """Return one sign per trial: kept, kept in several sessions, missing."""
+        signs = {0: "·", 1: "█"}
+        return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
+
+
+class KnownDigests:
+    """Checksums, computed once as long as a file does not change."""
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[Path, int, int, int], str] = {}
+
+    def __call__(self, path: Path) -> str:
+        """Return the hex digest of `path`."""
+        stat = path.stat()
+        key = (path, stat.st_ino, stat.st_size, stat.st_mtime_ns)
+        if key not in self._known:
+            self._known[key] = sha256_of(path)
+        return self._known[key]
+
+
+def count_board(
+    data: Path,
+    matrix: MatrixSettings,
+    where: Mapping[str, str] | None = None,
+    digest: _Digest = sha256_of,
+) -> list[BoardLine]:
+    """Return a line per terrain of the matrix, live first, simulated where there is.
+
+    Args:
+        data: the data folder.
+        matrix: the terrains.
+        where: only terrains and sessions with these values, by a name of `KEYS`.
+        digest: what computes the checksum of a file.
+    """
+    where = where or {}
+    sessions = [s for s in list_sessions(data) if _matches(_of_session(s), where)]
+    lines: list[BoardLine] = []
+    for row in matrix.terrains:
+        if not _matches(_of_row(row), where):
+            continue
+        for is_simulated in (False, True):
+            own = [
+                s
+                for s in sessions
+                if s.terrain == row.name and s.is_simulated is is_simulated
+            ]
+            is_wanted = not is_simulated and where.get("kind") != "simulated"
+            if own or (is_wanted and not {"session", "operator"} & set(where)):
+                lines.append(_line(row, own, digest, is_simulated=is_simulated))
+    return lines
+
+
+def parse_where(text: str) -> dict[str, str]:
+    """Return the conditions in `K=V,K=V`.
+
+    Raises:
+        SettingsError: it is not of that form, or a key is unknown.
+    """
+    found: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        key, sign, value = part.partition("=")
+        if key not in KEYS or not sign or not value:
+            raise SettingsError(
+                f"--where {part!r} - expected KEY=VALUE, e.g. kind=live.",
+                hint=f"Keys: {', '.join(KEYS)}.",
+            )
+        found[key] = value
+    return found
+
+
+def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> list[str]:
+    """Return what others have open, what is to be resumed, which terrain comes next."""
+    steps: list[str] = []
+    sessions = [s for s in list_sessions(data) if s.is_simulated is is_simulated]
+    for session in sessions:
+        owner = owner_of(session)
+        if owner is not None and owner.pid != os.getpid():
+            phase = read_json(session.path / "session.json").get("phase", "opening")
+            steps.append(
+                f"{session.id} {session.terrain} is open in process {owner.pid} since "
+                f"{owner.since} UTC: {phase}."
+            )
+    left = [u for u in find_unfinished(data) if u.folder.is_simulated is is_simulated]
+    option = data_option(data)
+    steps += [
+        f"{u.text()} To go on: traction resume {u.folder.id}{option}" for u in left
+    ]
+    order = suggest_order(matrix.terrains, [s.terrain for s in sessions])
+    if order:
+        steps.append(f"Next terrains, so that none goes with time: {' '.join(order)}")
+    return steps
+
+
+def _of_session(session: SessionFolder) -> dict[str, str]:
+    facts = read_json(session.path / "session.json")
+    return {
+        "kind": "simulated" if session.is_simulated else "live",
+        "session": session.id,
+        "operator": str(facts.get("operator", "")),
+    }
+
+
+def _of_row(row: TerrainRow) -> dict[str, str]:
+    incline = f"{row.incline_deg:g}"
+    return {
+        "terrain": row.name,
+        "stones": row.stones,
+        "incline_deg": incline,
+        "foot": row.foot,
+    }
+
+
+def _matches(facts: Mapping[str, str], where: Mapping[str, str]) -> bool:
+    """Return whether every fact that is asked for has the value."""
+    return all(facts[key] == value for key, value in where.items() if key in facts)
+
+
+def _line(
+    row: TerrainRow,
+    sessions: Sequence[SessionFolder],
+    digest: _Digest,
+    *,
+    is_simulated: bool,
+) -> BoardLine:
+    kept = [path.stem for s in sessions for path in s.kept_trials(digest)]
+    names = [f"T{number:02d}" for number in range(1, row.trials + 1)]
+    return BoardLine(
+        terrain=row.name,
+        is_simulated=is_simulated,
+        kept=len(kept),
+        wanted=row.trials,
+        rejected=sum(len(session.rejected_sidecars()) for session in sessions),
+        sessions=tuple(session.id for session in sessions),
+        trials=tuple(kept.count(name) for name in names),
+    )

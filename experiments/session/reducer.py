@@ -1,0 +1,300 @@
+"""A session as a pure reducer over its journal."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any, cast
+
+from experiments.session.states import TABLE, Event, Phase, Step
+
+KEEP, REJECT = "keep", "reject"
+_EVENTS = {str(event): event for event in Event}
+_AXES = 6  # of a wrench
+_Facts = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class SessionState:
+    """What the journal says of a session.
+
+    Attributes:
+        phase: where it stands.
+        terrain: name of the terrain.
+        wanted: how many kept trials make it complete.
+        kept_attempts: (number, attempt) of the kept trials, in the order of keeping.
+        rejected: how many attempts were rejected or interrupted.
+        attempts: how many attempts each number has had so far.
+        running: number of the trial without a verdict, None between trials.
+        redoing: number of the trial that is to be repeated, None where none is.
+        is_redo: it was opened to repeat one trial and for nothing else.
+        openings: how often it was opened.
+        ended: why it ended: "complete", "unfinished", a fault; empty while open.
+        tares: how many tares were taken since it was opened.
+        first_bias, last_bias: what the sensor showed beside the foot's weight in the
+            first and in the last of them [N, N m]; empty before.
+    """
+
+    phase: Phase = Phase.PLANNED
+    terrain: str = ""
+    wanted: int = 0
+    kept_attempts: tuple[tuple[int, int], ...] = ()
+    rejected: int = 0
+    attempts: tuple[tuple[int, int], ...] = ()
+    running: int | None = None
+    redoing: int | None = None
+    is_redo: bool = False
+    openings: int = 0
+    ended: str = ""
+    tares: int = 0
+    first_bias: tuple[float, ...] = ()
+    last_bias: tuple[float, ...] = ()
+
+    @property
+    def drift(self) -> tuple[float, ...]:
+        """What the force has drifted between first and last tare [N], three numbers.
+
+        Empty before there are two: the bracket is the force's uncertainty.
+        """
+        if self.tares < 2:
+            return ()
+        pairs = zip(self.first_bias[:3], self.last_bias[:3], strict=True)
+        return tuple(round(last - first, 3) for first, last in pairs)
+
+    @property
+    def kept(self) -> tuple[int, ...]:
+        """Numbers of the kept trials, in the order of keeping."""
+        return tuple(number for number, _ in self.kept_attempts)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every wanted trial was kept."""
+        return len(self.kept_attempts) >= self.wanted > 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether there is nothing left to record in this opening."""
+        return self.redoing is None if self.is_redo else self.is_complete
+
+    @property
+    def next_trial(self) -> int:
+        """Trial to be repeated, else the smallest number that has not been kept."""
+        if self.redoing is not None:
+            return self.redoing
+        number = 1
+        while number in self.kept:
+            number += 1
+        return number
+
+    def attempt(self, number: int) -> int:
+        """Return how many attempts trial `number` has had, 0 before the first."""
+        return dict(self.attempts).get(number, 0)
+
+    def kept_attempt(self, number: int) -> int:
+        """Return which attempt at trial `number` is the kept one, 0 for none."""
+        return dict(self.kept_attempts).get(number, 0)
+
+
+def refusal(state: SessionState, event: _Facts) -> str:
+    """Return why `event` cannot happen now; empty where it can."""
+    name = _EVENTS.get(str(event.get("event")))
+    if name is None:
+        return "this is no event of a session"
+    refused = TABLE[state.phase, name].refused
+    check = _CHECKS.get(name)
+    return refused or (check(state, event) if check else "")
+
+
+def apply(state: SessionState, event: _Facts) -> SessionState:
+    """Return the state after `event`; unknown or impossible events change nothing."""
+    if refusal(state, event):
+        return state
+    name = Event(str(event["event"]))
+    change = _CHANGES.get(name)
+    changed = change(state, event) if change else state
+    return replace(changed, phase=_next_phase(TABLE[state.phase, name], changed))
+
+
+def replay(events: Iterable[_Facts]) -> SessionState:
+    """Return the state after all `events`."""
+    state = SessionState()
+    for event in events:
+        state = apply(state, event)
+    return state
+
+
+def _next_phase(step: Step, state: SessionState) -> Phase:
+    """Return where the step leads; of two ways the kept trials decide."""
+    if len(step.to) == 1:
+        return step.to[0]
+    (other,) = (phase for phase in step.to if phase is not Phase.COMPLETE)
+    return Phase.COMPLETE if state.is_complete else other
+
+
+def _whole(event: _Facts, key: str) -> int:
+    """Return the whole number at `key`, 0 where there is none above 0."""
+    value = event.get(key)
+    return value if type(value) is int and value > 0 else 0
+
+
+def _numbers(value: object) -> tuple[float, ...]:
+    """Return finite numbers of a list, nothing where there is anything else in it."""
+    found = cast("list[object]", value) if isinstance(value, list) else []
+    numbers = tuple(x for x in found if type(x) is float and isfinite(x))
+    return numbers if len(numbers) == len(found) else ()
+
+
+# --- what a phase alone cannot know ------------------------------------------------
+
+
+def _check_start(state: SessionState, event: _Facts) -> str:
+    del state
+    is_whole = bool(event.get("terrain")) and _whole(event, "trials")
+    return "" if is_whole else "it names no terrain and number of trials"
+
+
+def _check_redo(state: SessionState, event: _Facts) -> str:
+    number = _whole(event, "trial")
+    if state.running is not None:
+        return _judged(state, event)
+    return "" if state.attempt(number) else f"T{number:02d} was never recorded"
+
+
+def _check_new_trial(state: SessionState, event: _Facts) -> str:
+    number = _whole(event, "trial")
+    if number in state.kept:
+        return f"T{number:02d} is kept"
+    is_wanted = number and state.redoing in (None, number)
+    return "" if is_wanted else f"T{number:02d} is not the trial to be recorded"
+
+
+def _check_running(state: SessionState, event: _Facts) -> str:
+    number = _whole(event, "trial")
+    is_it = number and number == state.running
+    return "" if is_it else f"T{number:02d} is not running"
+
+
+def _check_aside(state: SessionState, event: _Facts) -> str:
+    number = _whole(event, "trial")
+    is_it = number == state.redoing and number in state.kept
+    return "" if is_it else f"T{number:02d} is not a kept trial to be repeated"
+
+
+def _check_verdict(state: SessionState, event: _Facts) -> str:
+    number, attempt = _whole(event, "trial"), _whole(event, "attempt")
+    if not 1 <= attempt <= state.attempt(number):
+        return "there is no such attempt"
+    if number == state.running and attempt == state.attempt(number):
+        return _judged(state, event)
+    if event.get("verdict") not in (KEEP, REJECT):
+        return "a verdict is keep or reject"
+    kept = state.kept_attempt(number)
+    if event.get("verdict") == KEEP and kept not in (0, attempt):
+        return f"another attempt at T{number:02d} is kept"
+    return ""
+
+
+def _judged(state: SessionState, event: _Facts) -> str:
+    """Return a refusal while a crashed trial has not been put away."""
+    del event
+    if state.running is None or state.phase is not Phase.CRASHED:
+        return ""
+    return f"T{state.running:02d} has no verdict yet"
+
+
+_CHECKS: Mapping[Event, Callable[[SessionState, _Facts], str]] = {
+    Event.STARTED: _check_start,
+    Event.RESUMED: _judged,
+    Event.REDO: _check_redo,
+    Event.SET_ASIDE: _check_aside,
+    Event.TRIAL_STARTED: _check_new_trial,
+    Event.TRIAL_RECORDED: _check_running,
+    Event.TRIAL_KEPT: _check_running,
+    Event.TRIAL_REJECTED: _check_running,
+    Event.VERDICT: _check_verdict,
+    Event.ENDED: _judged,
+    Event.GIVEN_UP: _judged,
+}
+
+
+# --- what an event changes beside the phase ----------------------------------------
+
+
+def _start(state: SessionState, event: _Facts) -> SessionState:
+    terrain, wanted = str(event["terrain"]), _whole(event, "trials")
+    return _open(replace(state, terrain=terrain, wanted=wanted), event)
+
+
+def _open(state: SessionState, event: _Facts) -> SessionState:
+    del event
+    openings = state.openings + 1
+    state = replace(state, openings=openings, ended="", redoing=None, is_redo=False)
+    return replace(state, tares=0, first_bias=(), last_bias=())
+
+
+def _redo(state: SessionState, event: _Facts) -> SessionState:
+    number = _whole(event, "trial")
+    return replace(_open(state, event), redoing=number, is_redo=True)
+
+
+def _end(state: SessionState, event: _Facts) -> SessionState:
+    reason = str(event.get("reason") or "unfinished")
+    return replace(state, ended=reason, redoing=None, is_redo=False)
+
+
+def _tare(state: SessionState, event: _Facts) -> SessionState:
+    bias = _numbers(event.get("bias"))
+    if len(bias) != _AXES:
+        return state
+    first = state.first_bias or bias
+    return replace(state, tares=state.tares + 1, first_bias=first, last_bias=bias)
+
+
+def _start_trial(state: SessionState, event: _Facts) -> SessionState:
+    number = _whole(event, "trial")
+    attempts = dict(state.attempts)
+    attempts[number] = attempts.get(number, 0) + 1
+    return replace(state, running=number, attempts=tuple(sorted(attempts.items())))
+
+
+def _keep(state: SessionState, event: _Facts) -> SessionState:
+    number = _whole(event, "trial")
+    kept = (*state.kept_attempts, (number, state.attempt(number)))
+    redoing = None if state.redoing == number else state.redoing
+    return replace(state, running=None, kept_attempts=kept, redoing=redoing)
+
+
+def _reject(state: SessionState, event: _Facts) -> SessionState:
+    del event
+    return replace(state, running=None, rejected=state.rejected + 1)
+
+
+def _set_aside(state: SessionState, event: _Facts) -> SessionState:
+    number = _whole(event, "trial")
+    kept = tuple(pair for pair in state.kept_attempts if pair[0] != number)
+    return replace(state, kept_attempts=kept, rejected=state.rejected + 1)
+
+
+def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
+    number, attempt = _whole(event, "trial"), _whole(event, "attempt")
+    is_kept = state.kept_attempt(number) == attempt
+    if is_kept == (event.get("verdict") == KEEP):
+        return state
+    if is_kept:
+        return _set_aside(state, event)
+    kept = (*state.kept_attempts, (number, attempt))
+    return replace(state, kept_attempts=kept, rejected=state.rejected - 1)
+
+
+_CHANGES: Mapping[Event, Callable[[SessionState, _Facts], SessionState]] = {
+    Event.STARTED: _start,
+    Event.RESUMED: _open,
+    Event.REDO: _redo,
+    Event.TARED: _tare,
+    Event.SET_ASIDE: _set_aside,
+    Event.TRIAL_STARTED: _start_trial,
+    Event.TRIAL_KEPT: _keep,
+    Event.TRIAL_REJECTED: _reject,
+    Event.VERDICT: _change_verdict,
+    Event.ENDED: _end,
+    Event.GIVEN_UP: _end,
+}

@@ -1,0 +1,136 @@
+"""Where the files of a trial stand: they follow what the journal decided."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.session.reducer import KEEP, REJECT
+from experiments.session.states import Event
+from experiments.session.store import SessionFolder, move_file, read_json, write_json
+from experiments.trial.header import TrialName
+
+_SUFFIXES = (".mcap", ".truth.mcap")
+_VERDICTS: Mapping[str, str] = {
+    Event.TRIAL_KEPT: KEEP,
+    Event.TRIAL_REJECTED: REJECT,
+    Event.SET_ASIDE: REJECT,
+}
+_Facts = Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A verdict on one attempt, as the journal has it.
+
+    Attributes:
+        name: the attempt.
+        verdict: "keep" or "reject".
+        reason: why; may be empty for "keep".
+        who: whose verdict it is.
+        when: UTC as text.
+    """
+
+    name: TrialName
+    verdict: str
+    reason: str
+    who: str
+    when: str
+
+
+def decision_of(event: _Facts) -> Decision | None:
+    """Return the verdict in `event` of the journal, None where there is none."""
+    kind = str(event.get("event"))
+    verdict = _VERDICTS.get(kind)
+    if kind == Event.VERDICT:
+        verdict = str(event.get("verdict"))
+    number, attempt = event.get("trial"), event.get("attempt")
+    if verdict is None or type(number) is not int or type(attempt) is not int:
+        return None
+    texts = (str(event.get(key) or "") for key in ("reason", "who", "utc"))
+    return Decision(TrialName(number, attempt), verdict, *texts)
+
+
+def last_decisions(events: Iterable[_Facts]) -> list[Decision]:
+    """Return the newest verdict on every attempt, in the order they were given."""
+    found: dict[TrialName, Decision] = {}
+    for event in events:
+        decision = decision_of(event)
+        if decision is not None:
+            found.pop(decision.name, None)
+            found[decision.name] = decision
+    return list(found.values())
+
+
+def find_sidecar(folder: SessionFolder, name: TrialName) -> dict[str, Any]:
+    """Return the sidecar of an attempt, wherever it stands; empty for none."""
+    kept = read_json(folder.trials / f"{name.kept}.json")
+    if kept and kept.get("attempt") == name.attempt:
+        return kept
+    return read_json(folder.rejected / f"{name.rejected}.json")
+
+
+def shelve(folder: SessionFolder, decision: Decision) -> None:
+    """Let the files of an attempt follow the verdict on it.
+
+    The sidecar moves last, so a call that was cut short can be repeated; a second call
+    changes nothing. A verdict that was there before goes into the sidecar's history.
+
+    Raises:
+        TrialFileError: the disk is full or gone, or another file stands in the way.
+    """
+    name, is_kept = decision.name, decision.verdict == KEEP
+    at_trials = folder.trials / f"{name.kept}.json"
+    at_rejected = folder.rejected / f"{name.rejected}.json"
+    source, target = (at_rejected, at_trials) if is_kept else (at_trials, at_rejected)
+    sidecar = find_sidecar(folder, name)
+    holds_source = is_kept or _is_of(at_trials, name)
+    if holds_source:
+        for suffix in _SUFFIXES:
+            path = source.with_suffix(suffix)
+            if path.exists():
+                move_file(path, target.with_suffix(suffix))
+    changed = _with_verdict(sidecar, decision)
+    if not target.exists() or read_json(target) != changed:
+        write_json(target, changed)
+    if holds_source:
+        source.unlink(missing_ok=True)
+
+
+def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> str:
+    """Add a remark, which the journal has as its last event, to an attempt's sidecar.
+
+    Returns:
+        Name of the sidecar.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    path = folder.trials / f"{name.kept}.json"
+    if not _is_of(path, name):
+        path = folder.rejected / f"{name.rejected}.json"
+    sidecar = find_sidecar(folder, name)
+    remark = {"text": text, "who": who, "when": folder.events()[-1]["utc"]}
+    notes: list[object] = [*(sidecar.get("notes") or []), remark]
+    write_json(path, {**sidecar, "notes": notes})
+    return path.stem
+
+
+def _is_of(sidecar: Path, name: TrialName) -> bool:
+    return read_json(sidecar).get("attempt") == name.attempt
+
+
+def _with_verdict(sidecar: _Facts, decision: Decision) -> dict[str, object]:
+    """Return the sidecar with the verdict, the one before it in its history."""
+    given = {
+        "verdict": decision.verdict,
+        "reason": decision.reason,
+        "who": decision.who,
+        "when": decision.when,
+    }
+    before = {key: sidecar.get(key, "") for key in given}
+    history: list[object] = list(sidecar.get("history") or [])
+    if before["verdict"] and before != given:
+        history.append(before)
+    named = {"trial": decision.name.kept, "attempt": decision.name.attempt}
+    return {**named, **sidecar, **given, "history": history}

@@ -1,0 +1,101 @@
+"""Sessions that are not finished: left on purpose, or by a process that was killed."""
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.chunks import read_file
+from acquisition.trial_file.salvage import recorded_seconds
+from experiments.messages import CATALOGUE
+from experiments.session.lock import owner_of
+from experiments.session.reducer import SessionState, replay
+from experiments.session.states import OPEN, RESUMABLE, Phase
+from experiments.session.store import SessionFolder, list_sessions
+from experiments.trial.header import TrialName
+
+
+@dataclass(frozen=True, slots=True)
+class Unfinished:
+    """A session that can be resumed.
+
+    Attributes:
+        folder: the session on the disk.
+        state: what its journal says; a crash is a phase of its own here.
+        seconds: sound recording in the `.partial` of the trial that has no verdict
+            [s], with what was recorded before the trigger; None without such a file.
+        last_utc: time of the last event, as the journal has it.
+    """
+
+    folder: SessionFolder
+    state: SessionState
+    seconds: float | None
+    last_utc: str
+
+    @property
+    def is_crashed(self) -> bool:
+        """Whether it ended without closing."""
+        return self.state.phase in OPEN | {Phase.CRASHED}
+
+    @property
+    def running(self) -> str:
+        """Name of the trial that has no verdict; empty between trials."""
+        number = self.state.running
+        return "" if number is None else TrialName(number, 1).kept
+
+    def facts(self) -> dict[str, object]:
+        """Return what messages say about it."""
+        where = "between trials"
+        if self.running and self.seconds is None:
+            where = f"{self.running} before its verdict"
+        elif self.running:
+            where = f"{self.running} at {self.seconds:.1f} s"
+        redone = f" - {self.running} will be redone, its data are in rejected/"
+        return {
+            "session": self.folder.id,
+            "terrain": self.folder.terrain,
+            "kept": len(self.state.kept),
+            "wanted": self.state.wanted,
+            "where": where,
+            "redone": redone if self.running else "",
+        }
+
+    def text(self) -> str:
+        """Return what there is to say about it, without what to do."""
+        name = "crash" if self.is_crashed else "unfinished"
+        return CATALOGUE[name].what.format_map(self.facts())
+
+
+def find_unfinished(data: Path) -> list[Unfinished]:
+    """Return the sessions below `data` that can be resumed and are not open now.
+
+    Folders that cannot be read are left out: a look at old sessions stops no new one.
+    """
+    found: list[Unfinished] = []
+    with suppress(OSError):
+        for folder in list_sessions(data):
+            with suppress(OSError):
+                unfinished = look_at(folder)
+                found += [unfinished] if unfinished is not None else []
+    return found
+
+
+def look_at(folder: SessionFolder) -> Unfinished | None:
+    """Return the session as one to be resumed, None where it is not."""
+    events = folder.events()
+    state = replay(events)
+    if state.phase not in OPEN | RESUMABLE or owner_of(folder) is not None:
+        return None
+    partial = folder.trials / f"T{state.running or 0:02d}.mcap.partial"
+    return Unfinished(
+        folder, state, _seconds(partial), str(events[-1].get("utc") or "")
+    )
+
+
+def _seconds(partial: Path) -> float | None:
+    if not partial.is_file():
+        return None
+    try:
+        return recorded_seconds(read_file(partial))
+    except TrialFileError:
+        return None

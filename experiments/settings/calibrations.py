@@ -1,0 +1,126 @@
+"""The settings with the calibrations that they name: sensor, feet, containers."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+from pydantic import ValidationError
+
+from acquisition.errors import SettingsError
+from experiments.settings.calibration_files import check_kind, read_calibration
+from experiments.settings.load import Settings
+from experiments.settings.matrix import TerrainRow
+from experiments.settings.rig import RigSettings
+from ft_sensor.calibration.files import terrain_facts, terrain_from_toml
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
+
+_M = TypeVar("_M", RigSettings, TerrainRow)
+_INSTEAD = "remove the line calibration = {name!r}"
+
+
+def with_calibrations(settings: Settings, *, is_simulated: bool) -> Settings:
+    """Return the settings with what their calibrations measured in its place.
+
+    A sensor's calibration gives the mounting, and mass and centre of the foot that was
+    on; a foot's own goes before. A container's gives the frame of its row. A simulated
+    world is made from the settings without them: it does not know what was measured.
+
+    Raises:
+        SettingsError: a file cannot be read, is no calibration, of another foot or
+            terrain, or of a simulated rig for a real one, or conversely.
+    """
+    reader = _Reader(settings, is_simulated=is_simulated)
+    rig = reader.rig(settings.rig)
+    rows = tuple(reader.row(row) for row in settings.matrix.terrains)
+    matrix = settings.matrix.model_copy(update={"terrains": rows})
+    return replace(settings, rig=rig, matrix=matrix, calibrations=reader.texts)
+
+
+class _Reader:
+    """Reads each file once and keeps its text for the recordings."""
+
+    def __init__(self, settings: Settings, *, is_simulated: bool) -> None:
+        self.texts: dict[str, str] = {}
+        self._folder = settings.folder
+        self._is_simulated = is_simulated
+
+    def rig(self, rig: RigSettings) -> RigSettings:
+        """Return rig.toml with its sensor's and feet's calibrations."""
+        values = rig.model_dump()
+        mount, feet = values["ft_sensor"], values["feet"]
+        if rig.ft_sensor.calibration is not None:
+            found = self._sensor(rig.ft_sensor.calibration, "sensor", None)
+            mount["angle_deg"] = float(np.degrees(found.fit.angle))
+            mount["sign"] = int(found.fit.sign)
+            if found.foot in feet:
+                feet[found.foot].update(_body(found, rig.ft_sensor.height))
+        for name, section in (("tread", rig.feet.tread), ("bare", rig.feet.bare)):
+            if section.calibration is not None:
+                found = self._sensor(section.calibration, "foot", name)
+                feet[name].update(_body(found, rig.ft_sensor.height))
+        return _checked(RigSettings, values)
+
+    def row(self, row: TerrainRow) -> TerrainRow:
+        """Return a row of the matrix with the container where it was touched."""
+        name = row.calibration
+        if name is None:
+            return row
+        text = self._read(name, f"terrain --terrain {row.name}")
+        terrain, frame = terrain_from_toml(text)
+        if terrain != row.name:
+            raise _mismatch(name, f"terrain {terrain}", f"terrain {row.name}")
+        is_of_simulation = terrain_facts(text).get("simulated") == "true"
+        self._check_kind(name, is_of_simulation=is_of_simulation)
+        measured = {
+            "incline_deg": float(np.degrees(frame.incline)),
+            "heading_deg": float(np.degrees(frame.heading)),
+            "far_end": frame.far_end,
+            "travel": frame.travel,
+        }
+        return _checked(TerrainRow, {**row.model_dump(), **measured})
+
+    def _sensor(self, name: str, what: str, foot: str | None) -> SensorCalibration:
+        found = sensor_from_toml(self._read(name, what), name)
+        self._check_kind(name, is_of_simulation=found.is_simulated)
+        if foot is not None and found.foot != foot:
+            raise _mismatch(name, f"foot {found.foot}", f"foot {foot}")
+        return found
+
+    def _read(self, name: str, what: str) -> str:
+        instead = _INSTEAD.format(name=name)
+        text = read_calibration(self._folder / name, what, instead)
+        self.texts[f"calibration:{name}"] = text
+        return text
+
+    def _check_kind(self, name: str, *, is_of_simulation: bool) -> None:
+        check_kind(
+            name,
+            is_of_simulation=is_of_simulation,
+            is_simulated=self._is_simulated,
+            instead=_INSTEAD.format(name=name),
+        )
+
+
+def _body(found: SensorCalibration, height: float) -> Mapping[str, object]:
+    com = tuple(found.com_in_frame_7(height).tolist())
+    return {"mass": found.fit.mass, "com": com}
+
+
+def _checked(model: type[_M], values: object) -> _M:
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise SettingsError(
+            f"A calibration makes {place} = {first['input']!r}: {first['msg']}.",
+            hint="Calibrate again, or remove the line. Nothing was started.",
+        ) from error
+
+
+def _mismatch(name: str, theirs: str, ours: str) -> SettingsError:
+    return SettingsError(
+        f"{name} was measured with {theirs}, and is named for {ours}.",
+        hint=f"Calibrate again, or {_INSTEAD.format(name=name)}. Nothing was started.",
+    )

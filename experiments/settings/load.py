@@ -1,0 +1,145 @@
+"""rig.toml and matrix.toml: read, checked, with an error that says what to write."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from acquisition.errors import SettingsError
+from experiments.settings.errors import explain
+from experiments.settings.matrix import MatrixSettings, TerrainRow
+from experiments.settings.rig import RigSettings
+from experiments.settings.sensor import build_device
+
+_M = TypeVar("_M", bound=BaseModel)
+_LARGEST = 1_000_000  # bytes; a matrix has a few thousand
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """The resolved settings and where they came from.
+
+    Attributes:
+        rig: rig.toml.
+        matrix: matrix.toml.
+        rig_text: text of rig.toml, for the recording.
+        matrix_text: text of matrix.toml.
+        origin: "shipped default" or the folder of the files.
+        folder: where the files are that rig.toml names.
+        calibrations: texts of the calibration files that were applied, by name.
+    """
+
+    rig: RigSettings
+    matrix: MatrixSettings
+    rig_text: str
+    matrix_text: str
+    origin: str
+    folder: Path
+    calibrations: Mapping[str, str] = field(default_factory=dict[str, str])
+
+    def by_cad(self) -> "Settings":
+        """Return the same with the gravity of the drawings, for a calibration."""
+        cad = self.rig.gravity.model_copy(update={"model": "cad"})
+        return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
+
+    def with_row(self, row: TerrainRow) -> "Settings":
+        """Return the same with `row` in place of the one of its name."""
+        rows = tuple(row if old.name == row.name else old for old in self._rows)
+        matrix = self.matrix.model_copy(update={"terrains": rows})
+        return replace(self, matrix=matrix)
+
+    def without_sensor(self, foot: str, *, is_mounted: bool) -> "Settings":
+        """Return the same without what was measured of `foot`, for a calibration.
+
+        The mounting of the sensor goes too, unless it `is_mounted` as it was.
+        """
+        nothing = {"calibration": None}
+        old = self.rig.feet.tread if foot == "tread" else self.rig.feet.bare
+        feet = self.rig.feet.model_copy(update={foot: old.model_copy(update=nothing)})
+        changed: dict[str, object] = {"feet": feet}
+        if not is_mounted:
+            changed["ft_sensor"] = self.rig.ft_sensor.model_copy(update=nothing)
+        return replace(self, rig=self.rig.model_copy(update=changed))
+
+    @property
+    def _rows(self) -> tuple[TerrainRow, ...]:
+        return self.matrix.terrains
+
+    def row(self, terrain: str) -> TerrainRow:
+        """Return the matrix row of `terrain`.
+
+        Raises:
+            SettingsError: there is no such row.
+        """
+        for row in self.matrix.terrains:
+            if row.name == terrain:
+                return row
+        known = " ".join(row.name for row in self.matrix.terrains)
+        raise SettingsError(
+            f"There is no terrain {terrain!r} in matrix.toml.",
+            hint=f"Terrains: {known}. Nothing was started.",
+        )
+
+
+def load_settings(config: Path | None) -> Settings:
+    """Return settings from `config`, a rig.toml with a matrix.toml beside it.
+
+    Without `config` the shipped defaults are used; a missing matrix.toml too.
+
+    Raises:
+        SettingsError: a file is missing, no TOML, or holds a wrong key or value.
+    """
+    shipped = resources.files("experiments.data")
+    rig_text = (shipped / "rig.toml").read_text()
+    matrix_text = (shipped / "matrix.toml").read_text()
+    origin = "shipped default"
+    if config is not None:
+        rig_text = _read(config)
+        origin = str(config)
+        beside = config.with_name("matrix.toml")
+        if beside.exists():
+            matrix_text = _read(beside)
+    rig = _parse(RigSettings, rig_text, "rig.toml")
+    build_device(rig.ft_sensor)
+    matrix = _parse(MatrixSettings, matrix_text, "matrix.toml")
+    names = [row.name for row in matrix.terrains]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise SettingsError(
+            f"matrix.toml: terrain {twice[0]!r} stands there twice.",
+            hint="Every row needs a name of its own. Nothing was started.",
+        )
+    folder = config.parent if config is not None else Path()
+    return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
+
+
+def _read(path: Path) -> str:
+    try:
+        # A pipe or a device would be read for ever.
+        is_plain = path.is_file() or path.is_dir() or not path.exists()
+        if not is_plain or path.stat().st_size > _LARGEST:
+            raise ValueError
+        return path.read_text()
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text"
+        raise SettingsError(
+            f"{path} cannot be read ({reason}).",
+            hint="Name a rig.toml with --config. Nothing was started.",
+        ) from error
+
+
+def _parse(model: type[_M], text: str, name: str) -> _M:
+    try:
+        data = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise SettingsError(
+            explain(model, name, error), hint="Nothing was started."
+        ) from error

@@ -1,0 +1,40 @@
+"""What may stand in matrix.toml: the terrains and how they are pushed across."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.settings.base import File, Near, Number, Section, Vector3, Whole
+
+_Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
+_Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
+
+
+class TerrainRow(Section):
+    """One row of the matrix.
+
+    `reset`: what a person does to the terrain before every trial.
+    """
+
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
+    stones: Literal["small", "big", "none"] = Field(examples=["small"])
+    incline_deg: Number = Field(ge=0, le=30, examples=[10.0])
+    foot: Literal["tread", "bare"] = Field(examples=["tread"])
+    far_end: Vector3 = Field(examples=[[0.70, 0.0, 0.12]])
+    heading_deg: Number = Field(ge=-180, le=180, examples=[0.0])
+    travel: Number = Field(gt=0.05, le=1.0, examples=[0.45])
+    trials: Whole = Field(ge=1, le=99, examples=[10])
+    reset: tuple[_Task, ...] = Field(
+        default=("rake", "level", "foot at the far end"),
+        min_length=1,
+        max_length=9,
+        examples=[["rake", "level", "foot at the far end"]],
+    )
+    start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
+    calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
+
+
+class MatrixSettings(Section):
+    """Everything in matrix.toml."""
+
+    terrains: tuple[TerrainRow, ...] = Field(min_length=1)

@@ -1,0 +1,60 @@
+"""Every setting by its dotted name: its value, and where it comes from."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from experiments.settings.load import Settings
+
+_SHIPPED = "shipped default"
+
+
+def flatten(value: object, place: str = "") -> dict[str, object]:
+    """Return the values of nested tables by dotted name, e.g. feet.tread.mass.
+
+    A list of numbers or words is one value; a list of tables is numbered.
+    """
+    if isinstance(value, Mapping):
+        found: dict[str, object] = {}
+        for key, inner in cast("Mapping[str, object]", value).items():
+            found |= flatten(inner, f"{place}.{key}" if place else key)
+        return found
+    if isinstance(value, list | tuple):
+        items = cast("Sequence[object]", value)
+        if items and all(isinstance(item, Mapping) for item in items):
+            found = {}
+            for number, item in enumerate(items):
+                found |= flatten(item, f"{place}[{number}]")
+            return found
+        return {place: list(items)}
+    return {place: value}
+
+
+def origin_lines(settings: Settings) -> list[str]:
+    """Return one line per setting: file, name, value, where it comes from."""
+    lines: list[str] = []
+    files: tuple[tuple[str, Any, str], ...] = (
+        ("rig.toml", settings.rig, settings.rig_text),
+        ("matrix.toml", settings.matrix, settings.matrix_text),
+    )
+    for file, model, text in files:
+        given = flatten(tomllib.loads(text))
+        origin = _origin(settings, file)
+        for name, value in flatten(model.model_dump()).items():
+            source = origin if name in given else f"default, not in {file}"
+            lines.append(f"{name} = {_shown(value)}   ({source})")
+    return lines
+
+
+def _origin(settings: Settings, file: str) -> str:
+    path = settings.folder / file
+    is_shipped = settings.origin == _SHIPPED
+    if file == "rig.toml" and not is_shipped:
+        return settings.origin
+    return _SHIPPED if is_shipped or not path.is_file() else str(path)
+
+
+def _shown(value: object) -> str:
+    if value is None:
+        return "none"
+    return f'"{value}"' if isinstance(value, str) else str(value)

@@ -1,0 +1,155 @@
+"""What may stand in rig.toml."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from experiments.settings.base import (
+    File,
+    Mass,
+    Number,
+    Positive,
+    Section,
+    Vector3,
+    Whole,
+)
+from experiments.settings.sensor import SensorSection
+
+_Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
+_Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
+
+
+class CanSettings(Section):
+    """The CAN interface, in python-can's words."""
+
+    interface: str = Field(examples=["socketcan"])
+    channel: str = Field(examples=["can0"])
+    bitrate: Whole = Field(gt=0, examples=[1000000])
+
+
+class ArmSection(Section):
+    """This arm.
+
+    Attributes:
+        mech_at_home: absolute angles of the motors at the home position [counts], as
+            "traction zero" tells them; left out: the next zeroing is not checked.
+    """
+
+    mech_at_home: tuple[_Turn, _Turn, _Turn, _Turn, _Turn, _Turn, _Turn] | None = Field(
+        default=None, examples=[[1012, 340, 2761, 95, 4001, 1200, 2048]]
+    )
+
+
+class FootSection(Section):
+    """A foot with its adapter, in frame 7."""
+
+    mass: Mass = Field(examples=[0.45])
+    com: Vector3 = Field(examples=[[0.01, 0.0, 0.062]])
+    inertia: tuple[Positive, Positive, Positive] = Field(
+        examples=[[4e-4, 5.5e-4, 4.5e-4]]
+    )
+    sole: Vector3 = Field(examples=[[0.01, 0.0, 0.112]])
+    calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
+
+
+class Feet(Section):
+    """The two feet of the experiment."""
+
+    tread: FootSection
+    bare: FootSection
+
+
+class ControlSection(Section):
+    """The control law's numbers."""
+
+    virtual_mass: Number = Field(ge=0, le=2, examples=[0.30])
+    lock_kp: Number = Field(ge=0, le=30, examples=[20.0])
+    lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
+
+
+class GravitySection(Section):
+    """Which model of gravity floats the arm.
+
+    "cad": masses of the drawings; "shipped": first moments of another arm;
+    "calibrated": those of `file`, a path from the folder of rig.toml.
+    """
+
+    model: Literal["cad", "shipped", "calibrated"] = Field(examples=["cad"])
+    file: File = Field(default="gravity.toml", examples=["gravity.toml"])
+
+
+class LimitSection(Section):
+    """Where the guard steps in."""
+
+    speed: _Limits = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: _Limits = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    foot_speed: Positive = Field(examples=[0.8])
+    joint7_mrad: Positive = Field(examples=[50.0])
+    ft_stale_ms: Positive = Field(examples=[6.0])
+    ft_stop_ms: Positive = Field(examples=[20.0])
+    late_per_second: Whole = Field(ge=1, le=500, examples=[10])
+    tare_spread: Positive = Field(examples=[0.5])
+    residual: Positive = Field(default=1.0, examples=[1.0])
+    free_disk_gb: Number = Field(ge=0, examples=[5.0])
+
+
+class SafetySection(Section):
+    """What the safety module tolerates; a warning left out is 0.9 of its fault."""
+
+    speed_warning: Annotated[Number, Field(gt=0, le=2)] | None = Field(
+        default=None, examples=[0.5]
+    )
+    speed_fault: Number = Field(gt=0, le=2, examples=[1.0])
+    torque_warning_units: Annotated[Whole, Field(gt=0, le=8191)] | None = Field(
+        default=None, examples=[4731]
+    )
+    torque_fault_units: Whole = Field(gt=0, le=8191, examples=[5204])
+
+
+# What the module does by itself after power-up.
+_POWER_UP = SafetySection(
+    speed_warning=0.5,
+    speed_fault=1.0,
+    torque_warning_units=4731,
+    torque_fault_units=5204,
+)
+
+
+class LoopSection(Section):
+    """How the loop keeps time.
+
+    Attributes:
+        spin_us: it stops sleeping so long before each deadline and watches the time;
+            for a kernel that wakes late. It costs the share of the core.
+    """
+
+    spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
+
+
+class OperatorSection(Section):
+    """How the program and the person at the arm tell each other something.
+
+    Attributes:
+        bell: the terminal rings at the start, when too fast, and at the end.
+        speech: the same is spoken where a speech program is installed.
+        double_tap: two presses of the foot start a trial, and keep it.
+    """
+
+    bell: bool = Field(default=True, strict=True, examples=[True])
+    speech: bool = Field(default=False, strict=True, examples=[False])
+    double_tap: bool = Field(default=False, strict=True, examples=[False])
+
+
+class RigSettings(Section):
+    """Everything in rig.toml."""
+
+    can: CanSettings
+    arm: ArmSection = ArmSection()
+    ft_sensor: SensorSection
+    feet: Feet
+    control: ControlSection
+    limits: LimitSection
+    gravity: GravitySection = GravitySection(model="cad")
+    loop: LoopSection = LoopSection()
+    operator: OperatorSection = OperatorSection()
+    safety: SafetySection = _POWER_UP

@@ -1,0 +1,199 @@
+"""The whole study rehearsed: recorded through the wire, analysed, held to bands."""
+
+import contextlib
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import SessionError
+from analysis.data.load import RecordedTrial, load_trial
+from analysis.data.prepare import PrepareOptions
+from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.study import Study, StudyOptions, run_study
+from analysis.validation.bands import Band, Finding, hold_against_bands
+from analysis.validation.model_measures import model_measures
+from analysis.validation.slip_measures import GroundTrials, slip_measures
+from experiments.report.truth_errors import truth_errors
+from experiments.session.store import list_sessions
+
+WHOLE = 10  # trials per terrain from which every band applies
+_OF_FEW = ("D", "E", "F", "T")  # groups that apply to fewer
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+# Beside the 43: not met unless frames, signs, tare and kinematics are right.
+TRUTH_BANDS = (
+    Band("T1", "v_t against the truth, rms, each terrain's worst trial (mm/s)", 0, 1.5),
+    Band("T2", "F_t against the truth, mean |error|, all trials (N)", 0.2, 0.6),
+    Band("T3", "F_n against the truth, mean |error|, all trials (N)", 0.2, 0.6),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is rehearsed.
+
+    Attributes:
+        config: a rig.toml; None = as shipped.
+        terrains: names of the terrains, in the matrix's order.
+        plates: those of them without stones.
+        travel: length of the shortest container [m].
+        trials: of each.
+        seed: of everything random.
+        friction: of the joints, as a share of what was identified on another arm.
+        jobs: processes at a time; None = one per core.
+    """
+
+    config: Path | None
+    terrains: tuple[str, ...]
+    plates: tuple[str, ...]
+    travel: float
+    trials: int
+    seed: int
+    friction: float
+    jobs: int | None
+
+
+def record_study(
+    plan: Plan, data: Path, say: Callable[[str], None] = lambda _: None
+) -> None:
+    """Record a session on every terrain into `data`, terrains side by side.
+
+    Every session is the one that `traction run` makes, in a process of its own.
+
+    Raises:
+        SessionError: a session failed; its words are in `data`.
+    """
+    data.mkdir(parents=True, exist_ok=True)
+    with _single_threaded(), _pool(plan.jobs) as pool:
+        tasks = {
+            pool.submit(_record, _arguments(plan, terrain, data), data / terrain): (
+                terrain
+            )
+            for terrain in plan.terrains
+        }
+        for task in as_completed(tasks):
+            terrain, code = tasks[task], task.result()
+            if code:
+                raise SessionError(
+                    f"The session on {terrain} ended with exit code {code}.",
+                    hint=f"What it said: {data / terrain}.log",
+                )
+            say(f"{terrain} recorded")
+
+
+def analyse(plan: Plan, data: Path) -> list[Finding]:
+    """Analyse the study in `data` and hold it against its bands.
+
+    With fewer than ten trials only the bands on slips, samples and truth are returned.
+    """
+    trials = _load(plan, data)
+    series = {name: [trial.series() for trial in of] for name, of in trials.items()}
+    is_whole = plan.trials >= WHOLE
+    options = StudyOptions(
+        prepare=PrepareOptions(container_travel=plan.travel),
+        fit=FitOptions(
+            seed=plan.seed, models=(TUSTIN, GP_SE) if is_whole else (TUSTIN,), draws=0
+        ),
+        n_jobs=plan.jobs,
+    )
+    study = run_study(series, options, simulated=True)
+    measures = {
+        **(model_measures(study, plan.plates) if is_whole else {}),
+        **slip_measures(_grounds(study, trials, plan.plates)),
+    }
+    found = [*hold_against_bands(measures), *_truth(trials)]
+    if is_whole:
+        return found
+    return [f for f in found if f.band.id[0] in _OF_FEW and f.band.id != "E7"]
+
+
+def as_plain(plan: Plan, found: Sequence[Finding]) -> dict[str, object]:
+    """Return plan and findings as values for JSON."""
+    return {
+        "plan": {**asdict(plan), "config": str(plan.config or "shipped default")},
+        "bands": [
+            {**asdict(f.band), "values": list(f.values), "is_met": f.is_met}
+            for f in found
+        ],
+    }
+
+
+def _record(arguments: list[str], place: Path) -> int:
+    """Run one command of its own; what it says goes beside the data."""
+    command = [sys.executable, "-m", "experiments", *arguments]
+    with place.with_name(place.name + ".log").open("w") as log:
+        return subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, check=False
+        ).returncode
+
+
+def _arguments(plan: Plan, terrain: str, data: Path) -> list[str]:
+    config = [] if plan.config is None else ["--config", str(plan.config)]
+    return [
+        *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
+        *("--trials", str(plan.trials), "--seed", str(plan.seed)),
+        *("--friction", repr(plan.friction), "--data", str(data), "--no-color"),
+        *config,
+    ]
+
+
+def _pool(jobs: int | None) -> Executor:
+    return ThreadPoolExecutor(jobs or os.cpu_count())
+
+
+@contextlib.contextmanager
+def _single_threaded() -> Generator[None]:
+    """Let processes started meanwhile use one thread for linear algebra each."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _load(plan: Plan, data: Path) -> dict[str, list[RecordedTrial]]:
+    trials: dict[str, list[RecordedTrial]] = {name: [] for name in plan.terrains}
+    for session in list_sessions(data):
+        trials[session.terrain] += [load_trial(path) for path in session.kept_trials()]
+    return trials
+
+
+def _grounds(
+    study: Study, trials: dict[str, list[RecordedTrial]], plates: Sequence[str]
+) -> dict[str, GroundTrials]:
+    return {
+        name: GroundTrials(
+            is_plate=name in plates,
+            series=tuple(trial.series() for trial in trials[name]),
+            prepared=result.trials,
+            slips=result.slips,
+        )
+        for name, result in study.terrains.items()
+    }
+
+
+def _truth(trials: dict[str, list[RecordedTrial]]) -> list[Finding]:
+    errors = {
+        name: [e for trial in of if (e := truth_errors(trial)) is not None]
+        for name, of in trials.items()
+    }
+    every = [error for of in errors.values() for error in of]
+    if not every:
+        return [Finding(band, ()) for band in TRUTH_BANDS]
+    values = (
+        tuple(1e3 * max(e.v_t for e in of) for of in errors.values() if of),
+        (float(np.mean([e.F_t for e in every])),),
+        (float(np.mean([e.F_n for e in every])),),
+    )
+    return [Finding(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]

@@ -1,0 +1,143 @@
+"""What is written of a recorded trial: the sealed file, its sidecar, the flight."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.verify import Verified
+from acquisition.trial_file.writer import TrialHeader
+from analysis.data.quality import Coverage, suggest
+from experiments.rig.rig import Rig
+from experiments.session.reducer import KEEP
+from experiments.session.store import read_json, write_json
+from experiments.trial.header import SessionFacts, TrialName, write_flight, write_truth
+from experiments.trial.quality import Review
+
+COMPLETE = frozenset({"travel", "key", "time-limit"})
+CELLS = (4, 4)  # speeds, loads of a coverage
+MANY = 1_000_000_000  # samples, more than any trial has
+ENOUGH = 0.9  # share of the container a trial has to cross
+
+
+@dataclass(slots=True)
+class Outcome:
+    """How a recording ended.
+
+    Attributes:
+        reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
+        seconds: since the start [s].
+        displacement: of the foot along the container [m].
+    """
+
+    reason: str
+    seconds: float = 0.0
+    displacement: float = 0.0
+
+    @property
+    def status(self) -> str:
+        """The machine's word on the trial, never a verdict."""
+        return "complete" if self.reason in COMPLETE else "interrupted"
+
+
+def sidecar_of(
+    name: TrialName, verified: Verified | None, outcome: Outcome
+) -> dict[str, object]:
+    """Return the sidecar of an attempt without a verdict; no file where None."""
+    return {
+        "trial": name.kept,
+        "attempt": name.attempt,
+        "sha256": verified.sha256 if verified else "",
+        "size": verified.size if verified else 0,
+        "cycles": verified.cycles if verified else 0,
+        "duration": round(verified.duration, 3) if verified else 0.0,
+        "worst_gap": round(verified.worst_gap, 6) if verified else 0.0,
+        "status": outcome.status,
+        "stop_reason": outcome.reason,
+        "displacement": round(outcome.displacement, 4),
+        "verdict": "",
+        "reason": "",
+        "who": "",
+        "when": "",
+        "history": [],
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """The files of one session's trials."""
+
+    rig: Rig
+    facts: SessionFacts
+
+    def seal(self, header: TrialHeader, name: TrialName, reason: str) -> Verified:
+        """End and verify the trial file, and the truth beside it when simulated.
+
+        Raises:
+            TrialFileError: a file could not be written or verified.
+        """
+        verified = self.rig.crew.recorder.finish(reason)
+        truth = self.facts.folder.trials / f"{name.kept}.truth.mcap"
+        write_truth(self.rig, header, truth)
+        return verified
+
+    def flight(self, header: TrialHeader, name: TrialName, reason: str) -> str:
+        """Write the flight record of a fault; return what to say about it."""
+        path = self.facts.folder.faults / f"{name.rejected}.flight.mcap"
+        try:
+            write_flight(self.rig, header, path, reason)
+        except TrialFileError as error:
+            return f"No flight record: {error}"
+        return f"Flight record: faults/{path.name}."
+
+    def write_sidecar(
+        self,
+        name: TrialName,
+        verified: Verified,
+        outcome: Outcome,
+        review: Review | None = None,
+    ) -> None:
+        """Write what is known of a sealed trial beside it, without a verdict.
+
+        Args:
+            name: the attempt.
+            verified: what reading the file back has shown.
+            outcome: how the recording ended.
+            review: what the trial is worth; None = not looked at.
+
+        Raises:
+            TrialFileError: the disk is full or gone.
+        """
+        facts = sidecar_of(name, verified, outcome)
+        if review is not None:
+            facts |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
+        write_json(self.facts.folder.trials / f"{name.kept}.json", facts)
+
+    def kept_ratios(self) -> list[float]:
+        """Return the quick fits of the trials kept so far, from their sidecars."""
+        ratios = (sidecar.get("ratio") for sidecar in self._kept_sidecars())
+        return [ratio for ratio in ratios if isinstance(ratio, float)]
+
+    def suggestion(self) -> str:
+        """Return how the next push should be, so that the kept ones leave no gap."""
+        counts = np.zeros(CELLS, np.int64)
+        for sidecar in self._kept_sidecars():
+            counts += cells_of(sidecar.get("coverage"))
+        return suggest(Coverage(counts))
+
+    def _kept_sidecars(self) -> list[dict[str, Any]]:
+        paths = sorted(self.facts.folder.trials.glob("T*.json"))
+        found = [read_json(path) for path in paths]
+        return [sidecar for sidecar in found if sidecar.get("verdict") == KEEP]
+
+
+def cells_of(value: object) -> NDArray[np.int64]:
+    """Return a coverage as it stands in a sidecar, zeros where it is none."""
+    try:
+        counts = np.array(value, np.int64)
+    except (ValueError, TypeError, OverflowError):
+        counts = np.zeros(0, np.int64)
+    is_map = counts.shape == CELLS and bool((counts >= 0).all() & (counts < MANY).all())
+    return counts if is_map else np.zeros(CELLS, np.int64)

@@ -1,0 +1,130 @@
+"""The quality gate: what a trial is worth, while the terrain can still be seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.sample import Flag
+from analysis.data.events import find_slips
+from analysis.data.load import load_trial
+from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.quality import coverage, quick_ratio
+from experiments.operator.console import GOOD, WARNING
+
+JOINT7_WARNING = 0.020  # rad
+MIN_KEPT = 250
+STALE_SHARE = 0.01  # of the cycles
+ENOUGH_EARLIER = 3  # trials before which nothing is odd
+ODD = 3.0  # standard deviations
+LEAST_SPREAD = 0.05  # of the mean; few trials may agree by chance
+
+
+@dataclass(frozen=True, slots=True)
+class Review:
+    """Numbers of one trial for the review page.
+
+    Attributes:
+        worst_gap: longest time between two cycles [s].
+        missed: cycles that are missing.
+        joint7: largest motion of joint 7 [rad].
+        saturated: share of the cycles in which the force sensor was saturated.
+        stale: share of the cycles without a fresh force sample.
+        kept: samples inside the analysis window.
+        fast: share of them above 0.2 m/s.
+        slips: number of slips.
+        ratio: slope of F_t over F_n of the kept samples; NaN without load.
+        counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
+    """
+
+    worst_gap: float
+    missed: int
+    joint7: float
+    saturated: float
+    stale: float
+    kept: int
+    fast: float
+    slips: int
+    ratio: float
+    counts: NDArray[np.int64]
+
+    @property
+    def known_ratio(self) -> float | None:
+        """The slope, None where there is none."""
+        return None if np.isnan(self.ratio) else self.ratio
+
+    def lines(self, earlier: Sequence[float] = ()) -> list[tuple[str, str]]:
+        """Return (mark, text) of every line.
+
+        Args:
+            earlier: `ratio` of the trials kept before, for comparison.
+        """
+        timing = GOOD if self.worst_gap < 0.004 and not self.missed else WARNING
+        joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
+        kept = GOOD if self.kept >= MIN_KEPT else WARNING
+        sensor = WARNING if self.saturated or self.stale > STALE_SHARE else GOOD
+        fit, words = self._quick_fit(earlier)
+        return [
+            (
+                timing,
+                f"timing worst gap {self.worst_gap * 1e3:.1f} ms, missed {self.missed}",
+            ),
+            (sensor, self._sensor_words()),
+            (joint7, f"joint 7 moved {self.joint7 * 1e3:.0f} mrad"),
+            (
+                kept,
+                f"coverage {self.kept} samples, {self.fast:.0%} above 0.2 m/s · "
+                f"slips {self.slips}",
+            ),
+            (fit, words),
+        ]
+
+    def _sensor_words(self) -> str:
+        if self.saturated:
+            return f"sensor saturated in {self.saturated:.1%} of the cycles"
+        if self.stale > STALE_SHARE:
+            return f"sensor stale in {self.stale:.1%} of the cycles"
+        return "sensor no saturation"
+
+    def _quick_fit(self, earlier: Sequence[float]) -> tuple[str, str]:
+        """Return (mark, words) on the slope, held against the earlier ones."""
+        if np.isnan(self.ratio):
+            return WARNING, "quick fit impossible: no load"
+        words = f"quick fit F_t/F_n {self.ratio:.2f}"
+        known = [ratio for ratio in earlier if not np.isnan(ratio)]
+        if len(known) < ENOUGH_EARLIER:
+            return GOOD, words
+        mean, spread = float(np.mean(known)), float(np.std(known, ddof=1))
+        is_odd = abs(self.ratio - mean) > ODD * max(spread, LEAST_SPREAD * mean)
+        words += f" ({len(known)} before: {mean:.2f} ± {spread:.2f})"
+        return WARNING if is_odd else GOOD, words
+
+
+def review_trial(path: Path) -> Review:
+    """Return what the finished file says about the trial.
+
+    Raises:
+        TrialFileError: it cannot be read.
+    """
+    trial = load_trial(path)
+    prepared = prepare(
+        trial.series(), PrepareOptions(container_travel=trial.frame.travel)
+    )
+    q7 = trial.cycles["position"][:, 6]
+    flags = trial.cycles["flags"]
+    steps = np.diff(trial.cycles["cycle"].astype(int))
+    covered = coverage([prepared])
+    return Review(
+        worst_gap=float(np.diff(trial.t).max()),
+        missed=int((steps - 1).sum()),
+        joint7=float(np.abs(q7 - q7[0]).max()),
+        saturated=float(((flags & Flag.FT_SATURATED) != 0).mean()),
+        stale=float(((flags & Flag.FT_FRESH) == 0).mean()),
+        kept=int(prepared.kept),
+        fast=covered.fast_share,
+        slips=len(find_slips(prepared.smooth)),
+        ratio=quick_ratio(prepared),
+        counts=covered.counts,
+    )

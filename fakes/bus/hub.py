@@ -1,0 +1,170 @@
+"""The served end of a CAN bus on a Unix socket; clients see each other's frames."""
+
+import errno
+import select
+import socket
+from pathlib import Path
+
+from acquisition.errors import SettingsError
+from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
+
+CLIENTS = 32
+_PACKETS_AT_A_TIME = 64  # of one client, before the next one is heard
+_LONGEST_PATH = 107  # bytes, the kernel's limit
+
+Frame = tuple[int, bytes]
+
+
+class SocketHub:
+    """A listening socket and its clients; never waits.
+
+    Attributes:
+        ignored: packets that were no classic data frame.
+        lost: frames that a client did not fetch in time.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Begin to listen at `path`.
+
+        Raises:
+            SettingsError: the path is in use or cannot be one of a socket.
+        """
+        self.ignored = 0
+        self.lost = 0
+        self._path = path
+        self._clients: dict[int, socket.socket] = {}
+        self._listener = _listen(path)
+        self._inode = path.stat().st_ino
+        self._poll = select.epoll()
+        self._poll.register(self._listener, select.EPOLLIN)
+
+    @property
+    def name(self) -> str:
+        """The bus as a client of python-can names it."""
+        return f"traction-fake:{self._path}"
+
+    @property
+    def clients(self) -> int:
+        """Number of clients that are connected."""
+        return len(self._clients)
+
+    def fileno(self) -> int:
+        """Return a descriptor that is readable when somebody connects or sends."""
+        return self._poll.fileno()
+
+    def is_readable(self) -> bool:
+        """Return whether somebody connects or has sent something."""
+        return bool(self._poll.poll(0))
+
+    def receive(self) -> list[Frame]:
+        """Return the clients' frames that have arrived; others get them at once."""
+        frames: list[Frame] = []
+        for descriptor, _ in self._poll.poll(0):
+            if descriptor == self._listener.fileno():
+                self._accept()
+            elif descriptor in self._clients:
+                frames += self._drain(descriptor)
+        return frames
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Send a frame of the network to every client."""
+        self._spread(pack_frame(can_id, data), sender=-1)
+
+    def close(self) -> None:
+        """Send every client home and remove the socket; a second call does nothing."""
+        if self._poll.closed:
+            return
+        for descriptor in list(self._clients):
+            self._forget(descriptor)
+        self._poll.close()
+        self._listener.close()
+        if self._path.exists() and self._path.stat().st_ino == self._inode:
+            self._path.unlink()
+
+    def _accept(self) -> None:
+        try:
+            client, _ = self._listener.accept()
+        except OSError:
+            return  # it has gone away again
+        if len(self._clients) >= CLIENTS:
+            client.close()
+            return
+        client.setblocking(False)
+        self._clients[client.fileno()] = client
+        self._poll.register(client, select.EPOLLIN)
+
+    def _drain(self, descriptor: int) -> list[Frame]:
+        frames: list[Frame] = []
+        for _ in range(_PACKETS_AT_A_TIME):
+            try:
+                packet = self._clients[descriptor].recv(FRAME_SIZE + 1)
+            except BlockingIOError:
+                break
+            except OSError:
+                packet = b""
+            if not packet:
+                self._forget(descriptor)
+                break
+            if (frame := unpack_frame(packet)) is None:
+                self.ignored += 1
+            else:
+                frames.append(frame)
+                self._spread(packet, sender=descriptor)
+        return frames
+
+    def _spread(self, packet: bytes, sender: int) -> None:
+        for descriptor, client in list(self._clients.items()):
+            if descriptor == sender:
+                continue
+            try:
+                client.send(packet)
+            except BlockingIOError:
+                self.lost += 1
+            except OSError:
+                self._forget(descriptor)
+
+    def _forget(self, descriptor: int) -> None:
+        if (client := self._clients.pop(descriptor, None)) is not None:
+            self._poll.unregister(descriptor)
+            client.close()
+
+
+def _listen(path: Path) -> socket.socket:
+    if len(bytes(path)) > _LONGEST_PATH:
+        raise SettingsError(
+            f"{path} has {len(bytes(path))} bytes, a socket's path {_LONGEST_PATH} at "
+            "most.",
+            hint="Choose a shorter one, e.g. traction-fake:/tmp/wam.sock.",
+        )
+    _remove_stale(path)
+    listener = open_socket()
+    try:
+        listener.bind(str(path))
+        path.chmod(0o600)  # only its owner may connect
+        listener.listen(CLIENTS)
+        listener.setblocking(False)
+    except OSError as error:
+        listener.close()
+        raise SettingsError(
+            f"No bus can be served at {path}: {error.strerror or error}.",
+            hint="Name a new file in an existing folder you may write to.",
+        ) from error
+    return listener
+
+
+def _remove_stale(path: Path) -> None:
+    """Remove a socket that a server left behind; refuse whatever else is there."""
+    if not path.exists():
+        return
+    if not path.is_socket():
+        raise SettingsError(
+            f"{path} exists and is no socket.", hint="Name a file that does not exist."
+        )
+    with open_socket() as probe:
+        probe.settimeout(1.0)
+        if probe.connect_ex(str(path)) != errno.ECONNREFUSED:
+            raise SettingsError(
+                f"{path} is in use: somebody serves a bus there.",
+                hint="Stop that server, or choose another path.",
+            )
+    path.unlink()

@@ -1,0 +1,131 @@
+"""A CAN bus in this process: a puck network behind python-can's own interface."""
+
+import errno
+from collections import deque
+from typing import NoReturn
+
+import can
+
+from acquisition.clock import NS_PER_S, Clock
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.wire import WiredNetwork
+
+_PATIENCE_NS = NS_PER_S
+
+
+class FakeCanBus(can.BusABC):
+    """A bus with one host and a `PuckNetwork`; time comes from the clock alone.
+
+    Frames have the clock's monotonic time as their stamp [s]. A controller that has
+    left the bus (`network.faults.is_off`) refuses to send and to receive.
+    """
+
+    def __init__(self, network: PuckNetwork, clock: Clock) -> None:
+        self.channel_info = "fake bus"
+        self.network = network
+        self._faults = network.faults
+        self._clock = clock
+        self._inbox: deque[can.Message] = deque()
+        self._wired = WiredNetwork(network)
+        self._t_ns = -1  # how far it has gone on
+        super().__init__(channel="fake")
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Queue a frame for the wire at the clock's time; never waits.
+
+        Raises:
+            can.CanOperationError: the bus was shut down, or is off.
+        """
+        if self._is_shutdown:
+            raise can.CanOperationError("the bus was shut down")
+        if self._faults.is_off:
+            self._refuse()
+        now_ns = self._clock.now_ns()
+        self.advance(now_ns)  # what was sent before takes the wire first
+        if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
+            self._wired.send(now_ns, msg.arbitration_id, bytes(msg.data))
+
+    def fileno(self) -> int:
+        """There is no descriptor to wait on."""
+        raise NotImplementedError("a bus inside the process has no descriptor")
+
+    def is_readable(self) -> bool:
+        """Return whether a frame has arrived by the clock's time."""
+        if not self._inbox:
+            self.advance(self._clock.now_ns())
+        return bool(self._inbox)
+
+    def next_event_ns(self) -> int | None:
+        """Return when wire or network do something next, None if never."""
+        return self._wired.next_event_ns()
+
+    def advance(self, t_ns: int) -> None:
+        """Let wire and network go on to `t_ns`."""
+        self._t_ns = t_ns
+        for last_bit_ns, can_id, data in self._wired.advance(t_ns):
+            # positionally: stamp, identifier, is it an extended one
+            message = can.Message(last_bit_ns / NS_PER_S, can_id, False, data=data)
+            self._inbox.append(message)
+
+    def recv(self, timeout: float | None = None) -> can.Message | None:
+        """Return the next frame, None when `timeout` [s] of the clock has passed.
+
+        python-can would measure the time-out on the machine's own clock.
+
+        Raises:
+            can.CanOperationError: the bus is off.
+        """
+        if self._faults.is_off:
+            self._refuse()
+        clock = self._clock
+        if self._filters is None:  # the way that nearly every question takes
+            inbox = self._inbox
+            # What is sent is on the wire for a while: at one instant nothing new comes.
+            if not inbox and (now_ns := clock.now_ns()) != self._t_ns:
+                self.advance(now_ns)
+            if inbox:
+                return inbox.popleft()
+            if timeout == 0:
+                return None
+        patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)
+        deadline_ns = clock.now_ns() + patience_ns if timeout else 0
+        while True:
+            left = (deadline_ns - clock.now_ns()) / NS_PER_S if timeout else timeout
+            message, is_filtered = self._recv_internal(left)
+            if message is None:
+                if timeout is not None:
+                    return None
+            elif is_filtered or self._matches_filters(message):
+                return message
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        is_ready = self.is_readable()
+        can_wait = timeout is None or timeout > 0
+        if not is_ready and can_wait and not self._is_shutdown:
+            is_ready = self._await(timeout)
+        return (self._inbox.popleft() if is_ready else None), self._filters is None
+
+    def _await(self, timeout: float | None) -> bool:
+        patience_ns = _PATIENCE_NS if timeout is None else int(timeout * NS_PER_S)
+        return self._clock.wait(_Inbox(self), self._clock.now_ns() + patience_ns)
+
+    def _refuse(self) -> NoReturn:
+        """Lose what waits, and say so as an adapter does while it is off the bus."""
+        self._inbox.clear()
+        self._wired.drop_waiting()
+        raise can.CanOperationError("the controller is bus-off", errno.ENETDOWN)
+
+
+class _Inbox:
+    """What a clock waits for while somebody waits for a frame."""
+
+    def __init__(self, bus: FakeCanBus) -> None:
+        self._bus = bus
+
+    def fileno(self) -> int:
+        """Return -1: there is no descriptor."""
+        return -1
+
+    def is_readable(self) -> bool:
+        """Return whether a frame has arrived."""
+        return self._bus.is_readable()

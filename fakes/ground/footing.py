@@ -1,0 +1,89 @@
+"""What a sole of finite size adds to a point: sideways hold, and moments.
+
+The centre of pressure wanders under the sole as the stones change; the sole resists
+being shifted sideways, turned and tilted like bristles that slip at a limit.
+"""
+
+import numpy as np
+
+from fakes.ground.contact import Contact, Motion
+from fakes.ground.profile import locate, smooth_profile
+
+_K_TURN = 10.0  # N m/rad, about each axis
+_ARM = 0.03  # torsional friction limit per newton of normal force [m]
+_TURN_PER_N = _ARM / _K_TURN  # stretch of a torsional bristle at its limit [rad/N]
+
+
+def stretched(stretch: float, moved: float, most: float) -> float:
+    """Return the stretch of an elastic-plastic bristle that has `moved` on.
+
+    It slips at `most`, a limit that may be another at every step; the stored energy
+    never grows by a change of it.
+    """
+    stretch += moved
+    return most if stretch > most else -most if stretch < -most else stretch
+
+
+class Footing:
+    """Lateral bristle, torsional bristles and the wandering centre of pressure."""
+
+    def __init__(
+        self, stiffness: float, spread: float, length: float, rng: np.random.Generator
+    ) -> None:
+        """Draw one trial's footing.
+
+        Args:
+            stiffness: of the lateral bristle [N/m].
+            spread: of the centre of pressure about the sole's centre [m rms].
+            length: over which it wanders [m].
+            rng: of this trial's ground.
+        """
+        self._cop_x = (spread * smooth_profile(rng, length)).tolist()
+        self._cop_y = (spread * smooth_profile(rng, length)).tolist()
+        self._stiffness = stiffness
+        self.release()
+
+    def release(self) -> None:
+        """Lose contact."""
+        self._aside = self._turn_x = self._turn_y = self._turn_z = 0.0
+
+    def centre_of_pressure(self, x: float) -> tuple[float, float]:
+        """Return its offset from the sole's centre with the sole at `x` [m]."""
+        row, share = locate(x)
+        a, b = self._cop_x, self._cop_y
+        return (
+            a[row] + share * (a[row + 1] - a[row]),
+            b[row] + share * (b[row + 1] - b[row]),
+        )
+
+    def step(
+        self, dt: float, motion: Motion, F_t: float, F_n: float, mu: float
+    ) -> Contact:
+        """Return F_t and F_n with all that the sole's size adds to them.
+
+        Args:
+            dt: time step [s].
+            motion: of the sole.
+            F_t: traction [N].
+            F_n: normal force [N].
+            mu: lateral friction limit per newton of F_n.
+        """
+        if F_n <= 0.0:
+            self.release()
+            return F_t, 0.0, 0.0, 0.0, 0.0, 0.0
+        at, _, _, _, vy, _, wx, wy, wz = motion
+        x, y = self.centre_of_pressure(at)
+        k, most = self._stiffness, _TURN_PER_N * F_n
+        self._aside = aside = stretched(self._aside, vy * dt, mu * F_n / k)
+        self._turn_x = turn_x = stretched(self._turn_x, wx * dt, most)
+        self._turn_y = turn_y = stretched(self._turn_y, wy * dt, most)
+        self._turn_z = turn_z = stretched(self._turn_z, wz * dt, most)
+        F_y = -k * aside
+        return (
+            F_t,
+            F_y,
+            F_n,
+            y * F_n - _K_TURN * turn_x,
+            -x * F_n - _K_TURN * turn_y,
+            x * F_y + y * F_t - _K_TURN * turn_z,
+        )

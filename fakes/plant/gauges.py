@@ -1,0 +1,105 @@
+"""What the gauges in the wrist feel: ground, weight and inertia of the foot."""
+
+from collections.abc import Sequence
+from struct import Struct
+
+import numpy as np
+
+from fakes.plant.push import Vector3
+from ft_sensor.payload import payload_of
+from wam.model.constants import GRAVITY, Array
+from wam.model.tool import Tool
+
+Wrench = tuple[float, float, float, float, float, float]
+_FELT = Struct("15d")  # ground's wrench, change of the foot's rates, its turning rate
+
+
+class Wrist:
+    """The load on the sensor between arm and foot, cycle by cycle.
+
+    f = F_c + m (g_w - a)
+    n = p_s x F_c + M_c + c x m (g_w - a) - I alpha - w x I w      in the sensor frame
+
+    with F_c and M_c the ground's at the sole p_s, a and alpha the mean accelerations of
+    the foot over the cycle, m, c and I those of everything below the gauges.
+    """
+
+    def __init__(self, tool: Tool, up: Array, period: float) -> None:
+        """Take the tool, what is up in the terrain frame, (3,), and the cycle [s]."""
+        payload = payload_of(tool)
+        turn = payload.rotation
+        origin = np.array([0.0, 0.0, tool.sensor_height])
+        self._mass, self._sign = payload.mass, payload.sign
+        self._sole = _vector(turn.T @ (tool.sole - origin))
+        self._com = _vector(payload.com)
+        self._com_from_sole = _vector(turn.T @ (tool.foot.com - tool.sole))
+        self._inertia = turn.T @ tool.foot.inertia @ turn
+        self._turn = turn
+        self._period = period
+        self._rotation = np.eye(3)
+        self._ground: Sequence[float] = (0.0,) * 6
+        self._rates: Sequence[float] = (0.0,) * 6
+        self._before: Sequence[float] = (0.0,) * 6
+        self._load: Wrench | None = None
+        # The rows of _FELT, and below them what is up, which stays.
+        self._buffer = bytearray(_FELT.size) + up.tobytes()
+        self._felt = np.frombuffer(self._buffer).reshape(6, 3)
+
+    def end_cycle(
+        self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
+    ) -> None:
+        """Take what happened in a cycle.
+
+        Args:
+            rotation: frame 7 to terrain, shape (3, 3).
+            ground: mean force [N] and moment at the sole [N m], terrain frame.
+            rates: velocity of the sole [m/s] and turning rate [rad/s] at its end.
+        """
+        self._rotation, self._ground = rotation, ground
+        self._before, self._rates = self._rates, rates
+        self._load = None
+
+    def load(self) -> Wrench:
+        """Return what the sensor would read without errors, its own frame [N, N m]."""
+        if self._load is None:
+            self._load = self._compute()
+        return self._load
+
+    def _compute(self) -> Wrench:
+        """Work in plain numbers: for three of them numpy takes ten times as long."""
+        before, now, period = self._before, self._rates, self._period
+        change = [(v - u) / period for u, v in zip(before, now, strict=True)]
+        _FELT.pack_into(self._buffer, 0, *self._ground, *change, *now[3:])
+        felt = self._felt.dot(self._rotation.dot(self._turn))
+        force, moment, a, alpha, w, (gx, gy, gz) = felt.tolist()
+        # The inertia is symmetric: rows of its products are I alpha and I w.
+        (ix, iy, iz), (jx, jy, jz) = felt[3:5].dot(self._inertia).tolist()
+        spin = _cross(w, (jx, jy, jz))
+        euler = _cross(alpha, self._com_from_sole)
+        inward = _cross(w, _cross(w, self._com_from_sole))
+        m, s = self._mass, self._sign
+        weight = (
+            -m * (GRAVITY * gx + a[0] + euler[0] + inward[0]),
+            -m * (GRAVITY * gy + a[1] + euler[1] + inward[1]),
+            -m * (GRAVITY * gz + a[2] + euler[2] + inward[2]),
+        )
+        of_ground, of_weight = _cross(self._sole, force), _cross(self._com, weight)
+        return (
+            s * (force[0] + weight[0]),
+            s * (force[1] + weight[1]),
+            s * (force[2] + weight[2]),
+            s * (moment[0] + of_ground[0] + of_weight[0] - ix - spin[0]),
+            s * (moment[1] + of_ground[1] + of_weight[1] - iy - spin[1]),
+            s * (moment[2] + of_ground[2] + of_weight[2] - iz - spin[2]),
+        )
+
+
+def _vector(values: Array) -> Vector3:
+    x, y, z = values.tolist()
+    return x, y, z
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> Vector3:
+    ax, ay, az = a
+    bx, by, bz = b
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

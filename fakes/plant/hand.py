@@ -1,0 +1,166 @@
+"""The operator's hand: carries the foot, puts it down, pushes it across.
+
+Forces are in the terrain frame [N]; they act on the forearm at the hand point.
+"""
+
+import math
+from enum import Enum, auto
+
+import numpy as np
+
+from fakes.plant.push import (
+    LATERAL_B,
+    LATERAL_K,
+    PUSH_B,
+    PUSH_K,
+    HandView,
+    Pace,
+    Push,
+    Vector3,
+)
+
+LIFT = 0.06  # how high the foot is carried above the plane [m]
+SPEED = 0.25  # mean speed of carrying [m/s]
+_CAREFUL = 0.12  # m/s, of a hand that touches corners
+_CARRY_K, _CARRY_B = 800.0, 100.0  # N/m, N s/m
+_REST_B = 18.0  # of a hand that lies on the arm, along z [N s/m]
+
+
+class Phase(Enum):
+    """What the hand is doing."""
+
+    CARRY = auto()
+    REST = auto()
+    PUSH = auto()
+    AWAY = auto()
+
+
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_CARRY, _REST, _PUSH, _AWAY = Phase.CARRY, Phase.REST, Phase.PUSH, Phase.AWAY
+
+
+class Hand:
+    """Does what it is told, with forces a person could exert."""
+
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
+        self.phase = Phase.CARRY
+        self._start: Vector3 | None = None
+        self._path: list[Vector3] = []
+        self._moved = 0.0
+        self._speed = SPEED
+        self._push: Push | None = None
+        self._pending: tuple[Pace, np.random.Generator] | None = None
+        self._anchor = 0.0
+        self._rests_then = False
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the last carrying has come to its end."""
+        return self.phase is not Phase.CARRY or not self._path
+
+    @property
+    def is_holding(self) -> bool:
+        """Whether the hand is on the arm."""
+        return self.phase is not _AWAY
+
+    def carry(self, *points: Vector3) -> None:
+        """Carry the sole through `points` (terrain frame) and hold it there."""
+        self.phase = Phase.CARRY
+        self._speed = SPEED
+        self._path = list(points)
+        self._start = None
+        self._rests_then = False
+
+    def lift_to_start(self) -> None:
+        """Lift the foot, carry it above the far end and hold it still."""
+        self.carry((math.nan, 0.0, LIFT), (0.0, 0.0, LIFT))
+
+    def put_down(self, ground: float) -> None:
+        """Lower the foot onto the ground at the far end and let it rest there."""
+        self.carry((0.0, 0.0, ground + 0.01), (0.0, 0.0, ground - 0.002))
+        self._rests_then = True
+
+    def touch(self, x: float, y: float, ground: float) -> None:
+        """Carry the foot above a point, lower it there, and press lightly."""
+        above, low = (x, y, LIFT), (x, y, ground + 0.01)
+        self.carry((math.nan, math.nan, LIFT), above, low, (x, y, ground - 0.004))
+        self._speed = _CAREFUL
+
+    def push(self, pace: Pace, rng: np.random.Generator) -> None:
+        """Push the foot across the container."""
+        self._pending = (pace, rng)
+
+    def rest(self) -> None:
+        """Stop where it is and lie on the arm."""
+        self.carry()
+        self._rests_then = True
+
+    def let_go(self) -> None:
+        """Take the hand away."""
+        self.phase = Phase.AWAY
+
+    def step(self, view: HandView) -> Vector3:
+        """Return the force on the hand point along x, y, z of the terrain frame."""
+        if self._pending is not None:
+            self._push = Push(*self._pending, view, self._dt)
+            self._pending = None
+            self.phase = _PUSH
+        phase = self.phase
+        if phase is _PUSH and self._push is not None:
+            return self._push.step(view)
+        if phase is _CARRY:
+            return self._carry_force(view)
+        if phase is _REST:
+            return self._rest_force(view)
+        return 0.0, 0.0, 0.0
+
+    def _rest_force(self, view: HandView) -> Vector3:
+        (x, y, _), (vx, vy, vz) = view.hand, view.hand_v
+        along = PUSH_K * (self._anchor - x) - PUSH_B * vx
+        return along, -LATERAL_K * y - LATERAL_B * vy, -_REST_B * vz
+
+    def _carry_force(self, view: HandView) -> Vector3:
+        if self._start is None:
+            self._start = view.sole
+            self._moved = 0.0
+        if self._rests_then and not self._path:
+            self._anchor = view.hand[0]
+            self.phase = Phase.REST
+            return self._rest_force(view)
+        target, velocity = self._target()
+        return (
+            _spring(target[0], velocity[0], view.sole[0], view.sole_v[0]),
+            _spring(target[1], velocity[1], view.sole[1], view.sole_v[1]),
+            _spring(target[2], velocity[2], view.sole[2], view.sole_v[2]),
+        )
+
+    def _target(self) -> tuple[Vector3, Vector3]:
+        """Return (position, velocity) on a minimum-jerk path to the next point."""
+        assert self._start is not None
+        if not self._path:
+            return self._start, (0.0, 0.0, 0.0)
+        start = self._start
+        goal = self._path[0]
+        if math.isnan(goal[0]):
+            goal = (start[0], start[1] if math.isnan(goal[1]) else goal[1], goal[2])
+        step = (goal[0] - start[0], goal[1] - start[1], goal[2] - start[2])
+        duration = max(math.hypot(*step) / self._speed, 0.4)
+        self._moved += self._dt
+        s = min(self._moved / duration, 1.0)
+        share = s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
+        rate = 30.0 * s * s * (1.0 - s) ** 2 / duration
+        if s >= 1.0:
+            self._start = goal
+            self._path.pop(0)
+            self._moved = 0.0
+        position = (
+            start[0] + share * step[0],
+            start[1] + share * step[1],
+            start[2] + share * step[2],
+        )
+        return position, (rate * step[0], rate * step[1], rate * step[2])
+
+
+def _spring(target: float, velocity: float, x: float, v: float) -> float:
+    return _CARRY_K * (target - x) + _CARRY_B * (velocity - v)

@@ -1,0 +1,47 @@
+# pyright: basic, reportMissingImports=false
+"""The body that the simulated arm is: links, sensor, foot and a person's forearm."""
+
+import numpy as np
+import pinocchio as pin
+
+from ft_sensor.payload import TerrainFrame
+from wam.model.arm_model import add_point, build_pinocchio
+from wam.model.constants import ArmConstants
+from wam.model.tool import Tool
+
+FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
+_HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
+
+
+def arm_and_hand(
+    constants: ArmConstants, tool: Tool, frame: TerrainFrame
+) -> tuple["pin.Model", int, int]:
+    """Return a model whose world is the terrain frame, and its frames: sole and hand.
+
+    The hand is on link 6, where a person holds the forearm, and has the mass of one.
+    """
+    model = build_pinocchio(constants, (tool.sensor, tool.foot))
+    _stand_in(model, frame)
+    hand = _add_forearm(model, constants)
+    return model, add_point(model, constants, "sole", tool.sole), hand
+
+
+def _stand_in(model: "pin.Model", frame: TerrainFrame) -> None:
+    """Let the terrain frame be the world of the model: nothing is to be turned."""
+    axes = frame.axes()
+    base = pin.SE3(axes, -axes.dot(frame.far_end))
+    model.jointPlacements[1] = base * model.jointPlacements[1]
+    model.gravity.linear = axes.dot(model.gravity.linear)
+
+
+def _add_forearm(model: "pin.Model", constants: ArmConstants) -> int:
+    """Add the hand's frame on link 6 and the mass of a forearm in it."""
+    alpha, height = constants.alpha[5], constants.d[6] - _HAND_ABOVE_PLATE
+    c, s = np.cos(alpha), np.sin(alpha)
+    tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    link = pin.SE3(tilt, np.array([constants.a[5], 0.0, constants.d[5]]))
+    placement = link * pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
+    hand = model.addFrame(pin.Frame("hand", 6, 0, placement, pin.FrameType.OP_FRAME))
+    arm = pin.Inertia(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
+    model.appendBodyToJoint(6, placement.act(arm), pin.SE3.Identity())
+    return hand

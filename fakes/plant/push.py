@@ -1,0 +1,170 @@
+"""One push across the container, as a person does it.
+
+A spring to a target that moves at a wandering speed, pressing down at a wandering
+angle, with tremor; it gives way after a slip and presses harder when stuck.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fakes.plant.mishaps import NO_MISHAPS, Mishaps
+from fakes.randomness import NormalStream, OrnsteinUhlenbeck, Tremor
+
+Vector3 = tuple[float, float, float]
+
+LATERAL_K, LATERAL_B = 400.0, 20.0  # to the centre line: N/m, N s/m
+PUSH_K, PUSH_B = 300.0, 18.0  # along x: N/m, N s/m
+_LIFT_K, _LIFT_B = 800.0, 100.0  # of a hand that lifts: N/m, N s/m
+_Z_K, _Z_B, _Z_TIME = 50.0, 18.0, 0.8  # vertical: N/m, N s/m, s
+_WEAKEST = -3.0  # along x [N]
+_RAMP = 0.4  # from rest to full speed [s]
+_FLATTEST, _STEEPEST = math.radians(-5.0), math.radians(40.0)
+_SLIP_SPEED = 0.12  # m/s, where the hand notices
+_REACTION, _REACTION_SPREAD, _FASTEST_REACTION = 0.18, 0.03, 0.1  # s
+_DEAF = 0.25  # s after a reaction without another
+_PROGRESS, _STUCK = 0.006, 1.5  # m in s, less is stuck
+_HARDER, _HARDEST = 3.0, 40.0  # N/s, N
+_ON_THE_WAY = (0.0, 0.0)  # neither aside nor lifted
+
+
+class HandView(NamedTuple):
+    """What the hand feels, terrain frame: sole and hand point [m], speeds [m/s]."""
+
+    sole: Vector3
+    sole_v: Vector3
+    hand: Vector3
+    hand_v: Vector3
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How this operator pushes.
+
+    Attributes:
+        speed: median over trials [m/s].
+        stiffness: of hand and arm, median over trials [N/m].
+        strongest: push before the hand holds back [N].
+        mishaps: what goes wrong on the way.
+    """
+
+    speed: float = 0.040
+    stiffness: float = PUSH_K
+    strongest: float = 22.0
+    mishaps: Mishaps = NO_MISHAPS
+
+
+PACES = {
+    "steady": Pace(),
+    "slow": Pace(speed=0.030),
+    "fast": Pace(speed=0.055),
+    "clumsy": Pace(mishaps=Mishaps(swerve_at=0.10, lift_at=0.28)),
+}
+
+
+class Push:
+    """One push from rest, until the hand is told something else."""
+
+    def __init__(
+        self, pace: Pace, rng: np.random.Generator, view: HandView, dt: float
+    ) -> None:
+        """Draw one trial's hand.
+
+        Args:
+            pace: of the person.
+            rng: of this trial's hand.
+            view: where foot and hand are now.
+            dt: time step [s].
+        """
+        n = NormalStream(rng)
+        self._rng, self._n, self._dt, self._pace = rng, n, dt, pace
+        self._K = pace.stiffness * math.exp(0.15 * n.next())
+        self._speed = pace.speed * math.exp(0.22 * n.next())
+        self._beta = math.radians(4.0 + 6.0 * n.next())
+        self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n).step
+        self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n).step
+        self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n).step
+        self._press = OrnsteinUhlenbeck(0.8, 0.8, dt, n).step
+        self._tremor = Tremor(dt, n).step
+        self._wait = float(rng.uniform(0.6, 1.0))
+        self._age = 0.0
+        self._x0 = view.hand[0]
+        self._xe = 0.0
+        self._z_ref = view.hand[2]
+        self._strongest = pace.strongest
+        self._progress_x, self._progress_age = view.sole[0], 0.0
+        self._react_in: float | None = None
+        self._react_force = 0.0
+        self._deaf = 0.0
+        self._z_rest: float | None = None
+
+    def step(self, view: HandView) -> Vector3:
+        """Return the force on the hand point along x, y, z [N]."""
+        dt = self._dt
+        self._age += dt
+        x, y, _ = view.hand
+        vx, vy, _ = view.hand_v
+        self._watch(view.sole[0], view.sole_v[0])
+        begun = (self._age - self._wait) / _RAMP
+        begun = 0.0 if begun < 0.0 else begun if begun < 1.0 else 1.0
+        pace = 1.0 + self._wander()
+        v_e = begun * self._speed * pace if pace > 0.0 else 0.0
+        moved = x - self._x0
+        spring = self._K * (self._xe - moved)
+        room = (self._strongest - spring) / (0.3 * self._strongest)
+        if room > 0.0:
+            self._xe += dt * v_e * (room if room < 1.0 else 1.0)
+        if self._react_in is None:
+            self._react_force = spring
+        else:
+            self._react(self._react_in - dt, moved)
+        force = spring + PUSH_B * (v_e - vx)
+        force = force if force > _WEAKEST else _WEAKEST
+        unsteady = force * self._effort()
+        force += unsteady + (0.05 + 0.012 * abs(force)) * self._tremor()
+        aside, lift = _ON_THE_WAY
+        if self._pace.mishaps is not NO_MISHAPS:
+            aside, lift = self._pace.mishaps.at(view.sole[0])
+        lateral = LATERAL_K * (aside - y) - LATERAL_B * vy
+        return force, lateral, self._upward(force, view, begun, lift)
+
+    def _upward(self, push: float, view: HandView, begun: float, lift: float) -> float:
+        dt, z, vz = self._dt, view.hand[2], view.hand_v[2]
+        tilt = self._beta + self._tilt()
+        tilt = _FLATTEST if tilt < _FLATTEST else min(tilt, _STEEPEST)
+        wander = self._press() * begun
+        self._z_ref += dt * (z - self._z_ref) / _Z_TIME
+        if lift > 0.0:
+            if self._z_rest is None:
+                self._z_rest = z
+            self._z_ref = z
+            return _LIFT_K * (self._z_rest + lift - z) - _LIFT_B * vz
+        self._z_rest = None
+        pressed = push * math.tan(tilt) if push > 0.0 else 0.0
+        return -(pressed + wander + _Z_B * vz + _Z_K * (z - self._z_ref))
+
+    def _watch(self, x: float, vx: float) -> None:
+        """Press harder when stuck; notice a slip of the sole."""
+        dt = self._dt
+        if x - self._progress_x > _PROGRESS:
+            self._progress_x, self._progress_age = x, 0.0
+            self._strongest = self._pace.strongest
+        else:
+            self._progress_age += dt
+            if self._progress_age > _STUCK:
+                self._strongest = min(self._strongest + _HARDER * dt, _HARDEST)
+        self._deaf = self._deaf - dt if self._deaf > dt else 0.0
+        if vx > _SLIP_SPEED and self._deaf == 0.0 and self._react_in is None:
+            reaction = _REACTION + _REACTION_SPREAD * self._n.next()
+            self._react_in = max(_FASTEST_REACTION, reaction)
+
+    def _react(self, left: float, x: float) -> None:
+        """When nothing is `left` [s] of the reaction time, let the target go back."""
+        self._react_in = left
+        if left <= 0.0:
+            share = float(self._rng.uniform(0.1, 0.5))
+            self._xe = x + share * max(self._react_force, 0.0) / self._K
+            self._react_in = None
+            self._deaf = _DEAF

@@ -1,0 +1,214 @@
+"""The seven simulated motor pucks of an arm, and the motors behind them."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Protocol
+
+from acquisition.devices import SafetyMode
+from fakes.pucks.event_queue import Schedule
+from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.power import AWAKE, Power, PuckLife, power_after, power_at_start
+from fakes.pucks.safety_module import puck_mode_in
+from wam.bus.frames import (
+    MOTOR_NODES,
+    Property,
+    encode_position,
+    wrap_position,
+)
+
+
+class MotorSide(Protocol):
+    """The motors and the arm behind the pucks."""
+
+    def advance(self, t_ns: int) -> None:
+        """Let the world go on to `t_ns`."""
+        ...
+
+    def counts(self) -> Sequence[int]:
+        """Return the encoder counts of the seven motors now."""
+        ...
+
+    def set_torques(self, units: Sequence[int]) -> None:
+        """Apply these torques [puck units] to motors 1 to 7 from now on."""
+        ...
+
+    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
+        """Short the windings or not; without power the arm falls freely."""
+        ...
+
+
+class PuckBank:
+    """Motor pucks 1 to 7: they are told, asked, driven, and lose their power.
+
+    Motors are advanced to the instants at which pucks touch them and no further.
+    `on_positions` is called with the positions [counts] by node that are reported at
+    one instant.
+    """
+
+    def __init__(
+        self,
+        motors: MotorSide,
+        options: NetworkOptions,
+        schedule: Schedule,
+        on_positions: Callable[[Mapping[int, int]], None],
+    ) -> None:
+        self._motors = motors
+        self._options = options
+        self._schedule = schedule
+        self._on_positions = on_positions
+        self._mode = options.safety_mode
+        self._pucks = [
+            MotorPuck(PuckLife(node, options, schedule), options)
+            for node in MOTOR_NODES
+        ]
+        self._members: dict[int, list[MotorPuck]] = {}
+        self._wake_up()
+
+    def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
+        """Go where the safety module sends the pucks in its new `mode`."""
+        self._mode = mode
+        if (power := power_after(mode, before)) is not None:
+            for puck in self._pucks:
+                puck.restart(power)
+        self._members.clear()
+        self._set_puck_modes()
+
+    def silence(self, node: int, *, is_mute: bool) -> None:
+        """Cut the transmit wire of a puck, or mend it."""
+        self._pucks[node - 1].life.is_mute = is_mute
+
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the pucks measure `voltage` [V]."""
+        for puck in self._pucks:
+            puck.properties["VBUS"] = round(voltage)
+
+    def set_property(self, node: int, name: str, value: int) -> None:
+        """Let a puck measure `value` for a property such as TEMP."""
+        self._pucks[node - 1].properties[name] = value
+
+    def reboot(self, node: int) -> None:
+        """Let a puck fall into its monitor."""
+        self._pucks[node - 1].restart(Power.MONITOR)
+        self._members.clear()
+        self._apply()
+
+    def receive(self, node: int, request: Property) -> None:
+        """Take a GET or SET sent to one puck."""
+        puck = self._pucks[node - 1]
+        if puck.life.is_listening:
+            self._ask_or_tell([puck], request)
+
+    def receive_group(self, group: int, request: Property) -> None:
+        """Take a GET or SET sent to a group."""
+        self._ask_or_tell(self._group(group), request)
+
+    def receive_torques(self, group: int, header: int, units: Sequence[int]) -> None:
+        """Take a torque frame: its first byte and four torques [puck units]."""
+        for puck in self._group(group):
+            if puck.t_header == header:
+                puck.take_torque(units[(puck.properties["PIDX"] - 1) & 3])
+        self._motors.advance(self._schedule.now_ns)
+        self._motors.set_torques([puck.torque for puck in self._pucks])
+
+    def _wake_up(self) -> None:
+        for puck in self._pucks:
+            puck.restart(power_at_start(self._options))
+        if not self._options.has_positions:
+            self._lose_positions(self._pucks)
+        self._set_puck_modes()
+
+    def _ask_or_tell(self, pucks: list[MotorPuck], request: Property) -> None:
+        number = request.number
+        if request.value is not None:
+            for puck in pucks:
+                self._tell(puck, number, request.value)
+            return
+        feedback = [p for p in pucks if p.p_number == number and p.life.power is AWAKE]
+        if feedback:
+            self._schedule.after(self._options.latch_ns, lambda: self._report(feedback))
+            return
+        for puck in pucks:
+            if (name := puck.name_of(number)) is not None:
+                puck.life.answer(number, name, partial(self._value_of, puck))
+
+    def _value_of(self, puck: MotorPuck, name: str) -> int | None:
+        return puck.value_of(name, self._encoder_counts()[puck.node - 1])
+
+    def _report(self, pucks: list[MotorPuck]) -> None:
+        """Latch the positions of `pucks` and hand them to the wire."""
+        counts = self._encoder_counts()
+        reported: dict[int, int] = {}
+        for puck in pucks:
+            life = puck.life
+            if life.power is AWAKE and not life.is_mute:
+                node = puck.node
+                position = wrap_position(counts[node - 1] + puck.offset)
+                self._schedule.emit(puck.position_id, encode_position(position))
+                reported[node] = position
+        if reported:
+            self._on_positions(reported)
+
+    def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
+        name = puck.name_of(number)
+        if name == "STAT":
+            self._restart(puck, value)
+        elif not puck.is_awake or name is None or name in READ_ONLY:
+            return
+        elif name == "P":
+            puck.offset = value - self._encoder_counts()[puck.node - 1]
+        elif name == "T":
+            puck.take_torque(value)
+            self._apply()
+        else:
+            puck.properties[name] = value
+            self._members.clear()
+            if name == "MODE":
+                puck.torque = 0
+                self._apply()
+
+    def _restart(self, puck: MotorPuck, stat: int) -> None:
+        """Obey SET STAT: wake a sleeping puck, reset a running one."""
+        change = puck.life.change_by(stat)
+        if change is None:
+            return
+        delay_ns, power = change
+        puck.restart(Power.SILENT)
+
+        def finish() -> None:
+            puck.restart(power)
+            self._lose_positions([puck])
+            self._members.clear()
+
+        puck.life.later(delay_ns, finish)
+        self._members.clear()
+        self._apply()
+
+    def _set_puck_modes(self) -> None:
+        for puck in self._pucks:
+            if puck.is_awake:
+                puck.properties["MODE"] = puck_mode_in(self._mode)
+            puck.torque = 0
+        self._apply()
+
+    def _apply(self) -> None:
+        """Hand the torques and brakes as they are now to the motors."""
+        self._motors.advance(self._schedule.now_ns)
+        is_driven = any(puck.is_driven for puck in self._pucks)
+        is_powered = self._mode is not SafetyMode.E_STOP
+        self._motors.set_braking(is_powered and not is_driven, is_powered)
+        self._motors.set_torques([puck.torque for puck in self._pucks])
+
+    def _encoder_counts(self) -> Sequence[int]:
+        self._motors.advance(self._schedule.now_ns)
+        return self._motors.counts()
+
+    def _lose_positions(self, pucks: list[MotorPuck]) -> None:
+        counts = self._encoder_counts()
+        for puck in pucks:
+            puck.lose_position(counts[puck.node - 1])
+
+    def _group(self, group: int) -> list[MotorPuck]:
+        if group not in self._members:
+            self._members[group] = [p for p in self._pucks if p.hears(group)]
+        return self._members[group]

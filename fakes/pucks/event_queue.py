@@ -1,0 +1,85 @@
+"""The time of a simulated network: what happens later, and what has been said."""
+
+from collections.abc import Callable
+from heapq import heappop, heappush
+
+from wam.bus.frames import encode_reply, property_reply_id
+from wam.bus.properties import is_wide
+
+OutFrame = tuple[int, int, bytes]  # ready for the wire at [ns], identifier, data
+
+NEVER = 1 << 63  # later than any time [ns]
+
+# One bit is 1 us at 1 Mbit/s: 47 bits of frame and 8 per byte, with the stuff bits
+# that typical content needs.
+FRAME_NS = tuple(1000 * bits for bits in (50, 58, 67, 76, 84, 93, 101, 110, 118))
+
+
+class Schedule:
+    """One time for all devices of a network, their plans and their frames.
+
+    The wire asks for the next event with every frame, so it is kept, not looked up.
+
+    Attributes:
+        now_ns: the network's time; it never runs back.
+        next_ns: when the next plan or the alarm is due, `NEVER` if there is none.
+        emit: lets a device say something now (identifier, data); whoever comes between
+            the devices and the wire takes the place of `put`.
+        on_alarm: called when the alarm goes off.
+        outbox: frames that want onto the wire, until they are taken.
+    """
+
+    def __init__(self, t_ns: int) -> None:
+        self.now_ns = t_ns
+        self.next_ns = NEVER
+        self.emit: Callable[[int, bytes], None] = self.put
+        self.on_alarm: Callable[[], None] = lambda: None
+        self._alarm_ns = NEVER
+        self._plans: list[tuple[int, int, Callable[[], None]]] = []
+        self._plan_count = 0
+        self.outbox: list[OutFrame] = []
+
+    def after(self, delay_ns: int, action: Callable[[], None]) -> None:
+        """Plan `action` for `delay_ns` from now."""
+        self._plan_count += 1  # keeps plans for one instant in their order
+        at_ns = self.now_ns + delay_ns
+        heappush(self._plans, (at_ns, self._plan_count, action))
+        self.next_ns = min(self.next_ns, at_ns)
+
+    def set_alarm(self, at_ns: int) -> None:
+        """Call `on_alarm` at `at_ns` and at no other time, `NEVER` = not at all."""
+        self._alarm_ns = at_ns
+        self._find_next()
+
+    def advance(self, t_ns: int) -> None:
+        """Carry out all that is due until `t_ns`, in order of time; let it be then."""
+        while (next_ns := self.next_ns) <= t_ns:
+            self.now_ns = max(self.now_ns, next_ns)
+            # At one instant plans come first: what they do may put the alarm off.
+            if self._plans and self._plans[0][0] <= self.now_ns:
+                action = heappop(self._plans)[2]
+                self._find_next()
+                action()
+            else:
+                self.on_alarm()
+        self.now_ns = max(self.now_ns, t_ns)
+
+    def put(self, can_id: int, data: bytes) -> None:
+        """Hand a frame to the wire now."""
+        self.outbox.append((self.now_ns, can_id, data))
+
+    def reply(self, node: int, number: int, name: str, value: int) -> None:
+        """Answer a GET of property `name`, which has `number` on this device."""
+        is_long = is_wide(name)
+        if not is_long:
+            value = (value + 0x8000) % 0x10000 - 0x8000  # a host may set any number
+        self.emit(property_reply_id(node), encode_reply(number, value, is_wide=is_long))
+
+    def take(self) -> list[OutFrame]:
+        """Return the frames handed to the wire since the last call."""
+        frames, self.outbox = self.outbox, []
+        return frames
+
+    def _find_next(self) -> None:
+        plan_ns = self._plans[0][0] if self._plans else NEVER
+        self.next_ns = min(plan_ns, self._alarm_ns)

@@ -1,0 +1,109 @@
+"""One simulated motor puck: its power, its properties, its torque."""
+
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.power import AWAKE, Power, PuckLife
+from wam.bus.frames import position_reply_id
+from wam.bus.properties import (
+    MAGNETIC_ENCODER,
+    Device,
+    PuckMode,
+    Role,
+    Stat,
+    names,
+    property_number,
+)
+
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_DRIVEN = PuckMode.TORQUE
+READ_ONLY = frozenset(
+    ("VERS", "ROLE", "SN", "ID", "ERROR", "TEMP", "PTEMP", "THERM", "VBUS")
+)
+
+
+class MotorPuck:
+    """State of one motor puck.
+
+    Attributes:
+        life: its processor.
+        node: its number, 1 to 7.
+        position_id: identifier of its position replies.
+        vers: its firmware.
+        offset: its position less the encoder's [counts].
+        torque: torque it makes [puck units].
+        p_number: number of the property P in its firmware.
+        t_header: first byte of a torque frame that it takes.
+        properties: what a host has set or may ask for, by name.
+    """
+
+    def __init__(self, life: PuckLife, options: NetworkOptions) -> None:
+        self.life = life
+        self.node = node = life.node
+        self.position_id = position_reply_id(node)
+        i = node - 1
+        self.vers = options.vers[i]
+        self.offset = 0
+        self.torque = 0
+        self.p_number = property_number(Device.MOTOR, "P", self.vers)
+        self.t_header = 0x80 | property_number(Device.MOTOR, "T", self.vers)
+        self.properties = {
+            "ROLE": MAGNETIC_ENCODER | Role.TATER,
+            **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
+            **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33},
+            **{"VBUS": 48},
+            **{"GRPA": 0, "GRPB": 1 if node <= 4 else 2, "GRPC": 4},
+            **{"CTS": options.cts[i], "IPNM": options.ipnm[i], "MT": options.mt[i]},
+            **{"POLES": options.poles[i], "ECMIN": 0, "ECMAX": 0},
+            **{"PIDX": node if node <= 4 else node - 4, "JIDX": node},
+        }
+        self._monitor_vers = options.monitor_vers
+
+    @property
+    def is_awake(self) -> bool:
+        """Whether its firmware runs."""
+        return self.life.power is AWAKE
+
+    @property
+    def is_driven(self) -> bool:
+        """Whether it follows torques."""
+        return self.properties["MODE"] == _DRIVEN
+
+    def hears(self, group: int) -> bool:
+        """Return whether the puck belongs to `group` and runs."""
+        mine = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
+        return self.life.is_listening and group in mine
+
+    def name_of(self, number: int) -> str | None:
+        """Return what `number` means to the puck as it is now."""
+        if self.life.power is Power.MONITOR:
+            return names(Device.MONITOR).get(number)
+        return names(Device.MOTOR, self.vers).get(number)
+
+    def value_of(self, name: str, counts: int) -> int | None:
+        """Return the value of a property, None for one that is not modelled."""
+        is_asleep = self.life.power is Power.MONITOR
+        computed = {
+            "VERS": self._monitor_vers if is_asleep else self.vers,
+            "STAT": Stat.RESET if is_asleep else Stat.READY,
+            "MECH": counts % (self.properties["CTS"] or 1),
+            "T": self.torque,
+        }
+        return computed.get(name, self.properties.get(name))
+
+    def take_torque(self, units: int) -> None:
+        """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
+        properties = self.properties
+        if properties["MODE"] == _DRIVEN:
+            limit = properties["MT"]
+            self.torque = (
+                limit if units > limit else -limit if units < -limit else units
+            )
+
+    def restart(self, power: Power) -> None:
+        """Lose what a puck loses with its program."""
+        self.life.enter(power)
+        self.torque = 0
+        self.properties["MODE"] = PuckMode.IDLE
+
+    def lose_position(self, counts: int) -> None:
+        """Count from within one turn again, as the magnetic encoder sees it."""
+        self.offset = counts % (self.properties["CTS"] or 1) - counts

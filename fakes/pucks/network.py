@@ -1,0 +1,158 @@
+"""A WAM's puck network without wires: frames in, frames out, time as an argument.
+
+Seven motor pucks, the safety module and, where there is one, the force/torque sensor,
+as far as hosts have described them.
+"""
+
+from acquisition.devices import SafetyMode
+from fakes.pucks.bank import MotorSide, PuckBank
+from fakes.pucks.bus_faults import BusFaults
+from fakes.pucks.event_queue import NEVER, OutFrame, Schedule
+from fakes.pucks.ft_puck import ForceTorquePuck, Load
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.safety_module import (
+    TORQUE_GROUPS,
+    FakeSafetyModule,
+    PendantAction,
+    Strainable,
+)
+from wam.bus.frames import (
+    GROUP_BIT,
+    MOTOR_NODES,
+    SAFETY_NODE,
+    SENDER_MASK,
+    SENSOR_NODE,
+    FrameError,
+    Payload,
+    decode_request,
+    decode_torques,
+)
+from wam.driver.safety_module import PendantWord
+
+
+class PuckNetwork:
+    """The network as a host sees it: `receive` frames, `advance`, take what is `due`.
+
+    Attributes:
+        schedule: the network's time, its plans, and what wants onto the wire.
+        options: the arm as it was found.
+        faults: what goes wrong with frames on their way to the host.
+    """
+
+    def __init__(
+        self,
+        motors: MotorSide,
+        options: NetworkOptions | None = None,
+        t_ns: int = 0,
+        load: Load | None = None,
+    ) -> None:
+        """Join devices and motors; `load` is on the sensor, if there is one."""
+        self.options = options or NetworkOptions()
+        self.schedule = schedule = Schedule(t_ns)
+        self.faults = BusFaults(schedule)
+        self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
+        self._bank = PuckBank(
+            motors, self.options, schedule, self._safety.hear_positions
+        )
+        self._sensor: ForceTorquePuck | None = None
+        if self.options.has_sensor:
+            self._sensor = ForceTorquePuck(self.options, schedule, load or Load())
+
+    @property
+    def safety_mode(self) -> SafetyMode:
+        """The true mode of the safety module."""
+        return self._safety.mode
+
+    @property
+    def pendant_word(self) -> PendantWord:
+        """What the pendant shows."""
+        return self._safety.pendant_word
+
+    def advance(self, t_ns: int) -> None:
+        """Let everything happen that happens until `t_ns`, in order of time."""
+        self.schedule.advance(t_ns)
+
+    def next_event_ns(self) -> int | None:
+        """Return when the network does something of its own accord next."""
+        next_ns = self.schedule.next_ns
+        return None if next_ns == NEVER else next_ns
+
+    def due(self, t_ns: int) -> list[OutFrame]:
+        """Advance to `t_ns` and return the frames that want onto the wire by then."""
+        self.schedule.advance(t_ns)
+        return self.schedule.take()
+
+    def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
+        """Take a host's frame whose last bit arrived at `t_ns`."""
+        self.schedule.advance(t_ns)
+        if can_id & SENDER_MASK:
+            return
+        to = can_id & 0x1F
+        try:
+            if can_id & GROUP_BIT:
+                self._receive_group(to, data)
+            elif to == SAFETY_NODE:
+                self._safety.receive(decode_request(data))
+            elif to in MOTOR_NODES:
+                self._bank.receive(to, decode_request(data))
+            elif to == SENSOR_NODE and self._sensor is not None:
+                self._sensor.receive(decode_request(data))
+        except FrameError:
+            return  # devices do not answer what they do not understand
+
+    def pendant(self, action: PendantAction) -> None:
+        """Press a button of the pendant, at the time of the last `advance`."""
+        self._safety.press(action)
+
+    def silence(self, node: int, *, is_mute: bool = True) -> None:
+        """Cut the transmit wire of a node, or mend it; it still hears."""
+        if node == SAFETY_NODE:
+            self._safety.is_mute = is_mute
+        elif node == SENSOR_NODE:
+            if self._sensor is not None:
+                self._sensor.life.is_mute = is_mute
+        else:
+            self._bank.silence(node, is_mute=is_mute)
+
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the arm's power bus have `voltage` [V], at the last `advance`."""
+        self._bank.set_bus_voltage(voltage)
+        if self._sensor is not None:
+            self._sensor.set_bus_voltage(voltage)
+        self._safety.set_bus_voltage(voltage)
+
+    def set_property(self, node: int, name: str, value: int) -> None:
+        """Let a motor puck find `value` for one of its own measurements."""
+        self._bank.set_property(node, name, value)
+
+    def forget_positions(self) -> None:
+        """Let nobody know where the joints are, as after power-up."""
+        self._safety.forget_positions()
+
+    def strain(self, monitor: Strainable) -> None:
+        """Let a monitor of the safety module find fault with what it sees."""
+        self._safety.strain(monitor)
+
+    def relax(self) -> None:
+        """Let the safety module judge as before; a fault stays until Shift-idle."""
+        self._safety.relax()
+
+    def reboot(self, node: int) -> None:
+        """Let a puck fall into its monitor: no torque, position and tare lost."""
+        if node != SENSOR_NODE:
+            self._bank.reboot(node)
+        elif self._sensor is not None:
+            self._sensor.reboot()
+
+    def _receive_group(self, group: int, data: Payload) -> None:
+        if group in TORQUE_GROUPS and len(data) == 8:
+            units = decode_torques(data)
+            self._bank.receive_torques(group, data[0], units)
+            self._safety.hear_torques(group, units)
+        else:
+            self._bank.receive_group(group, decode_request(data))
+
+    def _mode_changed(self, before: SafetyMode) -> None:
+        self._bank.follow(self._safety.mode, before)
+        if self._sensor is not None:
+            self._sensor.follow(self._safety.mode, before)

@@ -1,0 +1,259 @@
+"""The simulated safety module: mode, pendant, and what it watches.
+
+Neither the heartbeat's limit nor the content of the broadcast is known outside Barrett:
+the one is an option, the other the mode that the pucks go to.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Literal
+
+from acquisition.devices import SafetyMode
+from fakes.pucks.event_queue import NEVER, Schedule
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.speed_monitor import SpeedWatch
+from wam.bus.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
+from wam.bus.properties import Device, PuckMode, Role, Stat, names
+from wam.driver.safety_limits import COUNTS_PER_SPEED
+from wam.driver.safety_module import (
+    MONITORS,
+    Button,
+    Level,
+    PendantWord,
+    encode_pendant,
+)
+
+PendantAction = Literal["activate", "idle", "estop"]
+Strainable = Literal["velocity", "torque", "heartbeat"]
+TORQUE_GROUPS = (Group.LOWER_TORQUE, Group.WRIST_TORQUE)
+_MODE = 8  # number of the property in every firmware
+_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
+_READ_ONLY = frozenset(("VERS", "ROLE", "SN", "ID", "ERROR", "STAT"))
+_POWER_UP_LIMITS = {
+    **{"VL1": 2048, "VL2": 4096, "TL1": 4731, "TL2": 5204},
+    **{"VOLTL1": 36, "VOLTL2": 30, "VOLTH1": 54, "VOLTH2": 57},
+}
+_FAULT_LIMITS = {"velocity": "VL2", "torque": "TL2"}
+NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
+_PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
+# Named once: to look a member of an Enum up takes longer than to compare it.
+_ACTIVE = SafetyMode.ACTIVE
+_SAFE, _WARNING, _FAULT = Level.SAFE, Level.WARNING, Level.FAULT
+_ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
+
+
+def puck_mode_in(mode: SafetyMode) -> PuckMode:
+    """Return the mode that the module sends the pucks to in its own `mode`."""
+    return PuckMode.TORQUE if mode is SafetyMode.ACTIVE else PuckMode.IDLE
+
+
+class FakeSafetyModule:
+    """State of the safety module, which answers hosts and watches their traffic.
+
+    `on_change(before)` is called when the mode has changed.
+
+    Attributes:
+        mode: the true mode.
+        is_mute: its transmit wire is cut.
+    """
+
+    def __init__(
+        self,
+        options: NetworkOptions,
+        schedule: Schedule,
+        on_change: Callable[[SafetyMode], None],
+    ) -> None:
+        self.mode = options.safety_mode
+        self.is_mute = False
+        self._options = options
+        self._schedule = schedule
+        self._on_change = on_change
+        self._levels: dict[str, Level] = dict.fromkeys(MONITORS, _SAFE)
+        if not options.has_power:
+            self._levels["other"] = _FAULT
+        self._speeds = SpeedWatch(options.cts)
+        self._too_fast_since_ns: int | None = None
+        self._bus_voltage = NOMINAL_VOLTAGE
+        self._is_deaf = False
+        self._spared: dict[str, int] = {}  # limits as they were before `strain`
+        self._largest_command: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
+        self._properties = {
+            **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
+            **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0, "STAT": int(Stat.READY)},
+            **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
+            **{
+                "VNOM": round(NOMINAL_VOLTAGE),
+                "ZERO": int(options.has_positions),
+                **_POWER_UP_LIMITS,
+            },
+        }
+        schedule.on_alarm = self._miss_beat
+        self._feel_beat()
+
+    @property
+    def pendant_word(self) -> PendantWord:
+        """What the pendant shows."""
+        is_stopped = self.mode is SafetyMode.E_STOP
+        return PendantWord(
+            **self._levels,
+            segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
+            is_idle_lit=self.mode is SafetyMode.IDLE,
+            is_active_lit=self.mode is _ACTIVE,
+            button=Button.E_STOP if is_stopped else Button.NONE,
+        )
+
+    def press(self, action: PendantAction) -> None:
+        """Press a button of the pendant."""
+        if action == "estop":
+            self._levels["other"] = _FAULT
+            self._enter(SafetyMode.E_STOP)
+        elif action == "idle":
+            self._levels = dict.fromkeys(self._levels, _SAFE)
+            self._enter(SafetyMode.IDLE)
+            self._judge_torque()
+            self._judge_voltage()
+        elif self.mode is SafetyMode.IDLE and not self.pendant_word.faults:
+            self._enter(_ACTIVE)
+
+    def forget_positions(self) -> None:
+        """Know no longer where the joints are, as after power-up."""
+        self._properties["ZERO"] = 0
+        self._speeds.forget()
+
+    def receive(self, request: Property) -> None:
+        """Take a GET or SET sent to the module."""
+        number = request.number
+        name = names(Device.SAFETY, self._options.safety_vers).get(number)
+        if request.value is not None:
+            self._tell(name, request.value)
+        elif name is not None:
+            self._schedule.after(
+                self._options.latch_ns, lambda: self._answer(number, name)
+            )
+
+    def set_bus_voltage(self, voltage: float) -> None:
+        """Let the power bus have `voltage` [V] from now on."""
+        self._bus_voltage = voltage
+        self._judge_voltage()
+
+    def strain(self, monitor: Strainable) -> None:
+        """Let a monitor find fault with what it sees, until `relax`.
+
+        The limits of speed and torque become the smallest that is not off; for the
+        heartbeat the module goes deaf to positions.
+        """
+        limit = _FAULT_LIMITS.get(monitor)
+        if limit is None:
+            self._is_deaf = True
+        else:
+            self._spared.setdefault(limit, self._properties[limit])
+            self._properties[limit] = 1
+
+    def relax(self) -> None:
+        """Judge as before; a fault stays until Shift-idle."""
+        self._is_deaf = False
+        self._properties.update(self._spared)
+        self._spared.clear()
+
+    def hear_positions(self, positions: Mapping[int, int]) -> None:
+        """Take positions [counts] by node: heartbeat of the arm, and its speed."""
+        if self._is_deaf:
+            return
+        self._feel_beat()
+        self._speeds.hear(self._schedule.now_ns, positions)
+        self._judge_speed()
+
+    def hear_torques(self, group: int, units: Sequence[int]) -> None:
+        """Judge a torque command as it stands on the bus, before a puck clips it."""
+        self._largest_command[group] = max(map(abs, units))
+        self._judge_torque()
+
+    def _feel_beat(self) -> None:
+        """Wait for the next position until the heartbeat is over, while ACTIVE."""
+        is_active = self.mode is _ACTIVE
+        due_ns = self._schedule.now_ns + self._options.heartbeat_ns
+        self._schedule.set_alarm(due_ns if is_active else NEVER)
+
+    def _miss_beat(self) -> None:
+        """Fault the arm: nobody has asked for positions in time."""
+        self._fault("heartbeat")
+
+    def _answer(self, number: int, name: str) -> None:
+        computed = {"MODE": int(self.mode), "PEN": encode_pendant(self.pendant_word)}
+        value = computed.get(name, self._properties.get(name))
+        if value is not None and not self.is_mute:
+            self._schedule.reply(SAFETY_NODE, number, name, value)
+
+    def _tell(self, name: str | None, value: int) -> None:
+        if name == "MODE":
+            if 0 <= value < self.mode:  # a host can lower the mode only
+                self._enter(SafetyMode(value))
+        elif name in ("DEF", "LOAD"):
+            limit = names(Device.SAFETY, self._options.safety_vers).get(value)
+            if limit in _POWER_UP_LIMITS:
+                self._properties[limit] = _POWER_UP_LIMITS[limit]
+        elif name in self._properties and name not in _READ_ONLY:
+            self._properties[name] = value
+            self._judge_voltage()
+
+    def _judge_speed(self) -> None:
+        """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
+        is_zeroed = self._properties["ZERO"] == 1
+        speed = self._speeds.tip_speed() if is_zeroed else self._speeds.joint_speed()
+        counts = speed * COUNTS_PER_SPEED
+        if counts <= self._properties["VL2"] or self._properties["VL2"] <= 0:
+            self._too_fast_since_ns = None
+            self._warn("velocity", counts > self._properties["VL1"] > 0)
+        elif self._properties["IFAULT"] > 0:
+            self._properties["IFAULT"] -= 1
+        else:
+            self._fault("velocity")
+            self._stop_if_still_too_fast()
+
+    def _stop_if_still_too_fast(self) -> None:
+        now_ns = self._schedule.now_ns
+        if self._too_fast_since_ns is None:
+            self._too_fast_since_ns = now_ns
+        if now_ns - self._too_fast_since_ns >= _PATIENCE_NS:
+            self._enter(SafetyMode.E_STOP)
+
+    def _judge_voltage(self) -> None:
+        limits, voltage = self._properties, self._bus_voltage
+        if self.mode is SafetyMode.E_STOP:
+            return  # the bus has no power, and nothing to judge
+        if not limits["VOLTL2"] <= voltage <= limits["VOLTH2"]:
+            self._levels["voltage"] = _FAULT
+            self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
+        else:
+            is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
+            self._warn("voltage", is_odd)
+
+    def _warn(self, monitor: str, is_warning: bool) -> None:
+        """Light or put out a warning; a fault stays until Shift-idle."""
+        if self._levels[monitor] is not _FAULT:
+            self._levels[monitor] = _WARNING if is_warning else _SAFE
+
+    def _judge_torque(self) -> None:
+        largest = max(self._largest_command.values())
+        if self.mode is _ACTIVE and largest > self._properties["TL2"]:
+            self._fault("torque")
+        else:
+            self._warn("torque", largest > self._properties["TL1"])
+
+    def _fault(self, monitor: str) -> None:
+        """Note a fault until Shift-idle and stop the arm."""
+        self._levels[monitor] = _FAULT
+        if self.mode is _ACTIVE:
+            self._enter(SafetyMode.IDLE)
+
+    def _enter(self, mode: SafetyMode) -> None:
+        if mode is self.mode:
+            return
+        before, self.mode = self.mode, mode
+        if mode is SafetyMode.E_STOP:
+            self._properties["ZERO"] = 0
+            self._speeds.forget()
+            self._too_fast_since_ns = None
+        self._feel_beat()
+        told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
+        self._schedule.emit(_BROADCAST_ID, told)
+        self._on_change(before)

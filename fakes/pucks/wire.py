@@ -1,0 +1,121 @@
+"""The wire between hosts and a puck network: one frame at a time, lowest id first."""
+
+from heapq import heappop, heappush
+
+from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
+from fakes.pucks.network import PuckNetwork
+from wam.bus.frames import Payload
+
+# A frame that wants onto the wire: identifier, order of arrival, data, is of a host.
+# The lowest identifier goes first.
+_Waiting = tuple[int, int, bytes, bool]
+
+
+class WiredNetwork:
+    """A `PuckNetwork` and the wire it hangs on; time is an argument.
+
+    One frame is on the wire at a time; of those that wait, the lowest identifier wins.
+    A frame counts as sent when its last bit is. Where hosts are other programs
+    (`is_far`), the way to them and back takes about as long as a frame on the wire, so
+    that a host's frame takes no time here, and a device's leaves with its first bit.
+    """
+
+    def __init__(self, network: PuckNetwork, *, is_far: bool = False) -> None:
+        self.network = network
+        self._schedule = network.schedule
+        self._is_far = is_far
+        self._waiting: list[_Waiting] = []
+        self._on_wire: _Waiting | None = None
+        self._free_ns = 0
+        self._next_ns = NEVER  # the frame on the wire ends, or the next one starts
+        self._order = 0
+        self._sent: list[OutFrame] = []
+
+    def send(self, t_ns: int, can_id: int, data: Payload) -> None:
+        """Queue a host's frame at `t_ns`, the time of the last `advance`."""
+        self._begin_at(t_ns)
+        self._order += 1
+        heappush(self._waiting, (can_id, self._order, bytes(data), True))
+
+    def drop_waiting(self) -> None:
+        """Lose the frames that wait for the wire."""
+        self._waiting.clear()
+        if self._on_wire is None:
+            self._next_ns = NEVER
+
+    def next_event_ns(self) -> int | None:
+        """Return when wire or network do something next, None if never."""
+        next_ns = min(self._next_ns, self._schedule.next_ns)
+        return None if next_ns == NEVER else next_ns
+
+    def advance(self, t_ns: int) -> list[OutFrame]:
+        """Let wire and network go on to `t_ns`; return the devices' frames till then.
+
+        Each comes with the time [ns] at which it was sent.
+        """
+        schedule = self._schedule
+        if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
+            schedule.now_ns = max(schedule.now_ns, t_ns)
+            return []
+        while True:
+            # At one instant the network is first: its frame may win the arbitration.
+            own_ns, wire_ns = schedule.next_ns, self._next_ns
+            if own_ns <= t_ns and own_ns <= wire_ns:
+                self._take_due(own_ns)
+            elif wire_ns <= t_ns:
+                self._carry(min(t_ns, own_ns - 1))
+            else:
+                break
+        if schedule.now_ns < t_ns or schedule.outbox:
+            self._take_due(t_ns)
+        sent, self._sent = self._sent, []
+        return sent
+
+    def _take_due(self, t_ns: int) -> None:
+        due = self.network.due(t_ns)
+        if not due:
+            return
+        self._begin_at(due[0][0])
+        waiting, order = self._waiting, self._order
+        for _, can_id, data in due:
+            order += 1
+            heappush(waiting, (can_id, order, data, False))
+        self._order = order
+
+    def _begin_at(self, ready_ns: int) -> None:
+        """Let a frame that is ready at `ready_ns` have a wire for which none waits."""
+        if not self._waiting and self._on_wire is None:
+            self._next_ns = max(self._free_ns, ready_ns)
+
+    def _carry(self, until_ns: int) -> None:
+        """Carry frames until `until_ns`, or until the network has got one of a host."""
+        waiting, is_far, sent = self._waiting, self._is_far, self._sent
+        while (t_ns := self._next_ns) <= until_ns:
+            frame = self._on_wire
+            if frame is None:
+                frame = heappop(waiting)
+                if is_far:
+                    t_ns = self._start(t_ns, frame)
+                else:
+                    t_ns += FRAME_NS[len(frame[2])]
+                if t_ns > until_ns:  # its end is of a later call
+                    self._on_wire, self._next_ns = frame, t_ns
+                    return
+            can_id, _, data, is_of_host = frame
+            self._on_wire = None
+            self._free_ns = t_ns
+            # Whoever waits by now has been ready for a while.
+            self._next_ns = t_ns if waiting else NEVER
+            if is_of_host:
+                self.network.receive(t_ns, can_id, data)
+                return
+            if not is_far:
+                sent.append((t_ns, can_id, data))
+
+    def _start(self, t_ns: int, frame: _Waiting) -> int:
+        """Begin a frame of far hosts at `t_ns`; return when it ends."""
+        can_id, _, data, is_of_host = frame
+        if is_of_host:
+            return t_ns
+        self._sent.append((t_ns, can_id, data))
+        return t_ns + FRAME_NS[len(data)]

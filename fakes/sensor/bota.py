@@ -1,0 +1,178 @@
+"""A simulated Bota sensor of generation 1: what it says and what it obeys."""
+
+import re
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.firmware import Measurement, Saying, Schedule
+from fakes.sensor.stream import SensorStream, Source
+from ft_sensor.vendors import bota
+from ft_sensor.vendors.bota import Acknowledgement, BootText, BotaFrame
+
+_BOOT_NS = 400_000_000  # nothing is said before the port's opening has settled
+_LINE_PAUSE_NS = 100_000_000
+_SETTLE_NS = 200_000_000  # from the boot text to the first sample
+_REPLY_NS = 2_000_000
+_SHIPPED_SINC = 512  # 100 Hz: what the device does until it is told otherwise
+_BOOT_TEXT = BootText(True, "Fake F/T sensor", "20001", "fake 1.0")
+_COMMAND = re.compile(rb"[CRI#]|c,\d,\d,\d,\d|f,(\d{1,4}),\d,\d,\d")
+_COMMAND_BEGIN = re.compile(rb"c(,(\d(,(\d(,(\d(,)?)?)?)?)?)?)?|f(,[\d,]{0,10})?")
+
+
+class Mode(Enum):
+    """What the device is doing."""
+
+    RUN = auto()
+    CONFIGURATION = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class BotaOptions:
+    """Which device it is and what is wrong with it from the start.
+
+    Attributes:
+        boot_text: what it says after power-on; the fake's own words.
+        is_running: it has been streaming since before the beginning; otherwise it is
+            switched on at the beginning and boots.
+        resets_on_open: opening the port boots it.
+        baudrate: speed of its line [bit/s].
+        clock_error_ppm: how much its clock runs fast [parts per million].
+        clock_start_us: what its clock shows at power-on [us].
+        sinc: fixed sinc length; 0 = 512 until commanded.
+        refused: letters of the commands it answers with code 1.
+        is_deaf: it takes no commands.
+        raw_starts: so many starts leave the calibration matrix inactive.
+    """
+
+    boot_text: BootText = _BOOT_TEXT
+    is_running: bool = False
+    resets_on_open: bool = False
+    baudrate: int = 460800
+    clock_error_ppm: float = 0.0
+    clock_start_us: int = 0
+    sinc: int = 0
+    refused: str = ""
+    is_deaf: bool = False
+    raw_starts: int = 0
+
+
+_NORMAL = BotaOptions()
+
+
+def bota_stream(
+    source: Source,
+    errors: SensorErrors | None = None,
+    options: BotaOptions = _NORMAL,
+    start_ns: int = 0,
+) -> SensorStream:
+    """Return a Bota sensor that shows `source`."""
+    firmware = BotaFirmware(options, start_ns)
+    stream = SensorStream(firmware, source, errors, start_ns, options.clock_start_us)
+    stream.resets_on_open = options.resets_on_open
+    return stream
+
+
+class BotaFirmware:
+    """Implements `fakes.sensor.stream.Firmware`."""
+
+    frame_size = bota.FRAME_SIZE
+
+    def __init__(self, options: BotaOptions, start_ns: int) -> None:
+        self.baudrate = options.baudrate
+        # The device counts its own time, so a fast clock samples early.
+        self.clock_rate = 1 + options.clock_error_ppm * 1e-6
+        self.schedule: Schedule | None = None
+        self.on_since_ns = start_ns
+        self._options = options
+        self._raw_starts = options.raw_starts
+        self._forget()
+        self._ready_ns = start_ns
+        if options.is_running:
+            self._run_from(start_ns)
+
+    def power_up(self, t_ns: int) -> list[Saying]:
+        """Boot; return the boot text, line by line."""
+        self._forget()
+        self.on_since_ns = t_ns
+        said: list[Saying] = []
+        speak_ns = t_ns + _BOOT_NS
+        for line in bota.encode_boot_text(self._options.boot_text).splitlines(True):
+            said.append((speak_ns, line))
+            speak_ns += _LINE_PAUSE_NS
+        self._ready_ns = speak_ns + _SETTLE_NS
+        self._run_from(self._ready_ns)
+        return said
+
+    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+        """Obey the commands in `data`; return the acknowledgements."""
+        if self._options.is_deaf or t_ns < self._ready_ns:
+            return []
+        said: list[Saying] = []
+        self._input = (self._input + data)[-bota.MAX_COMMAND_SIZE :]
+        while self._input:
+            command = _COMMAND.match(self._input)
+            if command is not None:
+                self._input = self._input[command.end() :]
+                said += self._obey(t_ns, command)
+            elif _COMMAND_BEGIN.fullmatch(self._input):
+                break
+            else:
+                self._input = self._input[1:]
+        return said
+
+    def frame(self, shown: Measurement, status: int) -> bytes:
+        """Return the 37 bytes of a sample."""
+        status |= shown.is_skipping | self._is_raw << 3 | (shown.saturated > 0) << 1
+        return bota.encode_frame(
+            BotaFrame(
+                status,
+                shown.wrench,
+                shown.device_us % bota.CLOCK_MODULUS,
+                shown.temperature,
+            )
+        )
+
+    def _forget(self) -> None:
+        self._input = b""
+        self._sinc = self._options.sinc or _SHIPPED_SINC
+        self._start_measuring()
+
+    def _start_measuring(self) -> None:
+        self._is_raw = self._raw_starts > 0
+        self._raw_starts -= self._is_raw
+
+    def _run_from(self, t_ns: int) -> None:
+        self._mode = Mode.RUN
+        period_ns = bota.frame_period_ns(self._sinc) / self.clock_rate
+        self.schedule = Schedule(t_ns, period_ns)
+
+    def _stop(self) -> None:
+        self._mode = Mode.CONFIGURATION
+        self.schedule = None
+
+    def _obey(self, t_ns: int, command: re.Match[bytes]) -> list[Saying]:
+        letter = chr(command[0][0])
+        if letter == "#":
+            return self.power_up(t_ns)
+        is_running = self._mode is Mode.RUN
+        is_allowed = letter == "I" or is_running == (letter == "C")
+        is_refused = not is_allowed or letter in self._options.refused
+        if letter == "f" and not 1 <= int(command[1]) <= _SHIPPED_SINC:
+            is_refused = True
+        answer = bota.encode_acknowledgement(Acknowledgement(letter, int(is_refused)))
+        if not is_refused:
+            self._carry_out(t_ns, letter, command)
+        return [(t_ns + _REPLY_NS, answer)]
+
+    def _carry_out(self, t_ns: int, letter: str, command: re.Match[bytes]) -> None:
+        if letter == "C":
+            self._stop()
+        elif letter == "I":
+            self._stop()
+            self._sinc = self._options.sinc or _SHIPPED_SINC
+            self._start_measuring()
+        elif letter == "f" and not self._options.sinc:
+            self._sinc = int(command[1])
+        elif letter == "R":
+            self._run_from(t_ns + 2 * _REPLY_NS)

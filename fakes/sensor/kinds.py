@@ -1,0 +1,100 @@
+"""Which simulated wrist sensor, by the names that rig.toml uses."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fakes.sensor.bota import BotaOptions, bota_stream
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.optoforce import (
+    SENSITIVITY,
+    SERIAL_NUMBER,
+    OptoForceOptions,
+    optoforce_stream,
+)
+from fakes.sensor.robotous import RobotousOptions, robotous_stream
+from fakes.sensor.stream import SensorStream, Source
+from ft_sensor.reading import Wrench
+
+DRIFT_PPM = 20.0  # of the device's clock; two crystals are never alike
+
+
+@dataclass(frozen=True, slots=True)
+class SensorChoice:
+    """A wrist sensor that fits a rig.toml.
+
+    Attributes:
+        kind: "bota", "robotous", "optoforce", or "barrett" on the arm's bus.
+        sinc: filter length that a bota is found running with.
+        baudrate: speed of the line [bit/s]; None = the usual one of the kind.
+        sensitivity: of an optoforce [counts/N, counts/N m]; None = of the fake's own.
+        serial_number: of an optoforce; None = the fake's own.
+    """
+
+    kind: str = "bota"
+    sinc: int = 64
+    baudrate: int | None = None
+    sensitivity: Wrench | None = None
+    serial_number: str | None = None
+
+    @property
+    def is_on_bus(self) -> bool:
+        """Whether it is a node of the arm's bus."""
+        return self.kind == "barrett"
+
+
+def make_stream(
+    choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
+) -> SensorStream:
+    """Return a sensor that has been running for a while at `t_ns`.
+
+    One on the bus gets the stream of a bota that nobody reads.
+    """
+    return _MAKERS.get(choice.kind, _bota)(choice, source, errors, t_ns)
+
+
+def _bota(
+    choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
+) -> SensorStream:
+    options = BotaOptions(
+        is_running=True,
+        sinc=choice.sinc,
+        baudrate=choice.baudrate or BotaOptions().baudrate,
+        clock_error_ppm=DRIFT_PPM,
+    )
+    return bota_stream(source, errors, options, t_ns)
+
+
+def _robotous(
+    choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
+) -> SensorStream:
+    options = RobotousOptions(
+        is_running=True,
+        baudrate=choice.baudrate or RobotousOptions().baudrate,
+        clock_error_ppm=DRIFT_PPM,
+    )
+    return robotous_stream(source, errors, options, t_ns)
+
+
+def _optoforce(
+    choice: SensorChoice, source: Source, errors: SensorErrors | None, t_ns: int
+) -> SensorStream:
+    options = OptoForceOptions(
+        serial_number=choice.serial_number or SERIAL_NUMBER,
+        sensitivity=choice.sensitivity or SENSITIVITY,
+        is_running=True,
+        baudrate=choice.baudrate or OptoForceOptions().baudrate,
+        clock_error_ppm=DRIFT_PPM,
+    )
+    return optoforce_stream(source, errors, options, t_ns)
+
+
+_Maker = Callable[
+    [SensorChoice, Source, SensorErrors | None, int],
+    SensorStream,
+]
+_MAKERS: dict[str, _Maker] = {
+    "bota": _bota,
+    "robotous": _robotous,
+    "optoforce": _optoforce,
+}
+SERIAL_KINDS = tuple(_MAKERS)

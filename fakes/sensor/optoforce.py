@@ -1,0 +1,129 @@
+"""A simulated OptoForce / OnRobot HEX sensor: what it says and what it obeys."""
+
+from dataclasses import dataclass
+
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.firmware import Measurement, Saying, Schedule, count_of
+from fakes.sensor.stream import SensorStream, Source
+from ft_sensor.reading import Wrench
+from ft_sensor.vendors import optoforce
+from ft_sensor.vendors.optoforce import OptoForceFrame
+
+SERIAL_NUMBER = "HEX00042"
+SENSITIVITY: Wrench = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
+_REPLY_NS = 1_000_000
+_INPUT = 64
+_SIZES = {0xAA: 9, 0xAB: 6}
+
+
+@dataclass(frozen=True, slots=True)
+class OptoForceOptions:
+    """Which device it is and what is wrong with it from the start.
+
+    Attributes:
+        serial_number: eight characters at most.
+        sensitivity: counts per N and per N m.
+        is_running: it streams 1000 Hz already; otherwise 100 Hz, as it is shipped.
+        baudrate: speed of its line [bit/s].
+        clock_error_ppm: how much its clock runs fast [parts per million].
+        counter_start: what its counter shows first.
+        refusal: code it answers every configuration with; 0 = it obeys.
+        is_deaf: it takes no commands.
+    """
+
+    serial_number: str = SERIAL_NUMBER
+    sensitivity: Wrench = SENSITIVITY
+    is_running: bool = False
+    baudrate: int = 1_000_000
+    clock_error_ppm: float = 0.0
+    counter_start: int = 0
+    refusal: int = 0
+    is_deaf: bool = False
+
+
+_NORMAL = OptoForceOptions()
+
+
+def optoforce_stream(
+    source: Source,
+    errors: SensorErrors | None = None,
+    options: OptoForceOptions = _NORMAL,
+    start_ns: int = 0,
+) -> SensorStream:
+    """Return an OptoForce sensor that shows `source`."""
+    return SensorStream(OptoForceFirmware(options, start_ns), source, errors, start_ns)
+
+
+class OptoForceFirmware:
+    """Implements `fakes.sensor.stream.Firmware`; streams from power-on."""
+
+    frame_size = optoforce.FRAME_SIZE
+
+    def __init__(self, options: OptoForceOptions, start_ns: int) -> None:
+        self.baudrate = options.baudrate
+        self.clock_rate = 1 + options.clock_error_ppm * 1e-6
+        self.schedule: Schedule | None = None
+        self.on_since_ns = start_ns
+        self._options = options
+        self._input = b""
+        self._run_from(start_ns, 1 if options.is_running else 10)
+
+    def power_up(self, t_ns: int) -> list[Saying]:
+        """Stream 100 Hz."""
+        self._input = b""
+        self.on_since_ns = t_ns
+        self._run_from(t_ns, 10)
+        return []
+
+    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+        """Obey the commands in `data`; return the answers."""
+        if self._options.is_deaf:
+            return []
+        said: list[Saying] = []
+        self._input = (self._input + data)[-_INPUT:]
+        while self._input:
+            size = _SIZES.get(self._input[0], 1)
+            if len(self._input) < size:
+                break
+            answer = self._obey(t_ns, self._input[:size])
+            self._input = self._input[size if answer else 1 :]
+            said += [(t_ns + _REPLY_NS, answer)] if answer else []
+        return said
+
+    def frame(self, shown: Measurement, status: int) -> bytes:
+        """Return the 22 bytes of a sample."""
+        pairs = zip(shown.wrench, self._options.sensitivity, strict=True)
+        counts = [count_of(value * gain) for value, gain in pairs]
+        overload = shown.saturated
+        for axis, count in enumerate(counts):
+            if abs(count) >= optoforce.FULL_COUNTS:
+                overload |= 1 << axis
+        for axis in range(6):
+            status |= (overload >> axis & 1) << (9 - axis)
+        fx, fy, fz, tx, ty, tz = counts
+        counter = self._options.counter_start + shown.number
+        return optoforce.encode_frame(
+            OptoForceFrame(
+                counter % optoforce.COUNTER_MODULUS, status, (fx, fy, fz, tx, ty, tz)
+            )
+        )
+
+    def _run_from(self, t_ns: int, period_ms: int) -> None:
+        self.schedule = Schedule(t_ns, period_ms * 1e6 / self.clock_rate)
+
+    def _obey(self, t_ns: int, data: bytes) -> bytes | None:
+        if data == optoforce.ASK_SERIAL:
+            return optoforce.encode_serial_number(self._options.serial_number)
+        wished = optoforce.decode_configuration(data)
+        if wished is None:
+            return None
+        if self._options.refusal:
+            return optoforce.encode_configuration_answer(self._options.refusal)
+        speed = wished[0]
+        if speed == optoforce.STOPPED:
+            self.schedule = None
+        elif speed in optoforce.SPEED_CODES.values():
+            self._run_from(t_ns + 2 * _REPLY_NS, speed)
+        else:
+            return optoforce.encode_configuration_answer(1)
+        return optoforce.encode_configuration_answer(0)

@@ -1,0 +1,259 @@
+"""Serves a puck network to other programs, on the wall clock, in one thread."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from fakes.bus.adapter import CanPort
+from fakes.bus.hub import Frame, SocketHub
+from fakes.plant.plant import CYCLE_NS, ArmPlant
+from fakes.pucks.bank import MotorSide
+from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.safety_module import PendantAction
+from fakes.pucks.wire import WiredNetwork
+from fakes.randomness import trial_generator
+from fakes.sensor.errors import SensorErrors
+from fakes.serving.sensor_server import SensorLine, SensorServer
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import load_constants
+from wam.model.tool import Tool
+
+TICK_NS = 2_000_000
+# A stall of the machine must not look like a lost heartbeat or a fall of the arm.
+_LONGEST_STEP_NS = 10 * TICK_NS
+_SEED = 1  # of the sensor's errors
+
+Tap = Callable[[int, bytes], None]
+
+
+class Port(Protocol):
+    """Where hosts are: a Readable that frames come from and go to.
+
+    Attributes:
+        ignored: what came and was no classic data frame.
+        lost: frames that nobody took in time.
+    """
+
+    ignored: int
+    lost: int
+
+    @property
+    def name(self) -> str:
+        """The bus as INTERFACE:CHANNEL."""
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, -1 if there is none."""
+        ...
+
+    def is_readable(self) -> bool:
+        """Return whether something has arrived."""
+        ...
+
+    def receive(self) -> list[Frame]:
+        """Return the frames of hosts that have arrived; never waits."""
+        ...
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Send a frame of the network; never waits."""
+        ...
+
+    def close(self) -> None:
+        """Leave the bus."""
+        ...
+
+
+class Supported:
+    """Motors of an arm that somebody carries as long as no motor pulls.
+
+    Implements fakes.pucks.bank.MotorSide. Without power, and under zero torque, the arm
+    stays where it is instead of falling.
+    """
+
+    def __init__(self, motors: MotorSide) -> None:
+        self._motors = motors
+        self._is_braked = True
+
+    def advance(self, t_ns: int) -> None:
+        """Let the world go on to `t_ns`."""
+        self._motors.advance(t_ns)
+
+    def counts(self) -> Sequence[int]:
+        """Return the encoder counts of the seven motors now."""
+        return self._motors.counts()
+
+    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
+        """Brake or release the joints; the torques that follow decide."""
+        self._is_braked = is_braked or not is_powered
+
+    def set_torques(self, units: Sequence[int]) -> None:
+        """Apply torques [puck units]; under zero torque the arm is carried."""
+        is_held = self._is_braked or not any(units)
+        self._motors.set_braking(is_braked=is_held, is_powered=True)
+        self._motors.set_torques(units)
+
+
+class PuckServer:
+    """A network and the bus it is served on.
+
+    Whatever carries the frames here, the devices' leave one after the other, as on a
+    wire of 1 Mbit/s.
+
+    Attributes:
+        network: the pucks.
+        sensor: a serial wrist sensor that is served beside them; None = none.
+    """
+
+    def __init__(
+        self, network: PuckNetwork, motors: MotorSide, port: Port, clock: Clock
+    ) -> None:
+        self.network = network
+        self._wired = WiredNetwork(network, is_far=True)
+        self._motors = motors
+        self._port = port
+        self._clock = clock
+        self._seen_ns = self._world_ns = clock.now_ns()
+        self.sensor: SensorServer | None = None
+
+    @property
+    def name(self) -> str:
+        """The bus as INTERFACE:CHANNEL."""
+        if self.sensor is None:
+            return self._port.name
+        return f"{self._port.name}, {self.sensor.name}"
+
+    @property
+    def state(self) -> str:
+        """The mode of the safety module in words."""
+        return self.network.safety_mode.name.lower().replace("_", "-")
+
+    @property
+    def losses(self) -> str:
+        """What was not carried, in words; empty if all was."""
+        port = self._port
+        words = [self.sensor.losses] if self.sensor and self.sensor.losses else []
+        if port.ignored or port.lost:
+            words.append(
+                f"{port.ignored} packets were no classic data frames and were ignored; "
+                f"{port.lost} frames were lost because nobody took them in time."
+            )
+        return " ".join(words)
+
+    def press(self, action: PendantAction) -> None:
+        """Press a button of the pendant now."""
+        self._go_on()
+        self.network.pendant(action)
+
+    def step(self, tap: Tap | None = None) -> None:
+        """Wait for a frame or for the network, 2 ms at most, and let both go on.
+
+        Args:
+            tap: told of every frame on the bus.
+
+        Raises:
+            LinkError: the bus broke.
+        """
+        self._clock.wait(self._port, self._deadline_ns())
+        self._go_on()
+        for can_id, data in self._port.receive():
+            if tap is not None:
+                tap(can_id, data)
+            self._wired.send(self._world_ns, can_id, data)
+        for _, can_id, data in self._wired.advance(self._world_ns):
+            self._port.send(can_id, data)
+            if tap is not None:
+                tap(can_id, data)
+        # Nobody may have looked at the arm for long; catching up would delay answers.
+        self._motors.advance(self._world_ns)
+        if self.sensor is not None:
+            self.sensor.step()
+
+    def close(self) -> None:
+        """Leave the bus, pull the sensor's cable."""
+        self._port.close()
+        if self.sensor is not None:
+            self.sensor.close()
+
+    def _deadline_ns(self) -> int:
+        event_ns = self._wired.next_event_ns()
+        left = TICK_NS if event_ns is None else event_ns - self._world_ns
+        return self._seen_ns + max(0, min(left, TICK_NS))
+
+    def _go_on(self) -> None:
+        """Let the world's time pass, which a stall stops."""
+        now_ns = self._clock.now_ns()
+        self._world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
+        self._seen_ns = now_ns
+
+
+def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
+    """Return the place where a network is to be served.
+
+    Raises:
+        SettingsError: the socket's path is in use or cannot be one.
+        LinkError: the bus cannot be opened.
+    """
+    if interface == "traction-fake":
+        return SocketHub(Path(channel))
+    return CanPort(interface, channel, bitrate)
+
+
+@dataclass(frozen=True, slots=True)
+class Home:
+    """An arm at its home position, and how it is found.
+
+    Attributes:
+        tool: what it carries.
+        frame: where the container stands.
+        line: of a serial sensor; None = the sensor is on the bus.
+        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
+    """
+
+    tool: Tool
+    frame: TerrainFrame
+    line: SensorLine | None
+    is_idle_first: bool
+
+
+def build_home_server(port: Port, found: Home, clock: Clock) -> PuckServer:
+    """Return a server of an arm that stands at its home position, not zeroed.
+
+    It has a force/torque sensor on its bus or on a serial line.
+
+    Raises:
+        SettingsError: the serial line's path is in use or cannot be one.
+    """
+    constants = load_constants()
+    home = constants.home.copy()
+    # Home lies on or past two stops; a simulated spring would throw the arm off them.
+    constants = replace(
+        constants,
+        q_lower=np.minimum(constants.q_lower, home),
+        q_upper=np.maximum(constants.q_upper, home),
+    )
+    plant = ArmPlant(constants, found.tool, found.frame, home)
+    now_ns = clock.now_ns()
+    plant.t_ns = now_ns // CYCLE_NS * CYCLE_NS
+    motors = Supported(plant)
+    rng = trial_generator(_SEED, "home", 0)
+    errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
+    options = NetworkOptions(
+        safety_mode=SafetyMode.IDLE if found.is_idle_first else SafetyMode.E_STOP,
+        are_asleep=True,
+        has_sensor=found.line is None,
+        is_zeroed=False,
+        mt=constants.mt,
+    )
+    load = Load(plant.sensor_load, errors)
+    network = PuckNetwork(motors, options, now_ns, load)
+    server = PuckServer(network, motors, port, clock)
+    if found.line is not None:
+        server.sensor = SensorServer(found.line, plant.sensor_load, clock)
+    return server

@@ -1,0 +1,215 @@
+"""The simulated rig as a process of its own: bus on a socket, sensor on a terminal."""
+
+import base64
+import os
+import select
+import shutil
+import signal
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquisition.clock import SystemClock
+from acquisition.control_loop.realtime import Wish, request
+from acquisition.ipc.child import Station, name_process
+from acquisition.ipc.rpc import Channel, ChannelClosedError, Handler
+from fakes.bus.hub import SocketHub
+from fakes.plant.plant import PlantOptions
+from fakes.plant.push import PACES
+from fakes.pucks.wire import WiredNetwork
+from fakes.sensor.kinds import SensorChoice
+from fakes.sensor.pty import SerialPty
+from fakes.truth import truth_records
+from fakes.world.rig import FakeRig, Rehearsal, Scene
+from ft_sensor.payload import TerrainFrame
+from wam.model.constants import load_constants
+from wam.model.tool import tool_of
+
+PRIORITY = 70
+TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
+LINGER_NS = 5_000_000_000  # an arm whose console has died is braked within this
+TICK_NS = 2_000_000
+# A stall of the machine stops the simulated world too: it is no lost heartbeat.
+_LONGEST_STEP_NS = 10 * TICK_NS
+
+
+class WorldClock(SystemClock):
+    """The machine's time without the stalls that this process has noticed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.world_ns = self._seen_ns = super().now_ns()
+
+    def now_ns(self) -> int:
+        """Return the world's time [ns], as it was when `go_on` was called last."""
+        return self.world_ns
+
+    def go_on(self) -> int:
+        """Let the world's time pass and return it."""
+        now_ns = super().now_ns()
+        self.world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
+        self._seen_ns = now_ns
+        return self.world_ns
+
+
+class PtyCable:
+    """Implements `fakes.world.rig.Cable` over a pseudo-terminal."""
+
+    def __init__(self, pty: SerialPty, clock: WorldClock) -> None:
+        self._pty = pty
+        self._clock = clock
+
+    def unplug(self) -> None:
+        """Pull the cable."""
+        self._pty.unplug()
+
+    def plug_in(self) -> None:
+        """Put it in again."""
+        self._pty.plug_in(self._clock.now_ns())
+
+
+class RigServer:
+    """Serves one simulated rig to the processes of a session."""
+
+    def __init__(
+        self,
+        rehearsal: Rehearsal,
+        clock: WorldClock,
+        folder: Path,
+        channel: Channel,
+    ) -> None:
+        self._clock = clock
+        self._rig = rig = rehearsal.rig
+        self._wired = WiredNetwork(rig.network, is_far=True)
+        self._channel = channel
+        self._hub = SocketHub(folder / "can")
+        now_ns = self._clock.now_ns()
+        self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
+        rig.cable = PtyCable(self._pty, clock)
+        self._handlers = rehearsal_handlers(rehearsal)
+        self._handlers["hello"] = lambda _: {
+            "can": {
+                "interface": "traction-fake",
+                "channel": str(folder / "can"),
+                "bitrate": 1_000_000,
+            },
+            "port": self._pty.path,
+        }
+
+    def serve(self) -> None:
+        """Go on until the console hangs up and the arm's driver has left the bus."""
+        try:
+            try:
+                while True:
+                    if self._step(self._channel.fileno()):
+                        self._channel.answer(self._handlers)
+            except ChannelClosedError:
+                end_ns = self._clock.world_ns + LINGER_NS
+            while self._hub.clients and self._clock.world_ns < end_ns:
+                self._step(None)
+        finally:
+            self._hub.close()
+            self._pty.close()
+
+    def _step(self, asked: int | None) -> bool:
+        """Wait for what comes next; return whether descriptor `asked` is readable."""
+        watched = [self._hub.fileno()]
+        watched += [self._pty.fileno()] if self._pty.is_plugged_in else []
+        if asked is not None:
+            watched.append(asked)
+        ready = select.select(watched, [], [], self._patience())[0]
+        now_ns = self._clock.go_on()
+        self._carry_frames(now_ns)
+        self._pty.advance(now_ns)
+        self._rig.plant.advance(now_ns)
+        return asked in ready
+
+    def _carry_frames(self, now_ns: int) -> None:
+        for can_id, data in self._hub.receive():
+            self._wired.send(now_ns, can_id, data)
+        for _, can_id, data in self._wired.advance(now_ns):
+            self._hub.send(can_id, data)
+
+    def _patience(self) -> float:
+        """Return how long nothing will happen by itself [s]."""
+        events = [self._wired.next_event_ns(), self._pty.next_event_ns()]
+        times = [t for t in events if t is not None]
+        now_ns = self._clock.go_on()
+        wait_ns = min([t - now_ns for t in times], default=TICK_NS)
+        return max(0, min(wait_ns, TICK_NS)) * 1e-9
+
+
+def rehearsal_handlers(rehearsal: Rehearsal) -> dict[str, Handler]:
+    """Return what the console may ask of the simulation."""
+    rig = rehearsal.rig
+    return {
+        "prepare": rehearsal.prepare,
+        "lift": lambda _: rehearsal.lift(),
+        "rest": lambda _: rehearsal.rest(),
+        "let_go": lambda _: rehearsal.let_go(),
+        "put_down": lambda _: rehearsal.put_down(),
+        "touch": rehearsal.touch,
+        "push": lambda _: rehearsal.push(),
+        "pendant": rehearsal.pendant,
+        "inject": rehearsal.inject,
+        "mend": lambda _: rehearsal.mend(),
+        "fault_names": lambda _: list(rehearsal.fault_names),
+        "parameters": lambda _: rehearsal.parameters(),
+        "truth_part": lambda _: _truth_part(rig),
+    }
+
+
+def _truth_part(rig: FakeRig) -> str:
+    """Return the oldest rows of the truth; few, or the bus would wait meanwhile."""
+    truth = rig.plant.truth
+    if truth is None:
+        return ""
+    part = truth.take(TRUTH_ROWS)
+    if not part.t_ns:
+        rig.plant.truth = None
+        return ""
+    records = truth_records(part, rig.scene.frame)
+    return base64.b64encode(records.tobytes()).decode()
+
+
+def scene_of(facts: dict[str, Any]) -> Scene:
+    """Return the scene that was put into plain values."""
+    frame = facts["frame"]
+    return Scene(
+        terrain=facts["terrain"],
+        stones=facts["stones"],
+        foot=facts["foot"],
+        frame=TerrainFrame(
+            frame["incline"],
+            frame["heading"],
+            tuple(frame["far_end"]),
+            frame["travel"],
+        ),
+        start_q=np.array(facts["start_q"]),
+        seed=facts["seed"],
+        sensor=SensorChoice(**facts["sensor"]),
+    )
+
+
+def main(station: Station) -> None:
+    """Serve a simulated rig until the console hangs up."""
+    name_process("traction-fake")
+    # When the console dies, the driver still has to brake the arm.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    request(Wish(PRIORITY, station.settings.get("core")))
+    folder = Path(tempfile.mkdtemp(prefix=f"traction-{os.getpid()}-"))
+    try:
+        settings, clock = station.settings, WorldClock()
+        rig = FakeRig(
+            scene_of(settings["scene"]),
+            load_constants(),
+            tool_of(settings["tool"]),
+            clock,
+            PlantOptions(friction=settings["friction"]),
+        )
+        rehearsal = Rehearsal(rig, PACES[settings["pace"]])
+        RigServer(rehearsal, clock, folder, station.channel).serve()
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,95 @@
+"""Serves a simulated wrist sensor to other programs, on the wall clock."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.errors import SettingsError
+from fakes.randomness import trial_generator
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.kinds import SensorChoice, make_stream
+from fakes.sensor.pty import SerialPty
+from fakes.sensor.stream import Source
+from wam.model.constants import GRAVITY
+from wam.model.tool import Tool
+
+TICK_NS = 2_000_000
+# A stall of the machine is none of the sensor's: it goes on where it stopped.
+_LONGEST_STEP_NS = 10 * TICK_NS
+_SEED = 2  # of the sensor's errors
+
+
+@dataclass(frozen=True, slots=True)
+class SensorLine:
+    """Where a sensor is served, and which."""
+
+    path: Path
+    choice: SensorChoice
+
+
+class SensorServer:
+    """A sensor at the end of a path that other programs open as a serial port."""
+
+    def __init__(self, line: SensorLine, source: Source, clock: Clock) -> None:
+        """Plug the sensor in; `source` is its load.
+
+        Raises:
+            SettingsError: the path is in use or cannot be one.
+        """
+        self._clock = clock
+        self._kind = line.choice.kind
+        self._seen_ns = self._world_ns = clock.now_ns()
+        errors = SensorErrors(trial_generator(_SEED, "home", 0))
+        stream = make_stream(line.choice, source, errors, self._world_ns)
+        try:
+            self._pty = SerialPty(stream, self._world_ns, line.path)
+        except OSError as error:
+            raise SettingsError(
+                f"--serial {line.path} cannot be served ({error.strerror}).",
+                hint="Name a path that does not exist yet. Nothing was started.",
+            ) from error
+
+    @property
+    def name(self) -> str:
+        """The sensor and where it is."""
+        return f"{self._kind} sensor on {self._pty.path}"
+
+    @property
+    def losses(self) -> str:
+        """What nobody took in time, in words; empty if all was taken."""
+        lost = self._pty.overrun
+        return f"{lost} bytes of the sensor were not read in time." if lost else ""
+
+    def fileno(self) -> int:
+        """Return the descriptor that is readable when a host says something."""
+        return self._pty.fileno()
+
+    def is_readable(self) -> bool:
+        """Return False: what a host says is looked at in every step."""
+        return False
+
+    def wait(self) -> None:
+        """Wait 2 ms at most, until a host says something."""
+        self._clock.wait(self, self._clock.now_ns() + TICK_NS)
+
+    def step(self) -> None:
+        """Carry bytes both ways up to now."""
+        now_ns = self._clock.now_ns()
+        self._world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
+        self._seen_ns = now_ns
+        self._pty.advance(self._world_ns)
+
+    def close(self) -> None:
+        """Pull the cable; the path is gone."""
+        self._pty.unplug()
+
+
+def hanging_load(tool: Tool) -> Source:
+    """Return the load [N, N m] of a foot that hangs below a sensor at rest."""
+    foot = tool.foot
+    arm = np.array(foot.com) - np.array([0.0, 0.0, tool.sensor_height])
+    force = np.array([0.0, 0.0, tool.sensor_sign * foot.mass * GRAVITY])
+    wrench = tuple(map(float, np.concatenate([force, np.cross(arm, force)])))
+    return lambda _: wrench

@@ -1,0 +1,299 @@
+"""The whole simulated rig: arm, pucks, sensor, ground and hand, and its handle."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from acquisition.clock import Clock
+from acquisition.errors import SettingsError
+from acquisition.sample import Record
+from fakes.bus.in_process import FakeCanBus
+from fakes.clock import SteppedClock
+from fakes.ground.container import Container
+from fakes.ground.terrain import make_terrain
+from fakes.plant.plant import CYCLE_NS, ArmPlant, PlantOptions
+from fakes.plant.push import Pace
+from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.pucks.safety_module import PendantAction
+from fakes.randomness import trial_generators
+from fakes.sensor.errors import SensorErrors
+from fakes.sensor.kinds import SensorChoice, make_stream
+from fakes.sensor.port import FakeSerialPort
+from fakes.truth import truth_records
+from fakes.world.body_faults import BodyFaults
+from fakes.world.faults import mend_network, network_faults
+from fakes.world.sensor_faults import bus_sensor_faults, stream_faults
+from ft_sensor.payload import TerrainFrame
+from wam.bus.frames import SENSOR_NODE
+from wam.model.arm_model import ArmModel
+from wam.model.constants import ArmConstants, Array
+from wam.model.tool import Tool
+
+_START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
+LAG_NS = 600_000  # more than a cycle may be late
+ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
+_CLOSE = 1e-9  # m and rad, where the search for the start pose ends
+_LARGEST_STEP = 0.5  # rad
+_ANY_SENSOR = SensorChoice()
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """What stands on the laboratory floor.
+
+    Attributes:
+        terrain: its name, e.g. "S10".
+        stones: "small", "big" or "none".
+        foot: "tread" or "bare".
+        frame: where the container is.
+        start_q: joint positions with the foot at the far end [rad], shape (7,).
+        seed: of everything random.
+        sensor: which wrist sensor the arm has.
+    """
+
+    terrain: str
+    stones: str
+    foot: str
+    frame: TerrainFrame
+    start_q: Array
+    seed: int
+    sensor: SensorChoice = _ANY_SENSOR
+
+
+def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -> Array:
+    """Return joint positions near `q` with the sole `height` [m] above the far end.
+
+    The sole is parallel to the ground. Newton's method on joints 2, 4 and 6.
+
+    Raises:
+        SettingsError: it ends nowhere: out of reach, or `q` is a singular pose.
+    """
+    axes = frame.axes()
+    goal = np.array(frame.far_end) + height * axes[2]
+    start, q = q, q.copy()
+    joints = [1, 3, 5]
+    for _ in range(20):
+        position, rotation = model.sole_pose(q)
+        error = axes @ (goal - position)
+        turn = np.cross(rotation[:, 2], -axes[2]) @ axes[1]
+        if abs(error[0]) + abs(error[2]) < _CLOSE and abs(turn) < _CLOSE:
+            return q
+        J = model.sole_jacobian(q)[:, joints]
+        rows = np.vstack([axes[[0, 2]] @ J[:3], axes[1] @ J[3:]])
+        step = np.linalg.lstsq(rows, np.array([error[0], error[2], turn]))[0]
+        q[joints] += np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+    raise SettingsError(
+        f"matrix.toml: the foot cannot stand at far_end = {list(frame.far_end)} "
+        f"from start_q = {start.tolist()}.",
+        hint="Correct far_end or start_q of this terrain. Nothing was started.",
+    )
+
+
+class Cable(Protocol):
+    """What joins a serial sensor and whoever reads it."""
+
+    def unplug(self) -> None:
+        """Pull it out."""
+        ...
+
+    def plug_in(self) -> None:
+        """Put it in again."""
+        ...
+
+
+class FakeRig:
+    """Simulated devices joined by one plant; a World for the stepped clock.
+
+    The wrist sensor is on a serial port, or on the bus where `network` has one.
+
+    Attributes:
+        cable: of the serial sensor, while its port is open; None before.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        constants: ArmConstants,
+        tool: Tool,
+        clock: Clock,
+        options: PlantOptions | None = None,
+        network: NetworkOptions | None = None,
+    ) -> None:
+        self.scene = scene
+        self._clock = clock
+        model = ArmModel(constants, tool)
+        q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
+        self.plant = ArmPlant(constants, tool, scene.frame, q, options)
+        self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
+        found = replace(network or NetworkOptions(), mt=constants.mt)
+        if scene.sensor.is_on_bus:
+            found = replace(found, has_sensor=True)
+        self.rake(0)
+        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if found.has_sensor else ()
+        self.errors = SensorErrors(self.random.sensor, *kind)
+        load = Load(self.plant.sensor_load, self.errors)
+        self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
+        self._body = BodyFaults(self.plant, self.network.schedule.after)
+        self.bus = FakeCanBus(self.network, clock)
+        self.stream = make_stream(
+            scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
+        )
+        self._port: FakeSerialPort | None = None
+        self.cable: Cable | None = None
+
+    def open_port(self) -> FakeSerialPort:
+        """Return the sensor's serial port, opened now."""
+        self.cable = self._port = FakeSerialPort(self.stream, self._clock)
+        return self._port
+
+    def advance(self, t_ns: int) -> None:
+        """Let every device go on to `t_ns`."""
+        self.bus.advance(t_ns)
+        if self._port is not None:
+            self._port.advance(t_ns)
+        self.plant.advance(t_ns)
+
+    def next_event_ns(self) -> int | None:
+        """Return when a frame or byte arrives next."""
+        times = [self.bus.next_event_ns()]
+        if self._port is not None:
+            times.append(self._port.next_event_ns())
+        return min((t for t in times if t is not None), default=None)
+
+    def faults(self) -> dict[str, Callable[[], None]]:
+        """Return what each name of a fault does to the devices."""
+        sensor = bus_sensor_faults(self.network)
+        if not self.network.options.has_sensor:
+            now_ns = self._clock.now_ns
+            sensor = stream_faults(self.stream, self._unplug, now_ns)
+        found = {**sensor, **network_faults(self.network), **self._body.by_name()}
+        if isinstance(self._clock, SteppedClock):
+            found["loop-late"] = lambda: self._let_lag(LAG_NS)
+        return found
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        self.stream.recover()
+        if self.cable is not None:
+            self.cable.plug_in()
+        self._body.mend()
+        self.network.silence(SENSOR_NODE, is_mute=False)
+        mend_network(self.network)
+        self._let_lag(0)
+
+    def _let_lag(self, lag_ns: int) -> None:
+        """Let everybody who sleeps on stepped time wake `lag_ns` too late."""
+        if isinstance(self._clock, SteppedClock):
+            self._clock.lag_ns = lag_ns
+
+    def _unplug(self) -> None:
+        """Pull the sensor's cable; a port that is not open yet will bring nothing."""
+        if self.cable is not None:
+            self.cable.unplug()
+        else:
+            self.stream.go_silent()
+
+    def rake(self, trial: int) -> None:
+        """Rake the bed for `trial`: everything random starts anew."""
+        scene = self.scene
+        self.random = trial_generators(scene.seed, scene.terrain, trial)
+        self.ground = Container(
+            make_terrain(
+                scene.stones, scene.foot, scene.frame.incline, self.random.ground
+            )
+        )
+        self.plant.terrain = self.ground
+
+
+def _place(number: int, travel: float) -> tuple[float, float]:
+    """Return where a person touches the container the `number`th time [m]."""
+    if number <= 4:
+        return (0.0 if number <= 2 else travel), (-ASIDE if number % 2 else ASIDE)
+    share = number * 0.618 % 1.0  # spreads out, whatever the number
+    return share * travel, ASIDE * (2.0 * (number * 0.383 % 1.0) - 1.0)
+
+
+class Rehearsal:
+    """What only the simulation can be asked: hand, pendant, bed, faults, truth.
+
+    The drivers never see it; experiments.rig.rig owns it.
+
+    Attributes:
+        rig: the simulated rig.
+    """
+
+    def __init__(self, rig: FakeRig, pace: Pace | None = None) -> None:
+        self.rig = rig
+        self._pace = pace or Pace()
+        self._faults = rig.faults()
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """Names that `inject` knows."""
+        return tuple(self._faults)
+
+    def prepare(self, trial: int) -> None:
+        """Rake the bed for `trial` and begin to write the truth."""
+        self.rig.rake(trial)
+
+    def lift(self) -> None:
+        """Let the hand carry the foot above the far end and hold it still for a tare.
+
+        The sensor shows its offset and noise only, until the next push.
+        """
+        self.rig.errors.settle()
+        self.rig.plant.hand.lift_to_start()
+
+    def rest(self) -> None:
+        """Let the hand stop pushing and lie on the arm."""
+        self.rig.plant.hand.rest()
+
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        self.rig.plant.hand.let_go()
+
+    def put_down(self) -> None:
+        """Let the hand put the foot down at the far end."""
+        self.rig.plant.hand.put_down(self.rig.ground.surface(0.0))
+
+    def touch(self, number: int) -> None:
+        """Let the hand touch the ground with the sole and stay there.
+
+        1 to 4: far left, far right, near left, near right, seen from the arm; more:
+        points between them.
+        """
+        x, y = _place(number, self.rig.scene.frame.travel)
+        ground = self.rig.ground.surface(x)
+        self.rig.plant.hand.touch(x, y, ground)
+
+    def push(self) -> None:
+        """Let the hand push the foot across; the tare error of a trial begins here."""
+        rig = self.rig
+        rig.errors.new_trial(rig.random.sensor)
+        rig.plant.hand.push(self._pace, rig.random.hand)
+        rig.plant.start_truth()
+
+    def pendant(self, button: PendantAction) -> None:
+        """Press the pendant: "activate", "idle" or "estop"."""
+        self.rig.network.pendant(button)
+
+    def inject(self, fault: str) -> None:
+        """Let a device fail; `fault` is one of `fault_names`."""
+        self._faults[fault]()
+
+    def mend(self) -> None:
+        """End every fault that can be ended without the arm."""
+        self.rig.mend()
+
+    def take_truth(self) -> Record:
+        """Return traction_msgs/Truth records since the push began."""
+        return truth_records(self.rig.plant.take_truth(), self.rig.scene.frame)
+
+    def parameters(self) -> dict[str, str]:
+        """Return the true parameters of the ground as strings."""
+        values = self.rig.ground.truth()
+        return {name: f"{value:.9g}" for name, value in values.items()}

@@ -1,0 +1,179 @@
+"""What the sensor carries and how it is mounted, from readings in many orientations.
+
+At rest and without contact the sensor shows
+
+    f = s m R_WS^T g_w + b,   n = s c x (m R_WS^T g_w) + b_n
+
+with R_WS = R_W7 Rz(psi). For a mounting angle psi and a sign s the forces are linear in
+m and b, the torques in m c and b_n; psi is searched, both signs are tried.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import SettingsError
+from ft_sensor.payload import cross_matrix
+from wam.model.constants import GRAVITY, Array
+
+FEWEST = 6  # orientations
+LARGEST_RESIDUAL = 0.15  # N rms
+LEAST_SPREAD = 0.15  # of the weight's direction: the smallest singular value, relative
+_COARSE = np.radians(np.arange(-180.0, 180.0, 5.0))
+_FINE_STEPS = 40  # halvings of the bracket around the best coarse angle
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFit:
+    """What a series of orientations says.
+
+    Attributes:
+        mass: of everything below the gauges [kg].
+        com: its centre in the sensor frame [m], shape (3,).
+        bias: reading without load [N, N m], shape (6,).
+        angle: of the sensor frame about z7 [rad], -pi..pi.
+        sign: +1 if the sensor reads the load on it, -1 if the reaction.
+        residual: rms of force that is not explained [N].
+        torque_residual: rms of torque that is not explained [N m].
+    """
+
+    mass: float
+    com: Array
+    bias: Array
+    angle: float
+    sign: float
+    residual: float
+    torque_residual: float
+
+
+def fit_sensor(
+    rotations: Floats,
+    readings: Floats,
+    mounting: tuple[float, float] | None = None,
+) -> SensorFit:
+    """Fit payload, bias and mounting to readings at rest without contact.
+
+    Args:
+        rotations: orientations of frame 7 in the base frame, shape (n, 3, 3), n >= 6.
+        readings: mean raw readings there [N, N m], shape (n, 6).
+        mounting: angle [rad] and sign where they are known; None = fitted too.
+
+    Raises:
+        SettingsError: too few orientations, or too much alike.
+    """
+    down = _directions(rotations)
+    forces, torques = readings[:, :3], readings[:, 3:]
+    fits: list[tuple[float, float, float, Array, float]] = []
+    for sign in (1.0, -1.0) if mounting is None else (mounting[1],):
+        seen = sign * GRAVITY * down
+        angle = _search_angle(seen, forces) if mounting is None else mounting[0]
+        fits.append((*_fit_forces(seen, forces, angle), sign))
+    residual, angle, mass, bias, sign = min(fits, key=_cost)
+    if mass <= 0.0:
+        raise SettingsError(
+            "The readings do not change with the orientation.",
+            hint="Is this sensor the one that carries the foot, and does its sign in "
+            "rig.toml fit?",
+        )
+    weight = mass * sign * GRAVITY * _turned(down, angle)
+    moment, bias_torque, rest = _fit_torques(weight / mass, torques)
+    return SensorFit(
+        mass=mass,
+        com=moment / mass,
+        bias=np.concatenate([bias, bias_torque]),
+        angle=angle,
+        sign=sign,
+        residual=residual,
+        torque_residual=rest,
+    )
+
+
+def _cost(fit: tuple[float, float, float, Array, float]) -> float:
+    residual, _, mass, _, _ = fit
+    return residual if mass > 0.0 else np.inf
+
+
+def check_residual(fit: SensorFit, *, is_forced: bool) -> None:
+    """Refuse a fit that explains too little.
+
+    Raises:
+        SettingsError: more than 0.15 N are left and it is not forced.
+    """
+    if fit.residual > LARGEST_RESIDUAL and not is_forced:
+        raise SettingsError(
+            f"The forces leave {fit.residual:.2f} N rms unexplained (limit "
+            f"{LARGEST_RESIDUAL}).",
+            hint="Did the foot touch something, or is the sensor still warming up "
+            "(drift)? Start again, or add --force.",
+        )
+
+
+def _directions(rotations: Floats) -> Floats:
+    """Return the direction of gravity in frame 7, shape (n, 3), if they differ enough.
+
+    Raises:
+        SettingsError: too few orientations, or too much alike.
+    """
+    if len(rotations) < FEWEST:
+        raise SettingsError(
+            f"{len(rotations)} orientations were measured, {FEWEST} are needed.",
+            hint="Use more poses.",
+        )
+    down = -rotations[:, 2, :]
+    spread = np.linalg.svd(down - down.mean(axis=0), compute_uv=False)
+    if spread[-1] < LEAST_SPREAD * np.sqrt(len(down) / 3):
+        raise SettingsError(
+            "The orientations are too much alike: the foot has to point up, down and "
+            "to all sides.",
+            hint="Use more different poses.",
+        )
+    return down
+
+
+def _turned(down: Floats, angle: float) -> Floats:
+    """Return directions of frame 7 in the sensor frame, turned by `angle` [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return down @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _fit_forces(
+    accelerations: Floats, forces: Floats, angle: float
+) -> tuple[float, float, float, Array]:
+    """Return (rms residual [N], angle, mass [kg], bias [N]) for one mounting angle."""
+    seen = _turned(accelerations, angle)
+    centred = seen - seen.mean(axis=0)
+    wanted = forces - forces.mean(axis=0)
+    mass = float((centred * wanted).sum() / (centred * centred).sum())
+    bias = forces.mean(axis=0) - mass * seen.mean(axis=0)
+    rest = forces - mass * seen - bias
+    return float(np.sqrt((rest**2).mean())), angle, mass, bias
+
+
+def _search_angle(accelerations: Floats, forces: Floats) -> float:
+    """Return the best mounting angle [rad], -pi..pi, with a positive mass."""
+
+    def cost(angle: float) -> float:
+        residual, _, mass, _ = _fit_forces(accelerations, forces, angle)
+        return residual if mass > 0 else np.inf
+
+    costs = [cost(float(angle)) for angle in _COARSE]
+    middle = float(_COARSE[int(np.argmin(costs))])
+    half = float(_COARSE[1] - _COARSE[0])
+    for _ in range(_FINE_STEPS):
+        half *= 0.7
+        middle = min((middle - half, middle, middle + half), key=cost)
+    return float((middle + np.pi) % (2 * np.pi) - np.pi)
+
+
+def _fit_torques(accelerations: Floats, torques: Floats) -> tuple[Array, Array, float]:
+    """Return (m c [kg m], bias [N m], rms residual [N m])."""
+    rows = [np.hstack([-cross_matrix(a), np.eye(3)]) for a in accelerations]
+    matrix = np.vstack(rows)
+    solution: Array = np.asarray(
+        np.linalg.lstsq(matrix, torques.ravel())[0], dtype=np.float64
+    )
+    rest = torques.ravel() - matrix @ solution
+    return solution[:3], solution[3:], float(np.sqrt((rest**2).mean()))

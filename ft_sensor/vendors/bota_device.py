@@ -1,0 +1,200 @@
+"""A Bota sensor of generation 1: from any mode to a stream to be trusted."""
+
+from dataclasses import dataclass
+
+from acquisition.clock import NS_PER_S
+from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.startup import FIRST_READINGS, Listener
+from ft_sensor.vendors import bota
+from ft_sensor.vendors.bota import BootText, BotaStatus
+
+BAUDRATE = 460800
+# Of the SensONE as commonly given, in no document at hand: rig.toml may know better.
+RANGES: Wrench = (500.0, 500.0, 1200.0, 15.0, 15.0, 12.0)
+_FROZEN_NS = 50_000_000  # real noise never repeats six floats that long
+_LISTEN_NS = 3 * NS_PER_S  # a sensor that the opening reset boots within this
+_SETTLE_NS = NS_PER_S // 2
+_ANSWER_NS = 2 * NS_PER_S
+_KEYSTROKE_NS = 5_000_000  # the device takes commands no faster
+_RESET_NS = 1_500_000_000
+_TRIES = 3
+_RESETS = 5  # the matrix may need several starts to become active
+_PLAUSIBLE_OF_TEN = 8
+_MAX_FORCE = 500.0  # [N]; beyond it at rest the numbers are no forces
+_MAX_TORQUE = 50.0  # [N m]
+
+
+@dataclass(frozen=True, slots=True)
+class BotaSettings:
+    """How a Bota sensor is set up.
+
+    Attributes:
+        sinc: sinc filter length; the rate is 51200 / sinc [Hz].
+        is_fir_on: FIR filter on: cut-off 189 Hz at sinc 64, without it 1255 Hz.
+        ranges: fx fy fz tx ty tz it measures up to [N, N m].
+    """
+
+    sinc: int = 64
+    is_fir_on: bool = True
+    ranges: Wrench = RANGES
+
+    def __post_init__(self) -> None:
+        """Refuse what no sensor can do.
+
+        Raises:
+            SettingsError: the sinc length is out of range.
+        """
+        if not 1 <= self.sinc <= 512:
+            raise SettingsError(
+                f"F/T sensor sinc length {self.sinc} is out of range (1 to 512).",
+                hint="Sinc 64 gives 800 Hz.",
+            )
+
+
+class BotaDevice:
+    """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a Bota sensor."""
+
+    stop = bota.CONFIGURE
+
+    def __init__(self, line: Line, settings: BotaSettings) -> None:
+        """Take line and settings.
+
+        Raises:
+            SettingsError: the line cannot carry the stream.
+        """
+        period_ns = bota.frame_period_ns(settings.sinc)
+        line.require(tuple(bota.BAUD_CODES), bota.FRAME_SIZE, period_ns)
+        self.line = line
+        self.ranges = settings.ranges
+        self.timing = StreamTiming(
+            period_ns=period_ns,
+            wire_ns=wire_time_ns(bota.FRAME_SIZE, line.baudrate),
+            modulus=bota.CLOCK_MODULUS,
+            tick_ns=1000.0,
+            frozen_ns=_FROZEN_NS,
+            frame_size=bota.FRAME_SIZE,
+        )
+        self._settings = settings
+        self._boot = BootText()
+        self._answers = 0
+
+    def scanner(self) -> FrameScanner[Reading]:
+        """Return a scanner for the frames of the stream."""
+        return bota.scanner(self.ranges)
+
+    def status_words(self, status: int) -> tuple[str, ...]:
+        """Return what the set bits of `status` say."""
+        return bota.status_words(status)
+
+    def start(self, listener: Listener) -> dict[str, str]:
+        """Set the sensor up and start its stream; return who it is and how it is set.
+
+        Takes boot text or a running stream, for about three seconds; a sensor in
+        configuration mode says neither and is spoken to all the same.
+
+        Raises:
+            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkTimeoutError: the sensor is silent or does not answer.
+            DeviceFaultError: it refused a command, or its calibration matrix stays
+                inactive.
+        """
+        self._boot, self._answers = BootText(), 0
+        listener.wait_for(lambda: self._first_sign(listener), _LISTEN_NS)
+        if self._boot.is_complete:
+            # It takes no commands before its stream runs.
+            listener.wait_for(lambda: listener.frames > 0 or None, _SETTLE_NS)
+        self._start_until_plausible(listener)
+        fir = "on" if self._settings.is_fir_on else "off"
+        unknown = "unknown (no boot text seen)"
+        return {
+            "model": "Bota serial, generation 1",
+            "name": self._boot.name or unknown,
+            "serial_number": self._boot.serial_number or unknown,
+            "firmware": self._boot.firmware or unknown,
+            "filter": f"sinc {self._settings.sinc}, FIR {fir}",
+            "time": "device clock, fitted to arrival less wire time; filter unknown",
+        }
+
+    def _first_sign(self, listener: Listener) -> bool | None:
+        self._boot = bota.find_boot_text(listener.heard)
+        return self._boot.is_complete or listener.frames > 0 or None
+
+    def _start_until_plausible(self, listener: Listener) -> None:
+        for _ in range(_RESETS):
+            self._set_up(listener)
+            if _is_plausible(listener.first_readings()):
+                return
+            listener.say(bota.SOFT_RESET)
+            listener.pause(_RESET_NS)
+            listener.forget()
+        raise DeviceFaultError(
+            f"The F/T sensor sends raw gauge data or absurd forces after "
+            f"{_RESETS} starts (limits {_MAX_FORCE:g} N, {_MAX_TORQUE:g} N m).",
+            hint="Take its power away for ten seconds, then open it again.",
+        )
+
+    def _set_up(self, listener: Listener) -> None:
+        """Bring the sensor from any mode to a running stream; several tries."""
+        for tries_left in reversed(range(_TRIES)):
+            try:
+                self._configure_and_run(listener)
+            except (DeviceFaultError, LinkTimeoutError):
+                known = self._answers or listener.frames or self._boot.is_started
+                if not known:
+                    listener.refuse_stranger(self.line.baudrate)
+                if not tries_left:
+                    raise
+            else:
+                return
+
+    def _configure_and_run(self, listener: Listener) -> None:
+        # A sensor already in configuration mode need not answer this one.
+        self._ask(listener, bota.CONFIGURE)
+        for command in (
+            bota.communication_command(self.line.baudrate),
+            bota.filter_command(self._settings.sinc, self._settings.is_fir_on),
+            bota.RUN,
+        ):
+            code = self._ask(listener, command)
+            text = command.decode("ascii")
+            if code is None:
+                raise LinkTimeoutError(
+                    f"The F/T sensor did not answer '{text}' within "
+                    f"{_ANSWER_NS / NS_PER_S:g} s.",
+                    hint="Check the cable in both directions; cycle its power.",
+                )
+            if code != 0:
+                raise DeviceFaultError(
+                    f"The F/T sensor refused '{text}' with code {code}.",
+                    hint="Check sinc length and speed against its manual.",
+                )
+
+    def _ask(self, listener: Listener, command: bytes) -> int | None:
+        """Send `command`; return the code of its answer, None when there is none."""
+        for key in command:
+            listener.say(bytes((key,)))
+            listener.pause(_KEYSTROKE_NS)
+        letter = chr(command[0])
+
+        def answer() -> int | None:
+            for found in bota.find_acknowledgements(listener.heard):
+                if found.letter == letter:
+                    self._answers += 1
+                    return found.code
+            return None
+
+        return listener.wait_for(answer, _ANSWER_NS)
+
+
+def _is_plausible(readings: list[Reading]) -> bool:
+    """Return whether most of the first ten readings look like forces."""
+    good = [
+        not reading.status & BotaStatus.RAW_GAUGE
+        and all(abs(force) < _MAX_FORCE for force in reading.wrench[:3])
+        and all(abs(torque) < _MAX_TORQUE for torque in reading.wrench[3:])
+        for reading in readings[:FIRST_READINGS]
+    ]
+    return sum(good) >= _PLAUSIBLE_OF_TEN

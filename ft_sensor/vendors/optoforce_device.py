@@ -1,0 +1,169 @@
+"""An OptoForce / OnRobot HEX sensor: matched to its report, set up, started."""
+
+from dataclasses import dataclass
+
+from acquisition.clock import NS_PER_S
+from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.startup import Listener
+from ft_sensor.vendors import optoforce
+
+BAUDRATE = 1_000_000
+RATE = 1000  # Hz; 500 would be an undocumented code
+_FROZEN_NS = NS_PER_S  # its counts may repeat for a while, not so long
+_ANSWER_NS = NS_PER_S // 2
+_LISTEN_NS = NS_PER_S // 2
+_TRIES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class OptoForceSettings:
+    """How a HEX sensor is set up, and what its report says.
+
+    Attributes:
+        sensitivity: counts per N and per N m, from the report of this very unit.
+        serial_number: of the unit that the report belongs to.
+        filter_hz: cut-off of its low-pass, a key of `optoforce.FILTER_CODES`; 0 = off.
+    """
+
+    sensitivity: Wrench
+    serial_number: str
+    filter_hz: int = 150
+
+    def __post_init__(self) -> None:
+        """Refuse what the sensor does not know.
+
+        Raises:
+            SettingsError: unknown filter, or a sensitivity that is no scale.
+        """
+        if self.filter_hz not in optoforce.FILTER_CODES:
+            raise SettingsError(
+                f"F/T sensor filter {self.filter_hz} Hz is unknown.",
+                hint=f"Use one of {sorted(optoforce.FILTER_CODES)}.",
+            )
+        if not all(abs(value) > 1e-3 for value in self.sensitivity):
+            raise SettingsError(
+                "F/T sensor sensitivities must differ from zero.",
+                hint="Copy the six numbers of the unit's sensitivity report.",
+            )
+
+
+class OptoForceDevice:
+    """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a HEX sensor.
+
+    Nothing it is told can be read back: that it accepted is checked, and its rate.
+    """
+
+    stop = optoforce.encode_configuration(optoforce.STOPPED, 0)
+
+    def __init__(self, line: Line, settings: OptoForceSettings) -> None:
+        """Take line and settings.
+
+        Raises:
+            SettingsError: the line cannot carry the stream.
+        """
+        period_ns = NS_PER_S / RATE
+        line.require((BAUDRATE, 921600, 460800), optoforce.FRAME_SIZE, period_ns)
+        self.line = line
+        full = (abs(optoforce.FULL_COUNTS / value) for value in settings.sensitivity)
+        fx, fy, fz, tx, ty, tz = full
+        self.ranges: Wrench = (fx, fy, fz, tx, ty, tz)
+        self.timing = StreamTiming(
+            period_ns=period_ns,
+            wire_ns=wire_time_ns(optoforce.FRAME_SIZE, line.baudrate),
+            modulus=optoforce.COUNTER_MODULUS,
+            tick_ns=period_ns,
+            frozen_ns=_FROZEN_NS,
+            frame_size=optoforce.FRAME_SIZE,
+        )
+        self._settings = settings
+
+    def scanner(self) -> FrameScanner[Reading]:
+        """Return a scanner for the frames of the stream."""
+        return optoforce.scanner(self._settings.sensitivity)
+
+    def status_words(self, status: int) -> tuple[str, ...]:
+        """Return what a status says."""
+        return optoforce.status_words(status)
+
+    def start(self, listener: Listener) -> dict[str, str]:
+        """See that it is the unit of the report, set it up and start its stream.
+
+        Raises:
+            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkTimeoutError: the sensor is silent or does not answer.
+            DeviceFaultError: it is another unit, runs firmware of an older protocol,
+                refused its settings, or reports a failure.
+        """
+        listener.wait_for(lambda: listener.frames > 0 or None, _LISTEN_NS)
+        self._configure(listener, self.stop)
+        serial_number = self._serial_number(listener)
+        cutoff = self._settings.filter_hz
+        codes = optoforce.SPEED_CODES[RATE], optoforce.FILTER_CODES[cutoff]
+        self._configure(listener, optoforce.encode_configuration(*codes))
+        self._refuse_failure(listener.first_readings())
+        return {
+            "model": "OptoForce / OnRobot HEX, 6 axes",
+            "serial_number": serial_number,
+            "firmware": "unknown (cannot be asked)",
+            "filter": f"low-pass {cutoff} Hz" if cutoff else "off",
+            "time": "device counter, fitted to arrival less wire time; filter unknown",
+        }
+
+    def _serial_number(self, listener: Listener) -> str:
+        for _ in range(_TRIES):
+            listener.say(optoforce.ASK_SERIAL)
+            found = listener.wait_for(
+                lambda: optoforce.find_serial_number(listener.heard), _ANSWER_NS
+            )
+            if found is not None:
+                break
+        else:
+            raise LinkTimeoutError(
+                "The F/T sensor does not tell its serial number.",
+                hint="Cycle its power. Without it the sensitivities are anybody's.",
+            )
+        if found != self._settings.serial_number:
+            raise DeviceFaultError(
+                f"The F/T sensor is {found}, the sensitivities in rig.toml belong to "
+                f"{self._settings.serial_number}.",
+                hint="Enter sensitivity and serial_number of its own report.",
+            )
+        return found
+
+    def _configure(self, listener: Listener, command: bytes) -> None:
+        for _ in range(_TRIES):
+            listener.say(command)
+            code = listener.wait_for(
+                lambda: optoforce.find_configuration_answer(listener.heard), _ANSWER_NS
+            )
+            if code == 0:
+                return
+            if code is not None:
+                raise DeviceFaultError(
+                    f"The F/T sensor refused its configuration with code {code}.",
+                    hint="Cycle its power; check filter_hz against its manual.",
+                )
+            if optoforce.is_older_protocol(listener.heard):
+                raise DeviceFaultError(
+                    "The F/T sensor speaks an older protocol of its maker.",
+                    hint="Its firmware has to be brought up to date.",
+                )
+        if not listener.frames:
+            listener.refuse_stranger(self.line.baudrate)
+        raise LinkTimeoutError(
+            f"The F/T sensor did not answer within {_TRIES * _ANSWER_NS / NS_PER_S:g} "
+            "s.",
+            hint="Check the cable in both directions; cycle its power.",
+        )
+
+    def _refuse_failure(self, readings: list[Reading]) -> None:
+        ill = next((r for r in reversed(readings) if not r.is_trusted), None)
+        if ill is not None:
+            words = ", ".join(self.status_words(ill.status))
+            raise DeviceFaultError(
+                f"The F/T sensor reports: {words}.",
+                hint="Check the cable between sensor and DAQ; cycle its power.",
+            )

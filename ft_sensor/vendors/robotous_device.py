@@ -1,0 +1,242 @@
+"""A Robotous RFT sensor: identified, set up, read back, started."""
+
+from dataclasses import dataclass
+
+from acquisition.clock import NS_PER_S
+from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
+from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.startup import Listener
+from ft_sensor.vendors import robotous
+from ft_sensor.vendors.robotous import FIRMWARE, MODEL, MODELS, SERIAL, Model
+
+BAUDRATE = 921600
+_FIRST_BAUDRATE = 115200  # as it leaves the factory, at 200 Hz
+_MOST_BY_BAUDRATE = {57600: 200, 115200: 333, 230400: 500, 460800: 500, 921600: 1000}
+_FROZEN_NS = NS_PER_S  # its counts may repeat for a while, not so long
+_ANSWER_NS = NS_PER_S // 2
+_QUIET_NS = 50_000_000
+_TRIES = 3
+_ABSURD = 1.5  # times the rated load: no measurement
+
+
+@dataclass(frozen=True, slots=True)
+class RobotousSettings:
+    """How a Robotous sensor is set up.
+
+    Attributes:
+        rate: samples per second, 500 or 1000 [Hz].
+        filter_hz: cut-off of its low-pass, a key of `robotous.FILTER_CODES`; 0 = off.
+    """
+
+    rate: int = 1000
+    filter_hz: int = 150
+
+    def __post_init__(self) -> None:
+        """Refuse what the sensor does not know, or what is too slow for the loop.
+
+        Raises:
+            SettingsError: unknown rate or filter.
+        """
+        if self.rate not in (500, 1000):
+            raise SettingsError(
+                f"F/T sensor rate {self.rate} Hz - expected 500 or 1000.",
+                hint="Prefer 1000: two clocks of 500 Hz slip.",
+            )
+        if self.filter_hz and self.filter_hz not in robotous.FILTER_CODES:
+            raise SettingsError(
+                f"F/T sensor filter {self.filter_hz} Hz is unknown.",
+                hint=f"Use 0 or one of {sorted(robotous.FILTER_CODES)}.",
+            )
+
+
+class RobotousDevice:
+    """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a Robotous sensor.
+
+    It has no clock and no counter. Its scale follows from its model, which is asked.
+    """
+
+    stop = robotous.encode_command(robotous.STOP)
+
+    def __init__(self, line: Line, settings: RobotousSettings) -> None:
+        """Take line and settings.
+
+        Raises:
+            SettingsError: the line cannot carry the stream.
+        """
+        period_ns = NS_PER_S / settings.rate
+        # A sensor fresh from the factory has to be spoken to in its own speed once.
+        is_first = line.baudrate == _FIRST_BAUDRATE
+        needed_ns = NS_PER_S / 200 if is_first else period_ns
+        line.require(tuple(robotous.BAUD_CODES), robotous.FRAME_SIZE, needed_ns)
+        if not is_first and settings.rate > _MOST_BY_BAUDRATE[line.baudrate]:
+            raise SettingsError(
+                f"A Robotous sensor sends {_MOST_BY_BAUDRATE[line.baudrate]} Hz at "
+                f"most over {line.baudrate} baud, {settings.rate} are asked for.",
+                hint="Set baudrate = 921600.",
+            )
+        self.line = line
+        self.ranges: Wrench = MODELS["RFT60-HA01"].ranges
+        self.timing = StreamTiming(
+            period_ns=period_ns,
+            wire_ns=wire_time_ns(robotous.FRAME_SIZE, line.baudrate),
+            modulus=0,
+            tick_ns=period_ns,
+            frozen_ns=_FROZEN_NS,
+            frame_size=robotous.FRAME_SIZE,
+        )
+        self._settings = settings
+        self._model = MODELS["RFT60-HA01"]
+
+    def scanner(self) -> FrameScanner[Reading]:
+        """Return a scanner for the frames of the stream."""
+        return robotous.scanner(lambda: self._model.torque_counts)
+
+    def status_words(self, status: int) -> tuple[str, ...]:
+        """Return what the overload bits say."""
+        return robotous.status_words(status)
+
+    def start(self, listener: Listener) -> dict[str, str]:
+        """Stop the sensor, identify it, set it up, read that back, start its stream.
+
+        Raises:
+            LinkError: the port failed, or bytes came that are not this sensor's.
+            LinkTimeoutError: the sensor is silent or does not answer.
+            DeviceFaultError: it is an unknown model, too slow a model, or refused a
+                setting; or it spoke at the factory's speed and needs its power cycled.
+        """
+        self._make_quiet(listener)
+        name = self._identify(listener)
+        facts = {
+            "model": f"Robotous {name}",
+            "serial_number": self._text(listener, SERIAL),
+            "firmware": self._text(listener, FIRMWARE),
+        }
+        if self.line.baudrate == _FIRST_BAUDRATE:
+            self._leave_first_baudrate(listener)
+        self._set_filter(listener)
+        self._set_rate(listener)
+        overloads = self._ask(listener, robotous.OVERLOADS)
+        listener.say(robotous.encode_command(robotous.STREAM))
+        self._refuse_absurd(listener.first_readings())
+        low_pass = f"low-pass {self._settings.filter_hz} Hz"
+        return {
+            **facts,
+            "filter": low_pass if self._settings.filter_hz else "off",
+            "overloads": " ".join(map(str, overloads[:6])),
+            "time": "frames counted, fitted to arrival less wire time; no device clock",
+        }
+
+    def _make_quiet(self, listener: Listener) -> None:
+        """End a stream that an earlier program left; this command has no answer."""
+        listener.say(self.stop)
+        listener.pause(_QUIET_NS)
+        listener.forget()
+
+    def _identify(self, listener: Listener) -> str:
+        try:
+            name = self._text(listener, MODEL)
+        except LinkTimeoutError:
+            if not listener.frames:
+                listener.refuse_stranger(self.line.baudrate)
+            raise
+        found = _model_of(name)
+        if found is None:
+            raise DeviceFaultError(
+                f"The F/T sensor calls itself '{name}', whose scale is unknown.",
+                hint=f"Known are {', '.join(MODELS)}.",
+            )
+        if found.most_hz < self._settings.rate:
+            raise DeviceFaultError(
+                f"A {name} sends {found.most_hz} Hz at most; the loop needs 500.",
+                hint="Use another model.",
+            )
+        self._model, self.ranges = found, found.ranges
+        return name
+
+    def _leave_first_baudrate(self, listener: Listener) -> None:
+        """Let the sensor speak faster from its next power-on; raises in any case."""
+        self._set(listener, robotous.SET_BAUDRATE, robotous.BAUD_CODES[BAUDRATE])
+        raise DeviceFaultError(
+            f"At {_FIRST_BAUDRATE} baud the F/T sensor is too slow for the loop. It "
+            f"was told to use {BAUDRATE} baud from its next power-on.",
+            hint=f"Cycle its power and set baudrate = {BAUDRATE} in rig.toml.",
+        )
+
+    def _set_filter(self, listener: Listener) -> None:
+        cutoff = self._settings.filter_hz
+        wished = (1, robotous.FILTER_CODES[cutoff]) if cutoff else (0, 0)
+        self._set(listener, robotous.SET_FILTER, *wished)
+        got = self._ask(listener, robotous.GET_FILTER)
+        if (got[0], got[1] if got[0] else 0) != wished:
+            raise _not_taken("filter", wished, tuple(got[:2]))
+
+    def _set_rate(self, listener: Listener) -> None:
+        wished = robotous.RATE_CODES[self._settings.rate]
+        self._set(listener, robotous.SET_RATE, wished)
+        got = self._ask(listener, robotous.GET_RATE)
+        if got[0] != wished:
+            raise _not_taken("rate", (wished,), (got[0],))
+
+    def _set(self, listener: Listener, command: int, *parameters: int) -> None:
+        answer = self._ask(listener, command, *parameters)
+        if answer[0] != 1:
+            reason = robotous.ERRORS.get(answer[1], f"error {answer[1]}")
+            raise DeviceFaultError(
+                f"The F/T sensor refused command {command:#04x} "
+                f"{' '.join(map(str, parameters))}: {reason}.",
+                hint="Check rate, filter and speed against its manual.",
+            )
+
+    def _text(self, listener: Listener, command: int) -> str:
+        return robotous.text_of(self._ask(listener, command))
+
+    def _ask(self, listener: Listener, command: int, *parameters: int) -> bytes:
+        """Return the 15 bytes of the answer to `command`.
+
+        Raises:
+            LinkTimeoutError: it did not come, several times.
+        """
+        for _ in range(_TRIES):
+            listener.say(robotous.encode_command(command, *parameters))
+            found = listener.wait_for(
+                lambda: robotous.find_answer(listener.heard, command), _ANSWER_NS
+            )
+            if found is not None:
+                return found
+        raise LinkTimeoutError(
+            f"The F/T sensor did not answer command {command:#04x} within "
+            f"{_TRIES * _ANSWER_NS / NS_PER_S:g} s.",
+            hint="Check the cable in both directions; cycle its power.",
+        )
+
+    def _refuse_absurd(self, readings: list[Reading]) -> None:
+        worst = max(
+            abs(value) / rated
+            for reading in readings
+            for value, rated in zip(reading.wrench, self.ranges, strict=True)
+        )
+        if worst > _ABSURD:
+            raise DeviceFaultError(
+                f"The F/T sensor shows {worst:.1f} times its rated load.",
+                hint="Take the load off; if none is on it, its gauges are damaged.",
+            )
+
+
+def _model_of(name: str) -> Model | None:
+    """Return what is known of a model that calls itself `name`."""
+    plain = name.upper().replace(" ", "")
+    for known, model in MODELS.items():
+        if plain.startswith(known):
+            return model
+    return None
+
+
+def _not_taken(
+    what: str, wished: tuple[int, ...], got: tuple[int, ...]
+) -> DeviceFaultError:
+    return DeviceFaultError(
+        f"The F/T sensor reads back {what} code {got}, told was {wished}.",
+        hint="Cycle its power and try again; check its firmware.",
+    )

@@ -1,0 +1,294 @@
+"""A bus log in words: who asked what, who answered, how late, who stayed silent.
+
+A GET is answered once by each device that it addresses, a SET by nobody. The protocol
+has no sequence numbers: an answer belongs to the oldest open question of its kind, and
+a question asked again after the answer's time limit replaces the one before.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from enum import Enum
+
+from acquisition.devices import SafetyMode
+from wam.bus.frames import (
+    HOST,
+    MOTOR_NODES,
+    SAFETY_NODE,
+    SENSOR_NODE,
+    Address,
+    FrameError,
+    Group,
+    decode_acceleration,
+    decode_force,
+    decode_joint_encoder,
+    decode_position,
+    decode_reply,
+    decode_request,
+    decode_torque,
+    decode_torques,
+    split_id,
+)
+from wam.bus.log import LoggedFrame
+from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, Stat, names
+
+LIMIT_NS = 1_000_000  # an answer is late after this
+_GIVE_UP_NS = 1_000_000_000
+_USUAL_VERS = 200  # of a device that has not told its firmware
+_MEMBERS = {
+    Group.BUS: range(1, 8),
+    Group.LOWER_TORQUE: range(1, 5),
+    Group.WRIST_TORQUE: range(5, 8),
+    Group.ARM: range(1, 8),
+    Group.HAND: range(11, 15),
+}
+_GROUP_NAMES = {
+    Group.BUS: "every puck",
+    Group.LOWER_TORQUE: "pucks 1-4",
+    Group.WRIST_TORQUE: "pucks 5-7",
+    Group.ARM: "the arm",
+    Group.HAND: "the hand",
+}
+
+
+class Answer(Enum):
+    """Answers that are not property replies, by the group they are sent to."""
+
+    POSITION = Group.POSITION
+    JOINT_ENCODER = Group.JOINT_ENCODER
+    FORCE = Group.FORCE
+    TORQUE = Group.TORQUE
+    ACCELERATION = Group.ACCELERATION
+
+
+_SPECIAL = {
+    (Device.MOTOR, "P"): (Answer.POSITION,),
+    (Device.MOTOR, "JP"): (Answer.JOINT_ENCODER,),
+    (Device.SENSOR, "FT"): (Answer.FORCE, Answer.TORQUE),
+    (Device.SENSOR, "A"): (Answer.ACCELERATION,),
+}
+_Key = tuple[int, Answer | int]  # node, and what it is to say: a property by number
+
+
+@dataclass(frozen=True, slots=True)
+class Spoken:
+    """A sentence, and when it was said: UTC [ns]."""
+
+    utc_ns: int
+    text: str
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a log adds up to.
+
+    Attributes:
+        frames: all of them.
+        foreign: frames no WAM uses: extended, remote.
+        questions: answers asked for; a group is asked once per member.
+        answers: those that came.
+        late: those that came after more than 1 ms.
+        slowest_ns: the longest wait for an answer.
+        unasked: answers that nobody had asked for.
+        silent: questions without an answer, by device and property.
+    """
+
+    frames: int = 0
+    foreign: int = 0
+    questions: int = 0
+    answers: int = 0
+    late: int = 0
+    slowest_ns: int = 0
+    unasked: int = 0
+    silent: Counter[str] = field(default_factory=Counter[str])
+
+
+def node_name(node: int) -> str:
+    """Return what a person calls a node of the bus."""
+    known = {HOST: "host", SENSOR_NODE: "F/T sensor", SAFETY_NODE: "safety module"}
+    if node in known:
+        return known[node]
+    return f"puck {node}" if node in MOTOR_NODES else f"node {node}"
+
+
+class BusReader:
+    """Reads a log frame by frame and learns from it who sleeps and runs what.
+
+    Attributes:
+        tally: what the log adds up to so far.
+    """
+
+    def __init__(self) -> None:
+        self.tally = Tally()
+        self._open: dict[_Key, list[int]] = {}  # when asked [ns], the oldest key first
+        self._vers: dict[int, int] = {}
+        self._asleep: set[int] = set()
+
+    def read(self, frame: LoggedFrame) -> list[Spoken]:
+        """Return what `frame` says, after the questions it shows to be unanswered."""
+        self.tally.frames += 1
+        spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
+        if not frame.is_of_wam:
+            self.tally.foreign += 1
+            text = f"a frame no WAM uses: {frame.can_id:x}"
+            return [*spoken, Spoken(frame.utc_ns, text)]
+        address = split_id(frame.can_id)
+        try:
+            text = self._say(frame, address, spoken)
+        except FrameError as error:
+            text = f"{node_name(address.sender)}: {error.message}"
+        return [*spoken, Spoken(frame.utc_ns, text)]
+
+    def finish(self) -> list[Spoken]:
+        """Return the questions still open at the end of the log."""
+        newest = max((t for asked in self._open.values() for t in asked), default=0)
+        return self._give_up(newest)
+
+    def _say(self, frame: LoggedFrame, address: Address, spoken: list[Spoken]) -> str:
+        if address.sender == HOST:
+            return self._hear_host(frame, address, spoken)
+        who = node_name(address.sender)
+        if address.is_group and address.to == Group.PROPERTY:
+            return self._hear_reply(frame, address.sender)
+        if address.is_group and address.to in {answer.value for answer in Answer}:
+            answer = Answer(Group(address.to))
+            delay = self._answered((address.sender, answer), frame.utc_ns)
+            return f"{who} {_describe(answer, frame.data)}{delay}"
+        if address.is_group and address.to == Group.BUS:
+            return f"{who} tells every puck: {frame.data.hex(' ')}"
+        return f"{who} sends {frame.can_id:03x} {frame.data.hex(' ')}"
+
+    def _hear_host(
+        self, frame: LoggedFrame, address: Address, spoken: list[Spoken]
+    ) -> str:
+        nodes, whom = [address.to], node_name(address.to)
+        if address.is_group:
+            if address.to not in _MEMBERS:
+                return f"host sends {frame.can_id:03x} {frame.data.hex(' ')}"
+            group = Group(address.to)
+            nodes, whom = list(_MEMBERS[group]), _GROUP_NAMES[group]
+            if len(frame.data) == 8:
+                units = decode_torques(frame.data)[: len(nodes)]
+                return f"host sets torques of {whom}: {' '.join(map(str, units))}"
+        request = decode_request(frame.data)
+        name = self._name(nodes[0], request.number)
+        if request.value is not None:
+            value = self._value(nodes[0], name, request.value)
+            if name == "STAT":  # a puck that is woken says nothing of it
+                for node in nodes:
+                    self._learn(node, name, request.value)
+            return f"host sets {name} of {whom} to {value}"
+        for node in nodes:
+            for kind in self._answers_to(node, request.number):
+                spoken += self._ask((node, kind), frame.utc_ns)
+        return f"host asks {whom} for {name}"
+
+    def _hear_reply(self, frame: LoggedFrame, node: int) -> str:
+        reply = decode_reply(frame.data)
+        value = reply.value or 0
+        delay = self._answered((node, reply.number), frame.utc_ns)
+        name = self._name(node, reply.number)
+        self._learn(node, name, value)
+        shown = self._value(node, name, value)
+        return f"{node_name(node)} answers {name} = {shown}{delay}"
+
+    def _learn(self, node: int, name: str, value: int) -> None:
+        if name == "STAT":
+            (self._asleep.add if value == Stat.RESET else self._asleep.discard)(node)
+        elif name == "VERS" and node not in self._asleep and value >= FIRST_RELEASED:
+            self._vers[node] = value
+
+    def _device(self, node: int) -> Device:
+        if node in self._asleep:
+            return Device.MONITOR
+        special = {SAFETY_NODE: Device.SAFETY, SENSOR_NODE: Device.SENSOR}
+        return special.get(node, Device.MOTOR)
+
+    def _name(self, node: int, number: int) -> str:
+        table = names(self._device(node), self._vers.get(node, _USUAL_VERS))
+        return table.get(number, f"property {number}")
+
+    def _value(self, node: int, name: str, value: int) -> str:
+        words: dict[int, str] = {}
+        if name == "STAT":
+            words = {int(stat): stat.name for stat in Stat}
+        elif name == "MODE":
+            modes = SafetyMode if node == SAFETY_NODE else PuckMode
+            words = {int(mode): mode.name for mode in modes}
+        elif name == "PEN":
+            return f"{value & 0xFFFFFFFF:08X}"
+        if value not in words:
+            return str(value)
+        return f"{value} ({words[value].lower().replace('_', '-')})"
+
+    def _answers_to(self, node: int, number: int) -> tuple[Answer | int, ...]:
+        device = self._device(node)
+        return _SPECIAL.get((device, self._name(node, number)), (number,))
+
+    def _ask(self, key: _Key, utc_ns: int) -> list[Spoken]:
+        """Note a question; return the one it replaces if that had its time."""
+        self.tally.questions += 1
+        asked = self._open.get(key)
+        if asked is not None and utc_ns - asked[-1] <= LIMIT_NS:
+            asked.append(utc_ns)
+            return []
+        replaced = self._drop(key)
+        self._open[key] = [utc_ns]
+        return replaced
+
+    def _answered(self, key: _Key, utc_ns: int) -> str:
+        asked = self._open.get(key)
+        if asked is None:
+            self.tally.unasked += 1
+            return ", UNASKED"
+        delay_ns = utc_ns - asked.pop(0)
+        if not asked:
+            del self._open[key]
+        self.tally.answers += 1
+        self.tally.slowest_ns = max(self.tally.slowest_ns, delay_ns)
+        is_late = delay_ns > LIMIT_NS
+        self.tally.late += is_late
+        return (
+            f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
+        )
+
+    def _give_up(self, before_ns: int) -> list[Spoken]:
+        """Drop the questions asked until `before_ns`."""
+        dropped: list[Spoken] = []
+        while self._open:
+            key = next(iter(self._open))
+            if self._open[key][0] > before_ns:
+                break
+            dropped += self._drop(key)
+        return dropped
+
+    def _drop(self, key: _Key) -> list[Spoken]:
+        node, kind = key
+        if isinstance(kind, Answer):
+            name = kind.name.lower().replace("_", " ")
+        else:
+            name = self._name(node, kind)
+        what = f"{node_name(node)}: {name}"
+        asked = self._open.pop(key, [])
+        if asked:
+            self.tally.silent[what] += len(asked)
+        return [Spoken(t, f"UNANSWERED {what}") for t in asked]
+
+
+def _describe(answer: Answer, data: bytes) -> str:
+    if answer is Answer.POSITION:
+        encoder = decode_joint_encoder(data)
+        extra = "" if encoder is None else f", joint encoder {encoder}"
+        return f"is at {decode_position(data)}{extra}"
+    if answer is Answer.JOINT_ENCODER:
+        return f"has its joint encoder at {decode_position(data)}"
+    if answer is Answer.TORQUE:
+        torque, status = decode_torque(data)
+        extra = f", status {status:08b}" if status else ""
+        return f"feels the torque {_triple(torque)} N m{extra}"
+    if answer is Answer.FORCE:
+        return f"feels the force {_triple(decode_force(data))} N"
+    return f"feels the acceleration {_triple(decode_acceleration(data))} m/s2"
+
+
+def _triple(values: tuple[float, float, float]) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in values) + ")"

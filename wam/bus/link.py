@@ -1,0 +1,220 @@
+"""The one door to python-can: a bus that is sent to and drained, never waited on."""
+
+import errno
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+import can
+
+from acquisition.errors import LinkError
+from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
+
+MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
+_DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
+
+
+class Frame(NamedTuple):
+    """A frame as received or sent.
+
+    Attributes:
+        can_id: 11-bit identifier.
+        data: payload.
+        stamp: time of arrival by the bus's own clock [s], 0.0 = it has none.
+    """
+
+    can_id: int
+    data: bytes
+    stamp: float
+
+
+Tap = Callable[[Sequence[tuple[int, bytes, float]]], None]  # each like a Frame
+
+
+class Link(Protocol):
+    """Frames out, frames in; what a driver needs of a bus."""
+
+    @property
+    def mode_hints(self) -> int:
+        """Number of times the safety module has said that its mode changed."""
+        ...
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Queue a frame; raises LinkError when the bus refuses it."""
+        ...
+
+    def receive(self) -> list[Frame]:
+        """Return what has arrived, oldest first; never waits."""
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, -1 if there is none."""
+        ...
+
+    def is_readable(self) -> bool:
+        """Return whether `receive` would return something."""
+        ...
+
+    def close(self) -> None:
+        """Give the bus back."""
+        ...
+
+
+def open_bus(interface: str, channel: str, bitrate: int) -> can.BusABC:
+    """Return an open bus of python-can.
+
+    Args:
+        interface: python-can's name of the adapter, such as "socketcan".
+        channel: the adapter's name, such as "can0".
+        bitrate: [bit/s]; a SocketCAN interface has its own and ignores it.
+
+    Raises:
+        LinkError: the adapter is missing, down or unknown to python-can.
+    """
+    bus: can.BusABC | None = None
+    try:
+        bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate)
+        bus.recv(0)  # an interface that is down says so at the first look only
+    except (can.CanError, OSError, ValueError, ImportError) as error:
+        if bus is not None:
+            bus.shutdown()
+        raise _cannot_open(interface, channel, bitrate, error) from error
+    return bus
+
+
+class CanLink:
+    """A python-can bus seen by the driver: sent to, drained, never waited on.
+
+    Frames of hosts (FROM = 0, the own ones included), remote, extended and error
+    frames are dropped. The safety module's broadcast of a change of mode has no known
+    content: it is counted in `mode_hints` and dropped.
+
+    Attributes:
+        mode_hints: broadcasts of the safety module so far.
+        error_frames: error frames of the controller so far.
+        tap: told of every data frame with an 11-bit identifier, sent or received;
+            of all that are found at once together.
+    """
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.tap: Tap | None = None
+        self.mode_hints = 0
+        self.error_frames = 0
+        self._bus = bus
+        self._inbox: list[Frame] = []
+        self._is_open = True
+        try:
+            self._descriptor = bus.fileno()
+        except NotImplementedError:
+            self._descriptor = -1
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Queue a data frame with an 11-bit identifier.
+
+        Raises:
+            LinkError: the bus is down, full or closed.
+        """
+        if not self._is_open:
+            raise LinkError("The CAN bus is closed.", hint="Start again.")
+        # positionally: stamp, identifier, is it an extended one
+        message = can.Message(0.0, can_id, False, data=data)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise _broken(self._bus.channel_info, error) from error
+        if self.tap is not None:
+            self.tap(((can_id, data, 0.0),))
+
+    def receive(self) -> list[Frame]:
+        """Return the device frames that have arrived, oldest first.
+
+        Raises:
+            LinkError: the bus is down.
+        """
+        self._drain()
+        frames, self._inbox = self._inbox, []
+        return frames
+
+    def fileno(self) -> int:
+        """Return the bus's descriptor, -1 if it has none."""
+        return self._descriptor if self._is_open else -1
+
+    def is_readable(self) -> bool:
+        """Return whether a device frame has arrived; a dead bus has none."""
+        if not self._inbox:
+            try:
+                self._drain()
+            except LinkError:
+                return False
+        return bool(self._inbox)
+
+    def close(self) -> None:
+        """Give the bus back; a second call does nothing."""
+        if self._is_open:
+            self._is_open = False
+            self._bus.shutdown()
+
+    def _drain(self) -> None:
+        if not self._is_open:
+            return
+        receive = self._bus.recv
+        found: list[Frame] = []
+        try:
+            for _ in range(_DRAIN_AT_MOST):
+                message = receive(0)
+                if message is None:
+                    break
+                if message.is_error_frame:
+                    self.error_frames += 1
+                elif not (message.is_extended_id or message.is_remote_frame):
+                    data, stamp = bytes(message.data), message.timestamp
+                    found.append(Frame(message.arbitration_id, data, stamp))
+        except (can.CanError, OSError) as error:
+            raise _broken(self._bus.channel_info, error) from error
+        finally:
+            if found:
+                self._sort(found)
+
+    def _sort(self, found: list[Frame]) -> None:
+        """Show frames to the tap and keep those of devices."""
+        if self.tap is not None:
+            self.tap(found)
+        for frame in found:
+            can_id = frame.can_id
+            if can_id == MODE_BROADCAST_ID:
+                self.mode_hints += 1
+            elif can_id & SENDER_MASK:
+                self._inbox.append(frame)
+
+
+def _cannot_open(
+    interface: str, channel: str, bitrate: int, error: Exception
+) -> LinkError:
+    up = f"Fix: ip link set {channel} up type can bitrate {bitrate}. Arm not touched."
+    if interface == "socketcan" and _number_of(error) == errno.ENETDOWN:
+        return LinkError(f"{channel} is down.", hint=up)
+    if interface == "socketcan" and _number_of(error) == errno.ENODEV:
+        return LinkError(
+            f"{channel} does not exist.", hint=f"Is the adapter plugged in? {up}"
+        )
+    return LinkError(
+        f"CAN {interface}:{channel} cannot be opened: {error}.",
+        hint="Check the interface's name, its driver and its cable. Arm not touched.",
+    )
+
+
+def _broken(channel: str, error: Exception) -> LinkError:
+    if _number_of(error) in (errno.ENOBUFS, None) and "full" in str(error).lower():
+        return LinkError(
+            f"CAN {channel}: the send buffer is full.",
+            hint="Nobody acknowledges: is the arm powered, is the bus terminated?",
+        )
+    return LinkError(
+        f"CAN {channel} broke: {error}.",
+        hint="Check the adapter and its cable, then start again.",
+    )
+
+
+def _number_of(error: Exception) -> int | None:
+    """Return the system's error number, which python-can keeps in its own field."""
+    own = getattr(error, "error_code", None)
+    return own if isinstance(own, int) else getattr(error, "errno", None)

@@ -1,0 +1,270 @@
+"""The Barrett WAM as the loop sees it: start-up, positions in, torques out, idle."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from acquisition.clock import Clock
+from acquisition.devices import ArmReading, SafetyMode, Vector
+from acquisition.errors import (
+    DeviceFaultError,
+    LinkError,
+    LinkTimeoutError,
+    PreflightError,
+)
+from wam.bus.frames import MOTOR_NODES
+from wam.bus.link import Link
+from wam.bus.property_client import Dialogue
+from wam.driver.cyclic_io import Companion, CycleTraffic
+from wam.driver.discovery import pucks_do
+from wam.driver.health import PuckHealth
+from wam.driver.joint_estimator import Motion
+from wam.driver.safety_module import SafetyModule
+from wam.driver.settings import ArmSettings
+from wam.driver.startup import ArmInfo, StartUp
+from wam.driver.status_poller import BRAKED
+from wam.driver.transmission import MOTORS, Transmission
+
+_MS = 1_000_000
+_ALL_FRESH = (1 << MOTORS) - 1
+# Pucks without power are silent first; asked in these many incomplete cycles at once,
+# the module says whether it was a stop, even when one question or answer is lost.
+_URGENT_CYCLES = 3
+_IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
+
+
+class WamArm:
+    """A seven-joint WAM on a CAN link, an `acquisition.devices.Arm`.
+
+    Call `start` first; after an E-stop the pucks have lost their positions and `start`
+    is due again.
+
+    Attributes:
+        counters: what was dropped since the driver was made.
+    """
+
+    def __init__(
+        self, link: Link, clock: Clock, settings: ArmSettings | None = None
+    ) -> None:
+        self._link = link
+        self._clock = clock
+        self._settings = settings or ArmSettings()
+        self._traffic = CycleTraffic(link, clock, self._settings)
+        self._watch = self._traffic.watch
+        self.counters = self._traffic.counters
+        self._dialogue = Dialogue(link, clock)
+        self._safety = SafetyModule(self._dialogue, clock, vers=0)
+        self._motion: Motion | None = None
+        self._missing_cycles = 0
+        self._is_commanded = True
+        self._is_closed = False
+
+    @property
+    def transmission(self) -> Transmission:
+        """The transmission with the constants read from the pucks."""
+        return self._started().transmission
+
+    @property
+    def sent_ns(self) -> int:
+        """When torques were last handed to the bus [monotonic ns], 0 = never."""
+        return self._traffic.sent_ns
+
+    @property
+    def safety(self) -> SafetyModule:
+        """The safety module, for use outside the loop."""
+        return self._safety
+
+    def accompany(self, companion: Companion) -> None:
+        """Ask a device on the arm's bus along with the positions from now on."""
+        self._traffic.companion = companion
+
+    def start(self) -> ArmInfo:
+        """Find, wake and question the pucks; the arm can be read afterwards.
+
+        Raises:
+            PreflightError: a puck or the safety module is missing, in E-stop, asleep
+                for good, or of another kind.
+            DeviceFaultError: a device reports an error or nonsense.
+            LinkTimeoutError: a device stopped answering on the way.
+            LinkError: the bus is down.
+        """
+        info = StartUp(self._dialogue, self._clock, self._settings).run()
+        self._safety = SafetyModule(self._dialogue, self._clock, info.safety_vers)
+        self._watch.set_firmware(info.safety_vers)
+        self._watch.note_mode(info.safety_mode)
+        self._watch.is_lowering = False
+        self._watch.note_pendant(info.pendant)
+        health = [puck.health for puck in info.pucks]
+        self._watch.health.begin(health, self._clock.now_ns())
+        self._traffic.set_firmware(info.pucks[0].vers)
+        transmission = Transmission(
+            self._settings.j2mp,
+            tuple(puck.cts for puck in info.pucks),
+            tuple(puck.ipnm for puck in info.pucks),
+            self._settings.torque_limits,
+        )
+        self._motion = Motion(transmission, self._settings)
+        self._begin_at_rest()
+        pucks = tuple(
+            replace(puck, health=dated)
+            for puck, dated in zip(info.pucks, self.health(), strict=True)
+        )
+        return replace(info, pucks=pucks, late_replies=self._dialogue.late_replies)
+
+    def read(self, now_ns: int) -> ArmReading:
+        """Ask for the joint positions at `now_ns` and return them.
+
+        Never raises for missing replies and waits until `give_up_ns` at most. Missing
+        joints go on at their last velocity, and stand still after 50 ms of silence.
+        """
+        motion = self._motion or self._started()
+        traffic = self._traffic
+        traffic.exchange(now_ns)
+        fresh = motion.update(now_ns, traffic.received)
+        arrived = MOTORS - traffic.received.count(None)
+        self.counters.rejected += arrived - fresh.bit_count()
+        is_complete = fresh == _ALL_FRESH
+        self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
+        if not (is_complete and self._is_commanded):
+            # No torque frame may follow to carry the question.
+            is_urgent = 0 < self._missing_cycles <= _URGENT_CYCLES
+            traffic.ask(is_urgent=is_urgent)
+        self._is_commanded = False
+        return ArmReading(
+            host_ns=now_ns,
+            arm_ns=traffic.arm_ns,
+            counts=list(motion.counts),
+            q=motion.q,
+            qd=motion.qd,
+            qd7_raw=motion.qd7_raw,
+            fresh=fresh,
+            is_complete=is_complete,
+            missing_cycles=self._missing_cycles,
+        )
+
+    def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
+        """Send joint torques [N m] and return them as sent: clipped, rounded.
+
+        When the bus refuses a frame, its motors keep their last torque and so does the
+        answer; see `counters.link_errors`.
+
+        Raises:
+            DeviceFaultError: a torque is not a number, or `start` was not called.
+        """
+        transmission = (self._motion or self._started()).transmission
+        command = transmission.command(tau, tau_gravity)
+        is_sent = self._traffic.transmit(command.units)
+        self._traffic.ask()
+        self._is_commanded = True
+        return command.tau if is_sent else transmission.tau(self._traffic.sent)
+
+    def safety_mode(self) -> SafetyMode:
+        """Return the last known mode; UNKNOWN when the module stopped answering."""
+        return self._watch.mode
+
+    def safety_warnings(self) -> tuple[str, ...]:
+        """Return the monitors of the safety module that warn, as last heard."""
+        return self._watch.warnings
+
+    def safety_faults(self) -> tuple[str, ...]:
+        """Return the monitors of the safety module in fault, as last heard."""
+        return self._watch.faults
+
+    @property
+    def is_bus_down(self) -> bool:
+        """Whether the bus refused the last question for positions."""
+        return self._traffic.is_down
+
+    def health(self) -> tuple[PuckHealth, ...]:
+        """Return what pucks 1 to 7 said last, and when; does not wait."""
+        return tuple(self._watch.health.pucks)
+
+    def idle(self) -> bool:
+        """Brake the arm: module to IDLE, confirmed, then zero torque.
+
+        Zero torque while ACTIVE would be free fall, so without the confirmation none
+        is sent; the heartbeat then stops the arm within 0.1 s of the last reading.
+        Never raises. Returns whether the module confirmed.
+        """
+        if self._is_closed:
+            return self._watch.mode in BRAKED
+        self._watch.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
+        if self._watch.mode not in BRAKED:
+            self._watch.is_lowering = True
+            return False
+        self._traffic.transmit([0] * MOTORS)
+        self._look_at_pendant()
+        return True
+
+    def close(self) -> None:
+        """Brake the arm and give the bus back; a second call does nothing."""
+        if not self._is_closed:
+            self.idle()
+            self._is_closed = True
+            self._link.close()
+
+    def define_position(self, q: Vector) -> None:
+        """Tell the pucks that the joints stand at `q` [rad], shape (7,); IDLE only.
+
+        Raises:
+            PreflightError: the safety module is not IDLE.
+            DeviceFaultError: pucks or module do not take it.
+            LinkError: the bus is down or a puck silent.
+        """
+        motion = self._started()
+        mode = self._safety.mode()
+        if mode is not SafetyMode.IDLE:
+            raise PreflightError(
+                f"Positions can be defined in IDLE only; the arm is {mode.name}.",
+                hint="Press Shift-idle first.",
+            )
+        counts = motion.transmission.counts(q)
+        self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)
+        for node, value in zip(MOTOR_NODES, counts, strict=True):
+            self._dialogue.tell(node, self._traffic.p_number, value)
+            self._dialogue.pause(_MS)
+        # The module must see the new positions while it still ignores speed.
+        self._begin_at_rest()
+        self._check_taken(counts, motion.counts)
+        self._safety.mark_zeroed()
+
+    def _look_at_pendant(self) -> None:
+        """Learn why the arm is idle; without an answer the last one stands."""
+        if self._motion is None:
+            return
+        try:
+            self._watch.note_pendant(self._safety.pendant())
+        except LinkError:
+            self.counters.link_errors += 1
+        except DeviceFaultError:
+            self.counters.malformed += 1
+
+    def _check_taken(self, wanted: Sequence[int], found: Sequence[int]) -> None:
+        worst = max(abs(w - f) for w, f in zip(wanted, found, strict=True))
+        if worst > self._settings.jump_counts:
+            raise DeviceFaultError(
+                f"The pucks report {list(found)} counts, told were {list(wanted)}.",
+                hint="The arm must not move while it is zeroed. Zero it again.",
+            )
+
+    def _started(self) -> Motion:
+        if self._motion is None:
+            raise DeviceFaultError(
+                "The arm was not started.", hint="This is an error of the program."
+            )
+        return self._motion
+
+    def _begin_at_rest(self) -> None:
+        """Take the positions as they are, with velocity zero."""
+        for _ in range(3):
+            now_ns = self._clock.now_ns()
+            self._traffic.exchange(now_ns)
+            counts = [c for c in self._traffic.received if c is not None]
+            if len(counts) == MOTORS:
+                self._started().begin(now_ns, counts)
+                self._missing_cycles = 0
+                return
+        silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
+        raise LinkTimeoutError(
+            f"{pucks_do(silent)} not report a position.",
+            hint="Check the cable, or a puck in reset.",
+        )

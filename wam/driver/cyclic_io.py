@@ -1,0 +1,211 @@
+"""The frames of one cycle: positions asked for, torques sent, devices watched.
+
+Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
+"""
+
+from dataclasses import dataclass, field
+from typing import Final, Protocol
+
+from acquisition.clock import Clock
+from acquisition.errors import DeviceFaultError, LinkError
+from wam.bus.frames import (
+    MOTOR_NODES,
+    Group,
+    Payload,
+    decode_position,
+    encode_get,
+    encode_torques,
+    group_id,
+    position_reply_id,
+)
+from wam.bus.link import Link
+from wam.bus.properties import MODERN, Device, property_number
+from wam.driver.settings import ArmSettings
+from wam.driver.status_poller import Watch
+from wam.driver.transmission import MOTORS
+
+_ARM_ID = group_id(Group.ARM)
+_LOWER_ID, _WRIST_ID = group_id(Group.LOWER_TORQUE), group_id(Group.WRIST_TORQUE)
+_POSITION_INDEX: Final = {position_reply_id(n): n - 1 for n in MOTOR_NODES}
+
+
+@dataclass(slots=True)
+class LinkCounters:
+    """What the loop dropped on its way, counted instead of logged.
+
+    Attributes:
+        missing: questions for its position that each of motors 1 to 7 left open.
+        stale: position replies that came after their cycle, or twice.
+        rejected: positions that jumped.
+        malformed: frames that contradict the protocol.
+        link_errors: times the bus refused.
+    """
+
+    missing: list[int] = field(default_factory=lambda: [0] * MOTORS)
+    stale: int = 0
+    rejected: int = 0
+    malformed: int = 0
+    link_errors: int = 0
+
+    def text(self) -> str:
+        """Return the counters in one line."""
+        return ", ".join(f"{name} {value}" for name, value in self.facts().items())
+
+    def facts(self) -> dict[str, str]:
+        """Return the counters as text for a recording, motors 1 to 7 in one line."""
+        return {
+            "link:missing_replies": " ".join(map(str, self.missing)),
+            "link:late_replies": str(self.stale),
+            "link:rejected_jumps": str(self.rejected),
+            "link:malformed_frames": str(self.malformed),
+            "link:bus_errors": str(self.link_errors),
+        }
+
+
+class Companion(Protocol):
+    """A device that is asked along with the positions, such as a wrist sensor.
+
+    The loop never waits for it: its frames are heard when they have come, in this cycle
+    or in a later one.
+    """
+
+    def request(self, t_ns: int) -> tuple[int, bytes]:
+        """Return identifier and bytes of the question that leaves at `t_ns`."""
+        ...
+
+    def hear(self, can_id: int, data: Payload) -> None:
+        """Take a frame that is no position, of whatever device; never raises."""
+        ...
+
+
+class CycleTraffic:
+    """What host and arm say to each other while the loop runs; never raises.
+
+    Attributes:
+        received: positions of this cycle [counts], motors 1 to 7, None = no reply.
+        arm_ns: when the last of them arrived [ns], 0 = none did.
+        sent: torques that the bus took last [puck units], motors 1 to 7.
+        sent_ns: when it took them [ns], 0 = never.
+        watch: safety module and pucks, asked in the free bus time.
+        p_number: number of the property that holds a puck's position.
+        companion: asked right after the positions, while the pucks latch theirs.
+        counters: what was dropped so far.
+        is_down: the bus refused the last question for positions.
+    """
+
+    def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
+        self.received: list[int | None] = [None] * MOTORS
+        self.arm_ns = 0
+        self.sent = [0] * MOTORS
+        self.sent_ns = 0
+        self.watch = Watch(link, settings)
+        self.companion: Companion | None = None
+        self.counters = LinkCounters()
+        self.is_down = False
+        self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
+        self._link = link
+        self._clock = clock
+        self._settings = settings
+        self.set_firmware(MODERN)
+
+    def set_firmware(self, vers: int) -> None:
+        """Use the property numbers of puck firmware `vers`."""
+        self.p_number = property_number(Device.MOTOR, "P", vers)
+        self._get_p = encode_get(self.p_number)
+        self._t_number = property_number(Device.MOTOR, "T", vers)
+
+    def exchange(self, now_ns: int) -> None:
+        """Ask for all positions at `now_ns`; waits until `give_up_ns` at most.
+
+        Replies carry no number. What has come by now is late and thrown away. A motor
+        that owes an earlier answer is given the time to send two: the last one counts.
+        """
+        self.watch.begin_cycle(now_ns)
+        self.arm_ns = 0
+        self.received = [None] * MOTORS
+        try:
+            self.counters.stale += self._collect()
+            if self._owed:
+                self._owed &= self._missing()
+            self.received = [None] * MOTORS
+            self._link.send(_ARM_ID, self._get_p)
+            self._ask_companion()
+            self._await_replies(now_ns)
+            self.is_down = False
+        except LinkError:
+            self.is_down = True
+            self.counters.link_errors += 1
+        self._owed = self._missing()
+        if self._owed:
+            for i in range(MOTORS):
+                self.counters.missing[i] += self._owed >> i & 1
+
+    def transmit(self, units: list[int]) -> bool:
+        """Send torques [puck units]; return False when the bus refused a frame."""
+        try:
+            self._link.send(_LOWER_ID, encode_torques(units[:4], self._t_number))
+            self.sent[:4] = units[:4]
+            self._link.send(_WRIST_ID, encode_torques(units[4:], self._t_number))
+            self.sent[4:] = units[4:]
+            self.sent_ns = self._clock.now_ns()
+        except LinkError:
+            self.counters.link_errors += 1
+            return False
+        return True
+
+    def ask(self, *, is_urgent: bool = False) -> None:
+        """Use the free bus time for the question that is due; see `Watch.ask`."""
+        try:
+            self.watch.ask(is_urgent=is_urgent)
+        except LinkError:
+            self.counters.link_errors += 1
+
+    def _ask_companion(self) -> None:
+        """Send the companion's question; a refusal does not cost the positions."""
+        if self.companion is None:
+            return
+        can_id, data = self.companion.request(self._clock.now_ns())
+        try:
+            self._link.send(can_id, data)
+        except LinkError:
+            self.counters.link_errors += 1
+
+    def _await_replies(self, now_ns: int) -> None:
+        clock, deadline_ns = self._clock, now_ns + self._settings.give_up_ns
+        clock.sleep_until(now_ns + self._settings.first_look_ns)
+        found = self._collect()
+        if found:
+            self.arm_ns = clock.now_ns()
+        while (None in self.received or self._owed) and clock.now_ns() < deadline_ns:
+            if not clock.wait(self._link, deadline_ns):
+                break
+            if more := self._collect():
+                found += more
+                self.arm_ns = clock.now_ns()
+        self.counters.stale += found - MOTORS + self.received.count(None)
+
+    def _missing(self) -> int:
+        """Return the bits of the motors whose reply has not come."""
+        if None not in self.received:
+            return 0
+        return sum(1 << i for i, c in enumerate(self.received) if c is None)
+
+    def _collect(self) -> int:
+        """Sort what has arrived and return how many positions there were."""
+        found, received = 0, self.received
+        for can_id, data, _ in self._link.receive():
+            index = _POSITION_INDEX.get(can_id)
+            try:
+                if index is not None:
+                    counts = decode_position(data)
+                    if received[index] is not None:
+                        self._owed &= ~(1 << index)
+                    received[index] = counts
+                    found += 1
+                else:
+                    if self.companion is not None:
+                        self.companion.hear(can_id, data)
+                    self.watch.hear(can_id, data)
+            except DeviceFaultError:
+                self.counters.malformed += 1
+        return found

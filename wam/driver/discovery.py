@@ -1,0 +1,108 @@
+"""Who is on the arm's bus: every device is called, and those that are late again."""
+
+from collections.abc import Iterable, Sequence
+
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import DeviceFaultError, PreflightError
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
+from wam.bus.properties import Stat
+from wam.bus.property_client import Dialogue
+from wam.driver.safety_module import SafetyModule
+
+_STAT = 5  # the same in every firmware
+_MS = 1_000_000
+_EXPECTED = (*MOTOR_NODES, SAFETY_NODE)
+# A puck in reset is silent for up to 2 s; a second look comes after the time to boot.
+_SECOND_LOOKS = 2
+_SECOND_LOOK_NS = 50 * _MS  # it waits as long as for a puck that was woken
+_WRIST_NODES = [5, 6, 7]
+
+
+def call_roll(dialogue: Dialogue, clock: Clock, boot_ns: int) -> dict[int, int]:
+    """Return STAT by node of everything on the bus, the arm being complete.
+
+    Healthy devices answer within 1 ms. If one of the arm is silent, the bus is left
+    alone for `boot_ns` [ns], since it may be booting, and then it is asked again, twice
+    at most.
+
+    Raises:
+        PreflightError: a puck or the safety module is silent, or the arm is in E-stop.
+        DeviceFaultError: a puck says that it does not work.
+        LinkError: the bus is down.
+    """
+    stats = _ask(dialogue, range(1, 32), _MS)
+    mode = _mode(dialogue, clock, stats)
+    for _ in range(_SECOND_LOOKS):
+        silent = [node for node in _EXPECTED if node not in stats]
+        if not silent or mode is SafetyMode.E_STOP:  # without power nobody answers
+            break
+        dialogue.pause(boot_ns)
+        stats.update(_ask(dialogue, silent, _SECOND_LOOK_NS))
+        mode = _mode(dialogue, clock, stats)
+    _check_present(stats, mode)
+    return dict(sorted(stats.items()))
+
+
+def pucks_do(nodes: Sequence[int]) -> str:
+    """Return "Puck 5 does" or "Pucks 5,6 do"."""
+    names = ",".join(map(str, nodes))
+    return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"
+
+
+def _ask(dialogue: Dialogue, nodes: Iterable[int], within_ns: int) -> dict[int, int]:
+    """Return STAT by node of those of `nodes` that answer in time."""
+    found: dict[int, int] = {}
+    for node in nodes:
+        stat = dialogue.ask(node, _STAT, within_ns)
+        if stat is not None:
+            found[node] = stat
+    return found
+
+
+def _mode(dialogue: Dialogue, clock: Clock, stats: dict[int, int]) -> SafetyMode:
+    """Return the safety module's mode, UNKNOWN while it is silent."""
+    if SAFETY_NODE not in stats:
+        return SafetyMode.UNKNOWN
+    return SafetyModule(dialogue, clock, vers=0).mode()
+
+
+def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
+    """Raise PreflightError or DeviceFaultError unless seven healthy pucks answer."""
+    present = [node for node in MOTOR_NODES if node in stats]
+    missing = [node for node in MOTOR_NODES if node not in stats]
+    if SAFETY_NODE not in stats:
+        raise _without_safety(stats, missing)
+    if missing and mode is SafetyMode.E_STOP:
+        raise PreflightError(
+            "The arm is in E-stop: its pucks have no power.",
+            hint="Release the stop, press Shift-idle, then start again.",
+        )
+    if missing:
+        others = f"{','.join(map(str, present))} do" if present else "none does"
+        hint = "Check its cable or a puck in reset."
+        if missing == _WRIST_NODES:
+            hint = (
+                "Is this a four-joint WAM? Traction needs the wrist. Otherwise check "
+                "the cable behind puck 4."
+            )
+        raise PreflightError(f"{pucks_do(missing)} not answer ({others}).", hint=hint)
+    ill = [n for n in present if stats[n] not in (Stat.RESET, Stat.READY)]
+    if ill:
+        raise DeviceFaultError(
+            f"{pucks_do(ill)} not work: STAT {stats[ill[0]]}.",
+            hint="Switch the arm off and on, then start again.",
+        )
+
+
+def _without_safety(stats: dict[int, int], missing: list[int]) -> PreflightError:
+    """Return the error that names everything that is silent at once."""
+    others = ",".join(map(str, stats)) or "nobody"
+    who = "The safety module does"
+    if missing and stats:
+        names = ",".join(map(str, missing))
+        who = f"The safety module and puck{'s' * (len(missing) > 1)} {names} do"
+    return PreflightError(
+        f"{who} not answer ({others} on the bus).",
+        hint="Check the arm's power, the CAN cable and its terminators.",
+    )

@@ -1,0 +1,148 @@
+"""How the motor pucks feel: temperatures, bus voltage, last error, and since when."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+from acquisition.clock import NS_PER_S
+from wam.bus.frames import MOTOR_NODES, Property
+from wam.bus.properties import Device, property_number
+
+# The loop asks each puck something every 0.7 s; four questions without an answer and
+# what it said before is no longer news.
+NEWS_NS = 3 * NS_PER_S
+HOT = 60  # where a puck by its own default (OTEMP) is too hot [degrees Celsius]
+
+
+@dataclass(frozen=True, slots=True)
+class PuckHealth:
+    """What one puck said last, and when; None = it never answered.
+
+    Attributes:
+        puck_degc: temperature of the puck (TEMP) [degrees Celsius].
+        motor_degc: temperature of its motor (THERM) [degrees Celsius].
+        bus_voltage: voltage of the power bus (VBUS) [V].
+        error: its last error (ERROR), 0 = none.
+        heard_ns: monotonic time of its last answer [ns].
+    """
+
+    puck_degc: int | None = None
+    motor_degc: int | None = None
+    bus_voltage: int | None = None
+    error: int | None = None
+    heard_ns: int | None = None
+
+    def is_news(self, now_ns: int) -> bool:
+        """Return whether the puck has answered lately."""
+        return self.heard_ns is not None and now_ns - self.heard_ns <= NEWS_NS
+
+
+# The numbers up to 41 are the same in every firmware that can be driven.
+_FIELDS: Final = {
+    property_number(Device.MOTOR, name): field
+    for name, field in (
+        ("TEMP", "puck_degc"),
+        ("THERM", "motor_degc"),
+        ("VBUS", "bus_voltage"),
+        ("ERROR", "error"),
+    )
+}
+_QUESTIONS = tuple((node, number) for number in _FIELDS for node in MOTOR_NODES)
+
+
+def ask_health(ask: Callable[[int], int | None]) -> PuckHealth:
+    """Return what a puck says when `ask(number)` puts each question to it.
+
+    When that was is for the caller to know: see `HealthTable.begin`.
+    """
+    answers = {field: ask(number) for number, field in _FIELDS.items()}
+    return PuckHealth(**answers)
+
+
+class HealthTable:
+    """The newest answers of all pucks, and the question that comes next.
+
+    Attributes:
+        pucks: health of pucks 1 to 7.
+    """
+
+    def __init__(self) -> None:
+        self.pucks: list[PuckHealth] = [PuckHealth() for _ in MOTOR_NODES]
+        self._next = 0
+
+    def next_question(self) -> tuple[int, int]:
+        """Return (node, property number); all 28 come in turn."""
+        question = _QUESTIONS[self._next]
+        self._next = (self._next + 1) % len(_QUESTIONS)
+        return question
+
+    def begin(self, pucks: Sequence[PuckHealth], now_ns: int) -> None:
+        """Take what pucks 1 to 7 have answered by `now_ns`, at start-up."""
+        self.pucks[:] = [
+            replace(puck, heard_ns=now_ns if puck != PuckHealth() else None)
+            for puck in pucks
+        ]
+
+    def note(self, node: int, reply: Property, now_ns: int) -> None:
+        """Take the answer of puck `node`; other properties than these are ignored."""
+        field = _FIELDS.get(reply.number)
+        if field is not None:
+            old = self.pucks[node - 1]
+            self.pucks[node - 1] = replace(old, heard_ns=now_ns, **{field: reply.value})
+
+
+def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
+    """Return the coldest and hottest of pucks and motors, such as "31-36 °C".
+
+    Pucks that have not answered lately do not count and are named with their age.
+    """
+    found = [
+        degc
+        for puck in pucks
+        for degc in (puck.puck_degc, puck.motor_degc)
+        if degc is not None and puck.is_news(now_ns)
+    ]
+    known = f"{min(found)}-{max(found)} °C" if found else "temperatures unknown"
+    silent = [
+        f"puck {node} silent for {(now_ns - puck.heard_ns) / NS_PER_S:.0f} s"
+        for node, puck in enumerate(pucks, 1)
+        if puck.heard_ns is not None and not puck.is_news(now_ns)
+    ]
+    return ", ".join([known, *silent])
+
+
+def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
+    """Return what pucks 1 to 7 complain of, such as "puck 3 at 72 °C (limit 60)"."""
+    found: list[str] = []
+    for node, puck in enumerate(pucks, 1):
+        if not puck.is_news(now_ns):
+            continue
+        if puck.puck_degc is not None and puck.puck_degc > HOT:
+            found.append(f"puck {node} at {puck.puck_degc} °C (limit {HOT})")
+        if puck.error:
+            found.append(f"puck {node} reports error {puck.error}")
+    return found
+
+
+def health_facts(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
+    """Return the answers as text for a recording, pucks 1 to 7 in each line.
+
+    "?" stands for what was never said, or not lately; the age [s] is of the last
+    answer.
+    """
+    ages = [
+        "?" if p.heard_ns is None else f"{(now_ns - p.heard_ns) / NS_PER_S:.1f}"
+        for p in pucks
+    ]
+    pucks = [p if p.is_news(now_ns) else PuckHealth() for p in pucks]
+
+    def row(values: Sequence[int | None]) -> str:
+        return " ".join("?" if value is None else str(value) for value in values)
+
+    return {
+        "pucks:age_s": " ".join(ages),
+        "pucks:temperature_degc": row([p.puck_degc for p in pucks]),
+        "pucks:motor_temperature_degc": row([p.motor_degc for p in pucks]),
+        "pucks:bus_voltage": row([p.bus_voltage for p in pucks]),
+        "pucks:error": row([p.error for p in pucks]),
+    }

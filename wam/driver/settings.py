@@ -1,0 +1,44 @@
+"""What the arm's driver is told: transmission, limits and the timing of its cycle."""
+
+from dataclasses import dataclass, field
+
+from wam.driver.safety_limits import SafetyLimits
+from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix, coupled_ratios
+
+_MS = 1_000_000
+
+
+def _wam_j2mp() -> Matrix:
+    return coupled_ratios((42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmSettings:
+    """What the driver is told about the arm and the cycle.
+
+    Attributes:
+        j2mp: motor angles from joint angles, shape (7, 7).
+        torque_limits: largest torque the host sends to each motor [puck units].
+        velocity_pole: corner of the velocity filter [rad/s].
+        first_look_ns: from request to the first look at the bus [ns].
+        give_up_ns: from request to the end of waiting for replies [ns].
+        jump_counts: a motor cannot move further in a cycle [counts].
+        safety_poll_cycles: cycles between questions for the safety mode, and between
+            those for the pendant's word.
+        health_poll_cycles: cycles between questions for the health of a puck.
+        safety_limits: what the safety module is told to tolerate.
+        boot_ns: silence while pucks boot [ns].
+        idle_ns: longest wait for the safety module to confirm IDLE [ns].
+    """
+
+    j2mp: Matrix = field(default_factory=_wam_j2mp)
+    torque_limits: tuple[int, ...] = HOST_TORQUE_LIMITS
+    velocity_pole: float = 180.0
+    first_look_ns: int = 700_000
+    give_up_ns: int = 1_500_000
+    jump_counts: int = 1000
+    safety_poll_cycles: int = 25
+    health_poll_cycles: int = 50
+    safety_limits: SafetyLimits = field(default_factory=SafetyLimits)
+    boot_ns: int = 1_000 * _MS
+    idle_ns: int = 100 * _MS

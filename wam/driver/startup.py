@@ -1,0 +1,188 @@
+"""The start-up of a WAM: who is on the bus, is it healthy, is it the right arm."""
+
+from dataclasses import dataclass
+
+from acquisition.clock import Clock
+from acquisition.devices import SafetyMode
+from acquisition.errors import DeviceFaultError, PreflightError
+from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, Group
+from wam.bus.properties import (
+    MAGNETIC_ENCODER,
+    MODERN,
+    OLDEST_DRIVEN,
+    POLES_OF_GIMBALS,
+    POLES_OF_WRIST,
+    Device,
+    PuckMode,
+    Stat,
+    device_of,
+    property_number,
+)
+from wam.bus.property_client import Dialogue
+from wam.driver.discovery import call_roll, pucks_do
+from wam.driver.health import PuckHealth, ask_health
+from wam.driver.safety_module import PendantWord, SafetyModule
+from wam.driver.settings import ArmSettings
+
+_VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
+_MS = 1_000_000
+_ABSOLUTE_SINCE = 118  # firmware from which MECH can be believed
+
+
+@dataclass(frozen=True, slots=True)
+class PuckInfo:
+    """What one motor puck said about itself at start-up.
+
+    Attributes:
+        node: puck number, 1 to 7.
+        vers: firmware revision.
+        role: type in the low five bits, options above.
+        cts: encoder counts per motor turn.
+        ipnm: torque units per N m at the motor.
+        mech: absolute angle of the motor within its turn, 0..cts-1 [counts]; None =
+            it has no encoder that knows.
+        was_asleep: the puck had to be woken.
+        health: temperatures, voltage and error.
+    """
+
+    node: int
+    vers: int
+    role: int
+    cts: int
+    ipnm: int
+    mech: int | None
+    was_asleep: bool
+    health: PuckHealth
+
+
+@dataclass(frozen=True, slots=True)
+class ArmInfo:
+    """The arm as found at start-up.
+
+    Attributes:
+        pucks: the seven motor pucks.
+        nodes: every node that answered.
+        safety_vers: firmware of the safety module.
+        safety_mode: its mode at the end of start-up.
+        pendant: what the pendant shows.
+        is_zeroed: positions have been defined since power-up.
+        late_replies: replies that came after their question was given up.
+    """
+
+    pucks: tuple[PuckInfo, ...]
+    nodes: tuple[int, ...]
+    safety_vers: int
+    safety_mode: SafetyMode
+    pendant: PendantWord
+    is_zeroed: bool
+    late_replies: int
+
+
+class StartUp:
+    """The questions to a WAM before it is driven.
+
+    It follows libbarrett's start-up, without its waits for a person.
+    """
+
+    def __init__(self, dialogue: Dialogue, clock: Clock, settings: ArmSettings) -> None:
+        self._dialogue = dialogue
+        self._clock = clock
+        self._boot_ns = settings.boot_ns
+        self._limits = settings.safety_limits
+
+    def run(self) -> ArmInfo:
+        """Return what is there, awake and idle.
+
+        Raises:
+            PreflightError: a puck or the safety module is missing, in E-stop, asleep
+                for good, or of another kind.
+            DeviceFaultError: a device reports an error or nonsense.
+            LinkTimeoutError: a device stopped answering on the way.
+            LinkError: the bus is down.
+        """
+        stats = call_roll(self._dialogue, self._clock, self._boot_ns)
+        safety_vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
+        _check_firmware("The safety module", safety_vers, MODERN)
+        safety = SafetyModule(self._dialogue, self._clock, safety_vers)
+        mode = safety.mode()
+        safety.set_limits(self._limits)
+        asleep = [node for node, stat in stats.items() if stat == Stat.RESET]
+        self._wake(asleep)
+        pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
+        self._check_wrist(pucks[-1])
+        if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
+            safety.forget_zero()  # one puck restarted alone: it has lost its position
+        if mode is not SafetyMode.ACTIVE:
+            self._dialogue.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
+        return ArmInfo(
+            pucks=pucks,
+            nodes=tuple(stats),
+            safety_vers=safety_vers,
+            safety_mode=safety.mode(),
+            pendant=safety.pendant(),
+            is_zeroed=safety.is_zeroed(),
+            late_replies=self._dialogue.late_replies,
+        )
+
+    def _wake(self, asleep: list[int]) -> None:
+        """Wake nodes, keep silent while they boot, and see that they are there.
+
+        A transceiver that comes up while others talk can push a host off the bus.
+        """
+        if not asleep:
+            return
+        for node in asleep:
+            self._dialogue.tell(node, _STAT, Stat.READY)
+            self._dialogue.pause(10 * _MS)
+        self._dialogue.pause(self._boot_ns)
+        stats = {node: self._dialogue.ask(node, _STAT) for node in asleep}
+        dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != Stat.READY]
+        if dozing:
+            raise PreflightError(
+                f"{pucks_do(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
+                hint="Switch the arm off and on, then start again.",
+            )
+
+    def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
+        # Asleep, VERS is the monitor's; only now does it select the right table.
+        vers = self._dialogue.require(node, _VERS, "VERS")
+        _check_firmware(f"Puck {node}", vers, OLDEST_DRIVEN)
+        role = self._dialogue.require(node, _ROLE, "ROLE")
+        if device_of(role) is not Device.MOTOR:
+            raise PreflightError(
+                f"Node {node} is not a motor puck (ROLE {role:#06x}).",
+                hint="Is this a seven-joint WAM?",
+            )
+        cts, ipnm = self._get(node, "CTS", vers), self._get(node, "IPNM", vers)
+        if cts <= 0 or ipnm <= 0:
+            raise DeviceFaultError(
+                f"Puck {node} reports CTS {cts}, IPNM {ipnm}; both must be positive.",
+                hint="The puck has lost its configuration; see Barrett's manual.",
+            )
+        mech = None
+        if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
+            mech = self._get(node, "MECH", vers)
+        health = ask_health(lambda number: self._dialogue.ask(node, number))
+        return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
+
+    def _check_wrist(self, puck: PuckInfo) -> None:
+        poles = self._get(puck.node, "POLES", puck.vers)
+        if poles != POLES_OF_WRIST:
+            kind = "gimbals" if poles == POLES_OF_GIMBALS else "something unknown"
+            raise PreflightError(
+                f"Puck 7 has {poles} poles: {kind}, a wrist has {POLES_OF_WRIST}.",
+                hint="Traction drives the seven-joint WAM with wrist only.",
+            )
+
+    def _get(self, node: int, name: str, vers: int) -> int:
+        number = property_number(Device.MOTOR, name, vers)
+        return self._dialogue.require(node, number, name)
+
+
+def _check_firmware(who: str, found: int, needed: int) -> None:
+    """Raise DeviceFaultError for firmware whose properties have other numbers."""
+    if found < needed:
+        raise DeviceFaultError(
+            f"{who} has firmware {found}; {needed} or later is needed.",
+            hint="Ask Barrett for newer firmware.",
+        )

@@ -1,0 +1,181 @@
+# pyright: basic, reportMissingImports=false
+"""The arm as a Pinocchio model: pose, Jacobian, gravity, mass matrix.
+
+Standard (distal) Denavit-Hartenberg: T_i = Rz(q_i) Tz(d_i) Tx(a_i) Rx(alpha_i). The
+rotation comes first, so the constant part S_i of joint i is the placement of joint
+i + 1, and link i, given in its distal frame, is attached at S_i.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wam.model.constants import GRAVITY, ArmConstants, Array, Body
+from wam.model.tool import Tool
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+@dataclass(frozen=True, slots=True)
+class FootPath:
+    """The sole along a recording, in the base frame.
+
+    Attributes:
+        position: centre of the sole [m], shape (n, 3).
+        rotation: foot to base, shape (n, 3, 3).
+    """
+
+    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]
+
+
+def _constant_part(constants: ArmConstants, joint: int) -> "pin.SE3":
+    """Return S_i = Tz(d) Tx(a) Rx(alpha) of joint `joint` (0-6)."""
+    alpha = constants.alpha[joint]
+    c, s = np.cos(alpha), np.sin(alpha)
+    rotation = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    translation = np.array([constants.a[joint], 0.0, constants.d[joint]])
+    return pin.SE3(rotation, translation)
+
+
+def _inertia(body: Body) -> "pin.Inertia":
+    return pin.Inertia(body.mass, body.com, body.inertia)
+
+
+def build_pinocchio(
+    constants: ArmConstants, bodies: tuple[Body, ...] = ()
+) -> "pin.Model":
+    """Return a Pinocchio model with `bodies` (in frame 7) on the tool plate."""
+    model = pin.Model()
+    model.name = "wam7"
+    parent = 0
+    for joint in range(7):
+        placement = pin.SE3.Identity()
+        if joint > 0:
+            placement = _constant_part(constants, joint - 1)
+        parent = model.addJoint(
+            parent, pin.JointModelRZ(), placement, f"wam_j{joint + 1}"
+        )
+        offset = _constant_part(constants, joint)
+        link = offset.act(_inertia(constants.links[joint]))
+        model.appendBodyToJoint(parent, link, pin.SE3.Identity())
+    plate = _constant_part(constants, 6)
+    for body in bodies:
+        model.appendBodyToJoint(parent, plate.act(_inertia(body)), pin.SE3.Identity())
+    model.gravity.linear = np.array([0.0, 0.0, -GRAVITY])
+    model.lowerPositionLimit = constants.q_lower
+    model.upperPositionLimit = constants.q_upper
+    return model
+
+
+def add_point(
+    model: "pin.Model", constants: ArmConstants, name: str, point: Array
+) -> int:
+    """Add a frame at `point` [m] of frame 7, axes of frame 7; return its index."""
+    placement = _constant_part(constants, 6) * pin.SE3(np.eye(3), point)
+    return model.addFrame(pin.Frame(name, 7, 0, placement, pin.FrameType.OP_FRAME))
+
+
+def drive_inertia_matrix(constants: ArmConstants) -> Array:
+    """Return j2mp^T diag(rotor inertia) j2mp [kg m^2], shape (7, 7)."""
+    j2mp = constants.j2mp
+    return j2mp.T @ np.diag(constants.drive_inertia) @ j2mp
+
+
+class ArmModel:
+    """Kinematics and dynamics of the arm with its tool.
+
+    All results are in the base frame: origin where the axes of joints 1 and 2 cross,
+    z up. Arrays that are returned are new; nothing is shared between calls.
+    """
+
+    def __init__(self, constants: ArmConstants, tool: Tool | None = None) -> None:
+        bodies = (tool.sensor, tool.foot) if tool else ()
+        self.constants = constants
+        self.tool = tool
+        self._model = build_pinocchio(constants, bodies)
+        zero = np.zeros(3)
+        self._plate = add_point(self._model, constants, "tool_plate", zero)
+        sole = tool.sole if tool else zero
+        foot_com = tool.foot.com if tool else zero
+        self._sole = add_point(self._model, constants, "sole", sole)
+        self._foot_com = add_point(self._model, constants, "foot_com", foot_com)
+        self._data = self._model.createData()
+        self._drive = drive_inertia_matrix(constants)
+
+    def gravity(self, q: Array) -> Array:
+        """Return the torques that hold the arm, dV/dq [N m], shape (7,)."""
+        return pin.computeGeneralizedGravity(self._model, self._data, q).copy()
+
+    def weight_torque(self, q: Array, mass: float) -> Array:
+        """Return J_c^T (0, 0, -m g): the weight of `mass` [kg] at the foot's centre."""
+        jacobian = pin.computeFrameJacobian(
+            self._model, self._data, q, self._foot_com, _AXES
+        )
+        return jacobian[2] * (-mass * GRAVITY)
+
+    def mass_matrix(self, q: Array, *, with_drive: bool = True) -> Array:
+        """Return M(q) [kg m^2], shape (7, 7), by default with the drive inertia."""
+        upper = np.triu(pin.crba(self._model, self._data, q))
+        matrix = upper + np.triu(upper, 1).T
+        return matrix + self._drive if with_drive else matrix
+
+    def coriolis(self, q: Array, qd: Array) -> Array:
+        """Return C(q, qd) qd of the links [N m], shape (7,)."""
+        bias = pin.nonLinearEffects(self._model, self._data, q, qd)
+        return bias - pin.computeGeneralizedGravity(self._model, self._data, q)
+
+    def plate_pose(self, q: Array) -> tuple[Array, Array]:
+        """Return (position [m] (3,), rotation (3, 3)) of the tool plate, frame 7."""
+        return self._pose(q, self._plate)
+
+    def sole_pose(self, q: Array) -> tuple[Array, Array]:
+        """Return (position [m] (3,), rotation (3, 3)) of the sole."""
+        return self._pose(q, self._sole)
+
+    def foot_com_position(self, q: Array) -> Array:
+        """Return the foot's centre of mass [m], shape (3,)."""
+        return self._pose(q, self._foot_com)[0]
+
+    def plate_jacobian(self, q: Array) -> Array:
+        """Return the Jacobian of the tool plate, linear then angular, shape (6, 7)."""
+        return self._jacobian(q, self._plate)
+
+    def sole_jacobian(self, q: Array) -> Array:
+        """Return the Jacobian of the sole, linear then angular, shape (6, 7)."""
+        return self._jacobian(q, self._sole)
+
+    def sole_motion(self, q: Array, qd: Array) -> tuple[Array, Array, Array]:
+        """Return (pose (7,), rotation (3, 3), twist (6,)) of the sole at once.
+
+        The pose is the position [m] and the quaternion x y z w of the rotation, w >= 0.
+        """
+        pin.forwardKinematics(self._model, self._data, q, qd)
+        placement = pin.updateFramePlacement(self._model, self._data, self._sole)
+        velocity = pin.getFrameVelocity(self._model, self._data, self._sole, _AXES)
+        pose = pin.SE3ToXYZQUAT(placement)
+        if pose[6] < 0.0:
+            pose[3:] *= -1.0
+        return pose, placement.rotation, velocity.vector
+
+    def sole_path(self, q: NDArray[np.float64]) -> FootPath:
+        """Return the sole along joint positions `q` [rad], shape (n, 7)."""
+        position = np.empty((len(q), 3))
+        rotation = np.empty((len(q), 3, 3))
+        model, data = self._model, self._data
+        for i, row in enumerate(q):
+            pin.forwardKinematics(model, data, row)
+            placement = pin.updateFramePlacement(model, data, self._sole)
+            position[i] = placement.translation
+            rotation[i] = placement.rotation
+        return FootPath(position, rotation)
+
+    def _pose(self, q: Array, frame: int) -> tuple[Array, Array]:
+        pin.forwardKinematics(self._model, self._data, q)
+        placement = pin.updateFramePlacement(self._model, self._data, frame)
+        return placement.translation.copy(), placement.rotation.copy()
+
+    def _jacobian(self, q: Array, frame: int) -> Array:
+        return pin.computeFrameJacobian(self._model, self._data, q, frame, _AXES).copy()
