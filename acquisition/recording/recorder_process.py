@@ -58,7 +58,7 @@ def _finish(recorder: Recorder, reason: str) -> dict[str, Any]:
 
 
 class RemoteRecorder:
-    """A recorder in another process; implements acquisition.recording.recorder.TrialRecording."""
+    """A recorder in another process (implements TrialRecording)."""
 
     def __init__(self, child: Child, board: Board) -> None:
         self._child = child

@@ -15,7 +15,7 @@ from experiments.session.reducer import replay
 from experiments.session.states import Phase
 from experiments.session.store import list_sessions
 from tests.experiments.program import digest, kept_and_sound, run_watched, traction
-from tests.experiments.test_resuming import short
+from tests.experiments.run.test_resume import short
 
 CLOCK = SystemClock()
 

@@ -11,7 +11,7 @@ from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import Board
 
 pytestmark = pytest.mark.wall_clock
-HERE = "tests.acquisition.test_processes"
+HERE = "tests.acquisition.ipc.test_child"
 
 
 def answering(station):

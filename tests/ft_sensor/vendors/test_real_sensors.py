@@ -9,7 +9,7 @@ from acquisition.devices import WrenchSample
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, tare
 
-REAL = Path(__file__).parents[3] / "shared" / "data" / "real"
+REAL = Path(__file__).parents[4] / "shared" / "data" / "real"
 PRESS, CONTOUR = REAL / "granular_press_ft", REAL / "kuleuven_contour"
 RATE = 100.0  # Hz, of the recorded Bota sensor
 MOUNTINGS = {

@@ -10,7 +10,7 @@ from acquisition.errors import DeviceFaultError, SettingsError
 from wam.driver.transmission import Transmission, coupled_ratios, keep_gravity
 
 VECTORS = json.loads(
-    (Path(__file__).parents[1] / "data" / "wam7_vectors.json").read_text()
+    (Path(__file__).parents[2] / "data" / "wam7_vectors.json").read_text()
 )["vectors"]
 CTS = (4096,) * 7
 IPNM = (2700, 2700, 2700, 2700, 6500, 6500, 17474)

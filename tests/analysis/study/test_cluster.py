@@ -16,7 +16,7 @@ from analysis.study.jobs import Workers, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FIT = FitOptions(gp_points=60, draws=5, models=("tustin", "gp_se"))
 
 
