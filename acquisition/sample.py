@@ -32,7 +32,7 @@ MOTOR_FRESH_SHIFT = 14  # bits 14-20: the reply of motor 1..7 is fresh
 
 
 @dataclass(frozen=True, slots=True)
-class Channel:
+class ChannelMeaning:
     """What one field of a recorded message means."""
 
     field: str
@@ -42,23 +42,39 @@ class Channel:
 
 
 CHANNELS = (
-    Channel("cycle.host_ns", "ns", "host clock", "CLOCK_MONOTONIC at cycle start"),
-    Channel("cycle.arm_ns", "ns", "host clock", "last joint reply arrived, 0 = none"),
-    Channel("cycle.ft_ns", "ns", "host clock", "used F/T sample taken, 0 = none"),
-    Channel("cycle.ft_counter", "us or count", "sensor clock", "as received"),
-    Channel("cycle.counts", "encoder counts", "motors 1..7", "as received"),
-    Channel("cycle.position", "rad", "joints 1..7", "Denavit-Hartenberg, distal"),
-    Channel("cycle.velocity", "rad/s", "joints 1..7", "as the controller used it"),
-    Channel("cycle.torque_command", "N m", "joints 1..7", "as sent"),
-    Channel("cycle.torque_gravity", "N m", "joints 1..7", "gravity + effective mass"),
-    Channel("cycle.wrench", "N, N m", "ft_sensor", "force of the ground on the foot"),
-    Channel("cycle.wrench_raw", "N, N m", "ft_sensor", "as the sensor reads, untared"),
-    Channel("cycle.foot_position", "m", "wam_base", "centre of the sole"),
-    Channel(
+    ChannelMeaning(
+        "cycle.host_ns", "ns", "host clock", "CLOCK_MONOTONIC at cycle start"
+    ),
+    ChannelMeaning(
+        "cycle.arm_ns", "ns", "host clock", "last joint reply arrived, 0 = none"
+    ),
+    ChannelMeaning(
+        "cycle.ft_ns", "ns", "host clock", "used F/T sample taken, 0 = none"
+    ),
+    ChannelMeaning("cycle.ft_counter", "us or count", "sensor clock", "as received"),
+    ChannelMeaning("cycle.counts", "encoder counts", "motors 1..7", "as received"),
+    ChannelMeaning(
+        "cycle.position", "rad", "joints 1..7", "Denavit-Hartenberg, distal"
+    ),
+    ChannelMeaning(
+        "cycle.velocity", "rad/s", "joints 1..7", "as the controller used it"
+    ),
+    ChannelMeaning("cycle.torque_command", "N m", "joints 1..7", "as sent"),
+    ChannelMeaning(
+        "cycle.torque_gravity", "N m", "joints 1..7", "gravity + effective mass"
+    ),
+    ChannelMeaning(
+        "cycle.wrench", "N, N m", "ft_sensor", "force of the ground on the foot"
+    ),
+    ChannelMeaning(
+        "cycle.wrench_raw", "N, N m", "ft_sensor", "as the sensor reads, untared"
+    ),
+    ChannelMeaning("cycle.foot_position", "m", "wam_base", "centre of the sole"),
+    ChannelMeaning(
         "cycle.foot_orientation", "1", "wam_base", "quaternion x y z w of the foot"
     ),
-    Channel("cycle.foot_velocity", "m/s, rad/s", "wam_base", "linear, angular"),
-    Channel(
+    ChannelMeaning("cycle.foot_velocity", "m/s, rad/s", "wam_base", "linear, angular"),
+    ChannelMeaning(
         "cycle.traction",
         "m/s, N, N",
         "terrain",

@@ -19,7 +19,7 @@ import numpy as np
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.prepare import prepare as prepare_series
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import TractionSeries
 from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldResult, plan_folds, run_fold
@@ -124,9 +124,9 @@ def crossvalidate(
     return run_tasks(run_fold, tasks, n_jobs)
 
 
-def _training(trials: Sequence[PreparedTrial], options: FitOptions) -> Training:
-    rows = Rows.of(trials)
+def _training(trials: Sequence[PreparedTrial], options: FitOptions) -> TrainingSet:
+    rows = SampleTable.of(trials)
     count = min(options.gp_points, rows.count)
     rng = np.random.default_rng(options.seed)
     chosen = rng.choice(rows.count, count, replace=False)
-    return Training(rows, tuple(trial.kept for trial in trials), chosen)
+    return TrainingSet(rows, tuple(trial.kept for trial in trials), chosen)

@@ -45,7 +45,7 @@ _FT = property_number(Device.SENSOR, "FT")
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PageSection:
     """One part of a cycle as measured.
 
     Attributes:
@@ -150,7 +150,7 @@ def library_work(bus: can.BusABC, other: can.BusABC) -> list[_Work]:
     ]
 
 
-def measure(work: list[_Work], rounds: int) -> list[Part]:
+def measure(work: list[_Work], rounds: int) -> list[PageSection]:
     """Run all parts `rounds` times in turn and return what each costs per cycle."""
     took: list[list[int]] = [[] for _ in work]
     gc.collect()
@@ -175,10 +175,10 @@ def measure(work: list[_Work], rounds: int) -> list[Part]:
     return [_part("codec, whole cycle", 13, whole, unit), *found]
 
 
-def _part(name: str, frames: int, times: list[int], unit: float) -> Part:
+def _part(name: str, frames: int, times: list[int], unit: float) -> PageSection:
     middle = statistics.median(times)
     late = sorted(times)[math.ceil(0.99 * len(times)) - 1]
-    return Part(name, frames, middle / 1e3, late / 1e3, middle / unit)
+    return PageSection(name, frames, middle / 1e3, late / 1e3, middle / unit)
 
 
 def _messages(frames: list[tuple[int, bytes]]) -> list[can.Message]:
@@ -198,7 +198,7 @@ def _two_ends() -> Generator[tuple[can.BusABC, can.BusABC]]:
         yield one, other
 
 
-def _summary(parts: list[Part], rounds: int) -> dict[str, object]:
+def _summary(parts: list[PageSection], rounds: int) -> dict[str, object]:
     return {
         "rounds": rounds,
         "goal_us": GOAL_US,
@@ -207,7 +207,7 @@ def _summary(parts: list[Part], rounds: int) -> dict[str, object]:
     }
 
 
-def _print_table(parts: list[Part], rounds: int) -> None:
+def _print_table(parts: list[PageSection], rounds: int) -> None:
     print(f"{'part':26}{'frames':>7}{'p50 us':>10}{'p99 us':>10}{'x codec':>10}")
     for part in parts:
         print(

@@ -18,7 +18,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
 from analysis.data.prepare import PrepareOptions, prepare
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.data.tables import load_tables
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.likelihood import Likelihood
@@ -36,19 +36,21 @@ _ROUNDS = 3  # of every fold of the short race, medians
 _GOALS = {"evaluation": 5.0, "SE fit": 4.0, "NN fit": 2.0, "Tustin fit": 10.0}
 
 
-def load_rows() -> Rows:
+def load_rows() -> SampleTable:
     """Return the kept samples of three trials on stones."""
-    return Rows.of([prepare(s, PrepareOptions()) for s in load_tables([SLICE])["S0"]])
+    return SampleTable.of(
+        [prepare(s, PrepareOptions()) for s in load_tables([SLICE])["S0"]]
+    )
 
 
-def chosen(rows: Rows) -> tuple[np.ndarray, np.ndarray]:
+def chosen(rows: SampleTable) -> tuple[np.ndarray, np.ndarray]:
     """Return 300 standardised inputs and centred outputs."""
     index = np.random.default_rng(0).choice(rows.count, _POINTS, replace=False)
     X, y = rows.inputs[index], rows.F_t[index]
     return (X - X.mean(axis=0)) / X.std(axis=0), y - y.mean()
 
 
-def many_starts(rows: Rows) -> float:
+def many_starts(rows: SampleTable) -> float:
     """Return the best sum of squares of 20-start bounded least squares."""
     pairs = np.array([pair for _, pair in TustinBounds().items()])
     low, high = pairs.T.copy()
@@ -79,7 +81,7 @@ def duel(
     return statistics.median(spent[0]), statistics.median(spent[1])
 
 
-class Part(NamedTuple):
+class PageSection(NamedTuple):
     """One thing that is measured: ours, the other's, and how often.
 
     Attributes:
@@ -108,7 +110,7 @@ class Part(NamedTuple):
         }
 
 
-def parts(rounds: int) -> list[Part]:
+def parts(rounds: int) -> list[PageSection]:
     """Return what is measured of single fits."""
     rows = load_rows()
     X, y = chosen(rows)
@@ -121,25 +123,25 @@ def parts(rounds: int) -> list[Part]:
 
     return [
         evaluation(X, y, 10 * rounds),
-        Part(
+        PageSection(
             "SE fit",
             lambda: fit_gp(X, y).lml,
             lambda: likelihood_of_theirs("SE fit"),
             rounds,
         ),
-        Part(
+        PageSection(
             "NN fit",
             lambda: fit_gp(X, y, Arcsine()).lml,
             lambda: likelihood_of_theirs("NN fit"),
             rounds,
         ),
-        Part(
+        PageSection(
             "Tustin fit",
             lambda: fit_tustin(rows.F_n, rows.v_t, rows.F_t).sse,
             lambda: many_starts(rows),
             rounds,
         ),
-        Part(
+        PageSection(
             sparse,
             lambda: fit_sparse(rows.inputs, rows.F_t).lml,
             lambda: fit_gp(X, y).lml,
@@ -148,7 +150,7 @@ def parts(rounds: int) -> list[Part]:
     ]
 
 
-def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> Part:
+def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> PageSection:
     """Return one likelihood with its gradient, as a search asks for it."""
     theta = our_starts("SE fit", X, y)[0]
     likelihood = Likelihood((KERNELS["SE fit"], ConstantNoise()), X, y)
@@ -156,7 +158,7 @@ def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> Part:
         theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
     at = model.kernel_.theta
-    return Part(
+    return PageSection(
         "evaluation",
         lambda: likelihood(theta)[0],
         lambda: model.log_marginal_likelihood(

@@ -39,20 +39,20 @@ def float_rig() -> Rig:
     """Return a simulated rig whose hand pushes the foot over stones."""
     settings = load_settings(None)
     rig = build_rig(settings, settings.row(TERRAIN), FakeOptions(is_fast=True, seed=1))
-    crew, hand = rig.crew, rig.rehearsal
+    backend, hand = rig.backend, rig.simulation
     assert hand is not None
-    crew.start_arm()
-    crew.open_sensor()
-    crew.begin()
-    crew.desk.request(ArmState.HOLD)
-    crew.desk.advance(0.1)
+    backend.start_arm()
+    backend.open_sensor()
+    backend.begin()
+    backend.loop_client.request(ArmState.HOLD)
+    backend.loop_client.advance(0.1)
     hand.lift()
     hand.pendant("activate")
-    crew.desk.advance(1.5)
-    crew.desk.request(ArmState.FLOAT)
+    backend.loop_client.advance(1.5)
+    backend.loop_client.request(ArmState.FLOAT)
     hand.prepare(1)
     hand.put_down()
-    crew.desk.advance(2.0)
+    backend.loop_client.advance(2.0)
     hand.push()
     return rig
 
@@ -69,17 +69,19 @@ def timed(rig: Rig, seconds: float, *, is_recording: bool) -> tuple[float, str]:
     """Return (CPU seconds of `seconds` of simulation, digest of its samples)."""
     digest = hashlib.sha256()
     without_collector()
-    reader = rig.board.cycles.reader()
-    rig.crew.desk.on_pass.append(lambda: digest.update(reader.read().tobytes()))
+    reader = rig.shared.cycles.reader()
+    rig.backend.loop_client.on_tick.append(
+        lambda: digest.update(reader.read().tobytes())
+    )
     with tempfile.TemporaryDirectory() as folder:
         if is_recording:
-            rig.crew.recorder.start(Path(folder) / "bench.mcap", HEADER)
+            rig.backend.recorder.start(Path(folder) / "bench.mcap", HEADER)
         start = time.process_time()
-        rig.crew.desk.advance(seconds)
+        rig.backend.loop_client.advance(seconds)
         spent = time.process_time() - start
         if is_recording:
-            rig.crew.recorder.finish("bench")
-    rig.crew.close()
+            rig.backend.recorder.finish("bench")
+    rig.backend.close()
     return spent, digest.hexdigest()
 
 
@@ -101,8 +103,8 @@ def plant_share(seconds: float) -> float:
         spent_ns += time.perf_counter_ns() - start_ns
 
     world.plant.advance = watched
-    rig.crew.desk.advance(seconds)
-    rig.crew.close()
+    rig.backend.loop_client.advance(seconds)
+    rig.backend.close()
     return spent_ns * 1e-9
 
 

@@ -30,7 +30,7 @@ _LIKELIHOOD = 1e-3
 _SQUARES = 1e-4  # of their sum
 
 
-class Found(NamedTuple):
+class RawRecord(NamedTuple):
     """What one fit reached beside the best of twenty starts.
 
     Attributes:
@@ -50,19 +50,19 @@ class Found(NamedTuple):
     evaluations: int
 
 
-def examine(task: FoldTask) -> list[Found]:
+def examine(task: FoldTask) -> list[RawRecord]:
     """Return what the five models of one fold reached."""
     rows = given(task)
     sse, best = rows.curve.sse, many_starts(task.training)
     place = f"{task.terrain} fold {task.fold + 1}"
-    found = [Found(place, TUSTIN, -sse, -best, sse <= (1.0 + _SQUARES) * best, 0)]
+    found = [RawRecord(place, TUSTIN, -sse, -best, sse <= (1.0 + _SQUARES) * best, 0)]
     for name, (part, _) in FITS.items():
         kernel, r = KERNELS[part], rows.outputs[name]
         ours = posterior_search((kernel, ConstantNoise()), rows.X, r)
         best = twenty(kernel, rows.X, r, task.fold)
         is_as_good = ours.lml >= best - _LIKELIHOOD
         spent = sum(start.evaluations for start in ours.starts)
-        found.append(Found(place, name, ours.lml, best, is_as_good, spent))
+        found.append(RawRecord(place, name, ours.lml, best, is_as_good, spent))
     return found
 
 
@@ -95,7 +95,7 @@ def climb(likelihood: Likelihood, start: Array, box: Array) -> float:
     return -float(found.fun)
 
 
-def summary(found: Sequence[Found]) -> list[str]:
+def summary(found: Sequence[RawRecord]) -> list[str]:
     """Return what to print: shares, then every fit that missed the optimum."""
     processes = [one for one in found if one.model != TUSTIN]
     groups = {name: [one for one in found if one.model == name] for name in FITTERS}

@@ -13,9 +13,9 @@ import statistics
 
 from acquisition.clock import SystemClock
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
-from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
 from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
 from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
@@ -30,10 +30,10 @@ SENSITIVITY = (18.28, 18.41, 2.12, 278.72, 259.55, 448.47)
 def devices() -> dict[str, SerialDevice]:
     """Return the driver of each kind."""
     return {
-        "bota": BotaDevice(Line("none", 460800), BotaSettings()),
-        "robotous": RobotousDevice(Line("none", 921600), RobotousSettings()),
+        "bota": BotaDevice(PortSettings("none", 460800), BotaSettings()),
+        "robotous": RobotousDevice(PortSettings("none", 921600), RobotousSettings()),
         "optoforce": OptoForceDevice(
-            Line("none", 1_000_000), OptoForceSettings(SENSITIVITY, "HEX00042")
+            PortSettings("none", 1_000_000), OptoForceSettings(SENSITIVITY, "HEX00042")
         ),
     }
 
@@ -54,11 +54,11 @@ def pieces(kind: str, frames: int, device: SerialDevice) -> list[tuple[int, byte
 
 def cost_us(device: SerialDevice, stream: list[tuple[int, bytes]]) -> float:
     """Return the time of one frame from bytes to a dated sample [us]."""
-    scanner, dating = device.scanner(), FrameDating(device.timing)
+    scanner, timestamper = device.scanner(), SampleTimestamper(device.timing)
     count = 0
     begun_ns = CLOCK.now_ns()
     for t_ns, data in stream:
-        count += len(dating.date(scanner.feed(data), t_ns))
+        count += len(timestamper.date(scanner.feed(data), t_ns))
     return (CLOCK.now_ns() - begun_ns) / count / 1000
 
 

@@ -43,7 +43,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PageSection:
     """One part of a cycle as measured [us]; `share` is that of the whole's median."""
 
     name: str
@@ -95,7 +95,7 @@ def main() -> int:
     return 0
 
 
-def measure(cycles: int) -> list[Part]:
+def measure(cycles: int) -> list[PageSection]:
     """Simulate `cycles` of a push and return whole and parts."""
     notes = Notes()
     for _ in _run(cycles, notes):
@@ -249,13 +249,13 @@ def _ground() -> Terrain:
     return make_terrain("small", "tread", _FRAME.incline, _random().ground)
 
 
-def _part(name: str, took: list[float], whole: float) -> Part:
+def _part(name: str, took: list[float], whole: float) -> PageSection:
     middle = statistics.median(took)
     late = sorted(took)[math.ceil(0.99 * len(took)) - 1]
-    return Part(name, middle, late, middle / whole)
+    return PageSection(name, middle, late, middle / whole)
 
 
-def _print_table(parts: list[Part], cycles: int) -> None:
+def _print_table(parts: list[PageSection], cycles: int) -> None:
     print(f"{'part':14}{'p50 us':>10}{'p99 us':>10}{'share':>8}")
     for part in parts:
         print(

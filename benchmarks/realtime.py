@@ -23,9 +23,9 @@ import numpy as np
 
 from acquisition.control_loop.realtime import choose_cores
 from acquisition.sample import Record
-from benchmarks.realtime_table import Found, Times, Window, table
+from benchmarks.realtime_table import RawRecord, Times, Window, table
 from experiments.preflight.preflight import start_devices
-from experiments.rig.processes import ProcessCrew
+from experiments.rig.processes import MultiProcessBackend
 from experiments.rig.rig import FakeOptions, Rig, build_rig
 from experiments.settings.load import Settings, load_settings
 from experiments.tools.bench import run_bench
@@ -65,26 +65,26 @@ def settings_with_bus_sensor() -> Settings:
     )
 
 
-def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> Found:
+def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> RawRecord:
     """Run the loop and the C programs in turn on the same core, `windows` times."""
-    crew, found = rig.crew, Found()
+    backend, found = rig.backend, RawRecord()
     core, _ = choose_cores()
-    assert isinstance(crew, ProcessCrew)
+    assert isinstance(backend, MultiProcessBackend)
     assert core is not None
     for _ in range(windows):
-        processes = {**crew.processes(), "console": os.getpid()}
+        processes = {**backend.processes(), "console": os.getpid()}
         kept: list[Times] = []
-        timings = crew.desk.timings()
-        crew.desk.on_pass.append(lambda: kept.append(columns(timings.read())))  # noqa: B023
+        timings = backend.loop_client.timings()
+        backend.loop_client.on_tick.append(lambda: kept.append(columns(timings.read())))  # noqa: B023
         found.reports.append(run_bench(rig, processes, seconds))
-        crew.desk.on_pass.pop()
+        backend.loop_client.on_tick.pop()
         found.loops.append(Window(np.concatenate(kept)))
-        crew.desk.idle()
-        crew.end_loop()
+        backend.loop_client.idle()
+        backend.end_loop()
         found.wakes.append(in_c(program, core, seconds / 2))
-        found.exchanges.append(in_c(program, core, seconds, crew.bus_path))
-        crew.begin()
-        crew.desk.advance(0.2)
+        found.exchanges.append(in_c(program, core, seconds, backend.bus_path))
+        backend.begin()
+        backend.loop_client.advance(0.2)
     return found
 
 
@@ -111,7 +111,7 @@ def main() -> None:
         rig = build_rig(settings, row, FakeOptions(is_fast=False, seed=1))
         length = str(args.seconds * 3 + 60)
         seen = Path(name) / "stalls"
-        with closing(rig.crew), seen.open("w") as lines:
+        with closing(rig.backend), seen.open("w") as lines:
             watching = [
                 subprocess.Popen([witness, str(c), length], stdout=lines)
                 for c in (core, other)

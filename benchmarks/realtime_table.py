@@ -55,7 +55,7 @@ def explained(moments: Times, stalls: Times) -> NDArray[np.bool_]:
 
 
 @dataclasses.dataclass(slots=True)
-class Found:
+class RawRecord:
     """What the windows gave: loop reports, the loop's cycles, both C programs."""
 
     reports: list[BenchReport] = dataclasses.field(default_factory=list)
@@ -77,7 +77,7 @@ def use_of(report: BenchReport, process: str) -> ProcessUse:
     return next(use for use in report.processes if use.name == process)
 
 
-def table(found: Found, stalls: Times) -> list[Row]:
+def table(found: RawRecord, stalls: Times) -> list[Row]:
     """Return all lines; `stalls` are the witness's, end and length [ns]."""
     return [
         *cycle_rows(found, stalls),
@@ -93,7 +93,7 @@ def quantiles(times: Times) -> str:
     return " / ".join(f"{value / 1000:.0f}" for value in values) + " us"
 
 
-def cycle_rows(found: Found, stalls: Times) -> list[Row]:
+def cycle_rows(found: RawRecord, stalls: Times) -> list[Row]:
     """Return the lines on what happens within a cycle."""
     cycles = found.cycles()
     whole = (cycles[:, 2] > cycles[:, 1]) & (cycles[:, 3] >= cycles[:, 2])
@@ -124,7 +124,7 @@ def cycle_rows(found: Found, stalls: Times) -> list[Row]:
     ]
 
 
-def wake_rows(found: Found) -> list[Row]:
+def wake_rows(found: RawRecord) -> list[Row]:
     """Return the lines on waking up, medians over the windows for the ratios."""
     ratio = {
         q: statistics.median(
@@ -156,7 +156,7 @@ def wake_rows(found: Found) -> list[Row]:
     ]
 
 
-def miss_rows(found: Found, stalls: Times) -> list[Row]:
+def miss_rows(found: RawRecord, stalls: Times) -> list[Row]:
     """Return the lines on missed cycles."""
     count = len(found.cycles())
     own = np.concatenate([missed(window.cycles) for window in found.loops])
@@ -182,7 +182,7 @@ def miss_rows(found: Found, stalls: Times) -> list[Row]:
     ]
 
 
-def use_rows(found: Found) -> list[Row]:
+def use_rows(found: RawRecord) -> list[Row]:
     """Return the lines on processors, memory and the recorder."""
     loop, recorder = found.cpu("control"), found.cpu("recorder")
     faults = sum(use_of(r, "control").page_faults for r in found.reports[1:])

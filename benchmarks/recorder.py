@@ -19,7 +19,7 @@ from acquisition.control_loop.loop import PERIOD_NS
 from acquisition.devices import WrenchSample
 from acquisition.ipc.child import Child
 from acquisition.ipc.frame_tape import FrameTape
-from acquisition.ipc.layout import Board, pack_wrench
+from acquisition.ipc.layout import SharedLayout, pack_wrench
 from acquisition.recording.recorder_process import RemoteRecorder
 from acquisition.sample import Sample
 from acquisition.schema import CYCLE
@@ -43,10 +43,10 @@ HEADER = TrialHeader(
 class Load:
     """Writes what a loop would write, cycle after cycle."""
 
-    def __init__(self, board: Board) -> None:
-        self._board = board
+    def __init__(self, shared: SharedLayout) -> None:
+        self._shared = shared
         self._sample = Sample()
-        self._tape = FrameTape(board.frames)
+        self._tape = FrameTape(shared.frames)
         self._noise = np.random.default_rng(1).normal(size=(997, 7))
         self.cycles = 0
 
@@ -57,10 +57,10 @@ class Load:
         sample.host_ns[0] = now_ns
         sample.position[:] = self._noise[number % 997]
         sample.velocity[:] = self._noise[number % 991]
-        self._board.cycles.write(sample.payload())
+        self._shared.cycles.write(sample.payload())
         for _ in range(2):
             wrench = WrenchSample(now_ns, number, (1.0,) * 6, 0, True, False)
-            self._board.wrenches.write(pack_wrench(wrench))
+            self._shared.wrenches.write(pack_wrench(wrench))
         data = number.to_bytes(8, "little")
         self._tape.add([(now_ns, 0x400 + frame, 8, data) for frame in range(13)])
         self.cycles += 1
@@ -75,9 +75,9 @@ def usage(pid: int) -> tuple[float, float]:
 
 def run(seconds: float, rate: int) -> dict[str, float]:
     """Record for `seconds` at `rate` cycles a second; return what was seen."""
-    clock, board = SystemClock(), Board.create()
-    child = Child("recorder", MAIN, {}, board)
-    recorder, load = RemoteRecorder(child, board), Load(board)
+    clock, shared = SystemClock(), SharedLayout.create()
+    child = Child("recorder", MAIN, {}, shared)
+    recorder, load = RemoteRecorder(child, shared), Load(shared)
     memory: list[float] = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.mcap"
@@ -108,7 +108,7 @@ def run(seconds: float, rate: int) -> dict[str, float]:
         "written": written,
         "lost": lost,
         "largest_backlog": backlog,
-        "slots": board.cycles.slots,
+        "slots": shared.cycles.slots,
         "cpu_share": round(cpu / seconds, 4),
         "us_per_cycle": round(cpu / load.cycles * 1e6, 2),
         "bytes_per_cycle": round(size / load.cycles, 1),

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from analysis.data.prepare import PrepareOptions, prepare
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.data.tables import load_tables
 from analysis.study.crossval import FoldTask, choose_rows, plan_folds, run_fold
@@ -61,7 +61,7 @@ class Given(NamedTuple):
     X: Array
     outputs: dict[str, Array]
 
-    def standardised(self, rows: Rows) -> Array:
+    def standardised(self, rows: SampleTable) -> Array:
         """Return the inputs of other rows in the same terms, shape (m, 2)."""
         return (rows.inputs - self.centre) / self.scale
 
@@ -117,7 +117,7 @@ def folds_of(path: Path) -> list[FoldTask]:
 
 def given(task: FoldTask) -> Given:
     """Return what the Gaussian processes of one fold are fitted to."""
-    training = Training(task.training, task.lengths, choose_rows(task))
+    training = TrainingSet(task.training, task.lengths, choose_rows(task))
     curve, subset = tustin_of(training, task.options), training.subset
     plain = subset.F_t - subset.F_t.mean()
     left = subset.F_t - curve.mean(subset.F_n, subset.v_t)
@@ -195,7 +195,7 @@ def run_theirs(
     """Return scikit-learn's likelihoods of one fold, after the same predictions."""
     rows = given(task)
     foreign = [trial for trials in task.others.values() for trial in trials]
-    tested = rows.standardised(Rows.joined([task.training, *foreign]))
+    tested = rows.standardised(SampleTable.joined([task.training, *foreign]))
     own = rows.standardised(task.own)
     found = {}
     for name, (part, _) in FITS.items():
@@ -208,11 +208,11 @@ def run_theirs(
 
 def where_time_goes(task: FoldTask) -> list[str]:
     """Return what the parts of one of our folds cost."""
-    training = Training(task.training, task.lengths, choose_rows(task))
+    training = TrainingSet(task.training, task.lengths, choose_rows(task))
     spent, _ = timed(lambda: fit_model(TUSTIN, training, task.options))
     parts = [f"Tustin of {task.training.count} rows {1e3 * spent:.0f} ms"]
     foreign = [rows for trials in task.others.values() for rows in trials]
-    tested = Rows.joined([task.training, *foreign])
+    tested = SampleTable.joined([task.training, *foreign])
     predicting = 0.0
     for name in FITS:
         spent, model = timed(lambda name=name: fit_model(name, training, task.options))

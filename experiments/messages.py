@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import resources
 from string import Formatter
 
-from acquisition.control_loop.guard import Verdict
+from acquisition.control_loop.guard import GuardVerdict
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 
@@ -90,7 +90,7 @@ _PUCKS = 7
 
 
 @dataclass(frozen=True, slots=True)
-class Circumstances:
+class FaultContext:
     """When and where a fault came.
 
     Attributes:
@@ -104,7 +104,7 @@ class Circumstances:
     is_bus_down: bool = False
 
 
-def fault_text(verdict: Verdict, found: Circumstances, saved: str = "") -> str:
+def fault_text(verdict: GuardVerdict, found: FaultContext, saved: str = "") -> str:
     """Return the message of a verdict.
 
     A verdict of the safety circuit is the pendant's unless a monitor is its cause;

@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import fakes.world.rig
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
-from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.session.reducer import replay
 from experiments.session.store import find_session
 from fakes.clock import START_NS
@@ -224,7 +224,7 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
 
     seen: list[tuple[int, int]] = []
 
-    def answer(_: AutoKeys, asked) -> str:
+    def answer(_: AutoOperator, asked) -> str:
         if asked.prompt is Prompt.READY and seen[-1:] != [(asked.trial, asked.attempt)]:
             seen[:] = [(asked.trial, asked.attempt)]
             soak.counts["trials"] += 1
@@ -232,7 +232,7 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
         return press(asked)
 
     patch.setattr(fakes.world.rig, "FakeRig", Seen)
-    patch.setattr(AutoKeys, "answer", answer)
+    patch.setattr(AutoOperator, "answer", answer)
 
 
 def press(asked) -> str:

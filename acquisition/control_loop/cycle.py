@@ -8,10 +8,10 @@ import numpy as np
 from acquisition import sample_flags as flags
 from acquisition.control_loop.guard import (
     Action,
+    GuardLimits,
     GuardState,
-    Limits,
+    GuardVerdict,
     Observation,
-    Verdict,
     check,
 )
 from acquisition.control_loop.loop import Tick
@@ -62,7 +62,7 @@ class Cycle:
         sensor: WrenchSensor,
         law: ControlLaw,
         observer: FootObserver,
-        limits: Limits,
+        limits: GuardLimits,
         sink: Callable[[memoryview], None],
         on_wrench: Callable[[list[WrenchSample]], None],
         extra_flags: int = 0,
@@ -82,7 +82,7 @@ class Cycle:
         self._speed = 0.0
         self._requested: ArmState | None = None
         self._move: tuple[Vector, float] | None = None
-        self._reported: Verdict | None = None
+        self._reported: GuardVerdict | None = None
         self._was_active = False
         self.is_recording = False
         self.replies_ns = 0
@@ -108,7 +108,7 @@ class Cycle:
         """Take the sensor's reading without load [N, N m], six numbers."""
         self._observer.set_bias(bias)
 
-    def report(self, verdict: Verdict) -> None:
+    def report(self, verdict: GuardVerdict) -> None:
         """Let the next cycle obey what was found outside of it."""
         self._reported = verdict
 
@@ -177,7 +177,7 @@ class Cycle:
         try:
             self._law.move_to(*move, reading)
         except ValueError:
-            self.report(Verdict(Action.HOLD, "move-refused"))
+            self.report(GuardVerdict(Action.HOLD, "move-refused"))
 
     def _idle(self, reading: ArmReading) -> None:
         """Brake the arm. Unless that is confirmed no zero torque follows: free fall."""
@@ -203,7 +203,7 @@ class Cycle:
             return _ZERO, _ZERO
         return self._law.torque(reading)
 
-    def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> Verdict:
+    def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> GuardVerdict:
         status = self.status
         if self._wrench_ns:
             status.ft_age_ns = tick.now_ns - self._wrench_ns
@@ -227,7 +227,7 @@ class Cycle:
             return reported
         return verdict
 
-    def _obey(self, verdict: Verdict, reading: ArmReading) -> None:
+    def _obey(self, verdict: GuardVerdict, reading: ArmReading) -> None:
         """Enter the state the guard asks for; a fault is never made milder."""
         state = self.status.state
         if verdict.action is Action.IDLE:

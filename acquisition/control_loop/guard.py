@@ -26,7 +26,7 @@ _SEVERITY = {Action.NONE: 0, Action.HOLD: 1, Action.DAMP: 2, Action.IDLE: 3}
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class GuardVerdict:
     """The guard's decision.
 
     Attributes:
@@ -47,12 +47,12 @@ class Verdict:
         return _SEVERITY[self.action]
 
 
-OK = Verdict(Action.NONE)
+OK = GuardVerdict(Action.NONE)
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class GuardLimits:
     """Where the guard steps in.
 
     Attributes:
@@ -125,8 +125,8 @@ class Observation(NamedTuple):
 
 
 def check(
-    limits: Limits, state: GuardState, seen: Observation
-) -> tuple[GuardState, Verdict]:
+    limits: GuardLimits, state: GuardState, seen: Observation
+) -> tuple[GuardState, GuardVerdict]:
     """Return the next state and the most severe verdict of this cycle.
 
     Among equally severe ones: what takes the arm away (safety circuit, silence), then
@@ -156,7 +156,7 @@ def check(
 
 
 def _remember(
-    limits: Limits, state: GuardState, seen: Observation, now: int
+    limits: GuardLimits, state: GuardState, seen: Observation, now: int
 ) -> GuardState:
     armed = state.armed
     if armed != 0x7F and seen.reading.is_complete:
@@ -174,54 +174,58 @@ def _remember(
     return replace(state, armed=armed, late=late)
 
 
-def _check_safety(seen: Observation) -> Verdict:
+def _check_safety(seen: Observation) -> GuardVerdict:
     if seen.safety not in _BRAKED:
         return OK
     is_stopped = seen.safety is SafetyMode.E_STOP
-    return Verdict(Action.IDLE, "estop" if is_stopped else "pendant-idle")
+    return GuardVerdict(Action.IDLE, "estop" if is_stopped else "pendant-idle")
 
 
-def _check_silence(limits: Limits, seen: Observation) -> Verdict:
+def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     missing = seen.reading.missing_cycles
     if missing < limits.hold_after_missing:
         return OK
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
     facts = (("ms", missing * 2.0), ("silent", float(silent)))
     is_long = missing >= limits.idle_after_missing
-    return Verdict(Action.IDLE if is_long else Action.HOLD, "can-silence", facts)
+    return GuardVerdict(Action.IDLE if is_long else Action.HOLD, "can-silence", facts)
 
 
-def _check_numbers(total: float, seen: Observation) -> Verdict:
+def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
     """Refuse what is no number; infinities that cancel in `total` leave NaN."""
     total += seen.foot_speed + seen.joint7_offset
     if total - total != 0.0:  # NaN or infinite
-        return Verdict(Action.IDLE, "not-a-number")
+        return GuardVerdict(Action.IDLE, "not-a-number")
     return OK
 
 
-def _check_position(limits: Limits, state: GuardState, q: list[float]) -> Verdict:
+def _check_position(
+    limits: GuardLimits, state: GuardState, q: list[float]
+) -> GuardVerdict:
     ranges = zip(q, limits.q_lower, limits.q_upper, strict=True)
     for joint, (value, low, high) in enumerate(ranges):
         if not low <= value <= high and state.armed >> joint & 1:
             limit = low if value < low else high
             facts = (("joint", joint + 1.0), ("value", value), ("limit", limit))
-            return Verdict(Action.DAMP, "joint-limit", facts)
+            return GuardVerdict(Action.DAMP, "joint-limit", facts)
     return OK
 
 
-def _check_speed(limits: Limits, seen: Observation, qd: list[float]) -> Verdict:
+def _check_speed(
+    limits: GuardLimits, seen: Observation, qd: list[float]
+) -> GuardVerdict:
     facts = _first_beyond(qd, limits.qd)
     if facts:
-        return Verdict(Action.DAMP, "overspeed", facts)
+        return GuardVerdict(Action.DAMP, "overspeed", facts)
     if seen.foot_speed > limits.foot_speed:
         facts = (("value", seen.foot_speed), ("limit", limits.foot_speed))
-        return Verdict(Action.DAMP, "foot-speed", facts)
+        return GuardVerdict(Action.DAMP, "foot-speed", facts)
     return OK
 
 
-def _check_torque(limits: Limits, tau: list[float]) -> Verdict:
+def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
     facts = _first_beyond(tau, limits.tau)
-    return Verdict(Action.DAMP, "torque-limit", facts) if facts else OK
+    return GuardVerdict(Action.DAMP, "torque-limit", facts) if facts else OK
 
 
 def _first_beyond(
@@ -234,7 +238,7 @@ def _first_beyond(
     return ()
 
 
-def _check_trial(limits: Limits, seen: Observation) -> Verdict:
+def _check_trial(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     if not seen.is_recording:
         return OK
     if abs(seen.joint7_offset) > limits.joint7:
@@ -242,16 +246,16 @@ def _check_trial(limits: Limits, seen: Observation) -> Verdict:
             ("mrad", abs(seen.joint7_offset) * 1e3),
             ("limit", limits.joint7 * 1e3),
         )
-        return Verdict(Action.HOLD, "joint7-slip", facts)
+        return GuardVerdict(Action.HOLD, "joint7-slip", facts)
     if seen.ft_age_ns > limits.ft_stop_ns:
         facts = (("ms", seen.ft_age_ns / MS), ("limit", limits.ft_stop_ns / MS))
-        return Verdict(Action.HOLD, "ft-stale", facts)
+        return GuardVerdict(Action.HOLD, "ft-stale", facts)
     return OK
 
 
-def _check_cadence(limits: Limits, state: GuardState, now: int) -> Verdict:
+def _check_cadence(limits: GuardLimits, state: GuardState, now: int) -> GuardVerdict:
     late = len(state.late)
     if late > limits.late_per_second and state.late[-1] == now:
         facts = (("late", float(late)), ("limit", float(limits.late_per_second)))
-        return Verdict(Action.HOLD, "loop-late", facts)
+        return GuardVerdict(Action.HOLD, "loop-late", facts)
     return OK

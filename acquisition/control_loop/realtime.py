@@ -15,7 +15,7 @@ _NEEDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class RealtimeRequest:
     """What a process would like.
 
     Attributes:
@@ -50,7 +50,7 @@ def choose_cores() -> tuple[int | None, int | None]:
     return (cores[-1], cores[0]) if len(cores) > 1 else (None, None)
 
 
-def request(wish: Wish) -> list[Grant]:
+def request(wish: RealtimeRequest) -> list[Grant]:
     """Ask the kernel for what `wish` says; what it refuses is in the answer."""
     grants: list[Grant] = []
     if wish.core is not None:

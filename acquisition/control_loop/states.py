@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Protocol
 
-from acquisition.control_loop.guard import Verdict
+from acquisition.control_loop.guard import GuardVerdict
 from acquisition.devices import ArmReading, SafetyMode, Vector, WrenchSample
 from acquisition.sample import Sample
 
@@ -73,5 +73,5 @@ class ControlStatus:
 
     state: ArmState = ArmState.IDLE
     safety: SafetyMode = SafetyMode.UNKNOWN
-    verdict: Verdict | None = None
+    verdict: GuardVerdict | None = None
     ft_age_ns: int = 0

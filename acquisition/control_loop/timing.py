@@ -29,7 +29,7 @@ def pack_timing(tick: Tick, replies_ns: int, sent_ns: int, ended_ns: int) -> byt
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
+class LatencyQuantiles:
     """Quantiles of a time [us]: of 50, 99 and 99.9 percent, and the largest."""
 
     p50: float
@@ -56,17 +56,17 @@ class LoopReport:
     cycles: int
     missed: int
     rate: float
-    late: Spread
-    exchange: Spread | None
-    compute: Spread | None
-    torque_out: Spread | None
-    total: Spread
+    late: LatencyQuantiles
+    exchange: LatencyQuantiles | None
+    compute: LatencyQuantiles | None
+    torque_out: LatencyQuantiles | None
+    total: LatencyQuantiles
 
 
-def spread(times_ns: NDArray[np.int64]) -> Spread:
+def spread(times_ns: NDArray[np.int64]) -> LatencyQuantiles:
     """Return the quantiles of times [ns], shape (n,), n >= 1."""
     values = np.percentile(times_ns, QUANTILES) / 1000.0
-    return Spread(*(round(float(value), 1) for value in values))
+    return LatencyQuantiles(*(round(float(value), 1) for value in values))
 
 
 def loop_report(timings: Record) -> LoopReport | None:
@@ -93,5 +93,5 @@ def loop_report(timings: Record) -> LoopReport | None:
     )
 
 
-def _spread_of(times_ns: NDArray[np.int64]) -> Spread | None:
+def _spread_of(times_ns: NDArray[np.int64]) -> LatencyQuantiles | None:
     return spread(times_ns) if len(times_ns) else None

@@ -18,8 +18,8 @@ from typing import Any
 
 from acquisition.control_loop.realtime import die_with_parent
 from acquisition.errors import TractionError
-from acquisition.ipc.layout import Board
-from acquisition.ipc.memory import SharedMemory
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.rings import SharedMemory
 from acquisition.ipc.rpc import Channel, ChannelClosedError
 
 _ROOT = str(Path(__file__).parents[2])
@@ -53,7 +53,7 @@ class ProcessLostError(TractionError):
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
+class ChildContext:
     """What a child works with.
 
     Attributes:
@@ -62,13 +62,13 @@ class Station:
         settings: what it was told at the start.
     """
 
-    board: Board
+    shared: SharedLayout
     channel: Channel
     settings: Mapping[str, Any]
 
 
 class Child:
-    """A process that runs `module:function` with a `Station`.
+    """A process that runs `module:function` with a `ChildContext`.
 
     Attributes:
         name: what it is called in messages.
@@ -76,12 +76,16 @@ class Child:
     """
 
     def __init__(
-        self, name: str, target: str, settings: Mapping[str, object], board: Board
+        self,
+        name: str,
+        target: str,
+        settings: Mapping[str, object],
+        shared: SharedLayout,
     ) -> None:
         self.name = name
         self.channel, theirs = Channel.pair()
         self._words = os.memfd_create(f"traction-{name}", os.MFD_CLOEXEC)
-        descriptors = (board.memory.descriptor, theirs.fileno())
+        descriptors = (shared.memory.descriptor, theirs.fileno())
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _START, _ROOT, target]
             + [str(descriptor) for descriptor in (*descriptors, os.getpid())],
@@ -153,16 +157,18 @@ class Child:
 
 def main(arguments: list[str]) -> None:
     """Run one child: TARGET, descriptors of board and channel, number of the parent."""
-    target, board, channel, parent = arguments
+    target, shared, channel, parent = arguments
     die_with_parent(signal.SIGTERM)
     if os.getppid() != int(parent):
         return  # it died before the line above
     module, function = target.split(":")
-    run: Callable[[Station], None] = getattr(importlib.import_module(module), function)
+    run: Callable[[ChildContext], None] = getattr(
+        importlib.import_module(module), function
+    )
     link = Channel.adopt(int(channel))
     try:
         settings = link.receive()
-        run(Station(Board(SharedMemory(int(board))), link, settings))
+        run(ChildContext(SharedLayout(SharedMemory(int(shared))), link, settings))
     except ChannelClosedError:
         return  # the console has gone; whoever has an arm has braked it
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.guard import Action, GuardVerdict
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.ipc.rings import Ring, Slot
@@ -17,7 +17,7 @@ _VALUES = 12
 _NOTHING = (0.0,) * _VALUES
 
 
-class Kind(IntEnum):
+class CommandKind(IntEnum):
     """What a command asks for."""
 
     ENTER = 1  # argument: an ArmState
@@ -34,17 +34,17 @@ class Command:
     Attributes:
         number: counts the commands from 1; the status says which was obeyed last.
         kind: what is asked for.
-        argument: a small number, see `Kind`.
-        values: numbers, see `Kind`.
+        argument: a small number, see `CommandKind`.
+        values: numbers, see `CommandKind`.
     """
 
     number: int
-    kind: Kind
+    kind: CommandKind
     argument: int
     values: tuple[float, ...]
 
 
-class Mailbox:
+class CommandQueue:
     """Both ends of the commands; the console posts, the loop takes."""
 
     def __init__(self, ring: Ring) -> None:
@@ -53,7 +53,7 @@ class Mailbox:
         self.posted = ring.written
 
     def post(
-        self, kind: Kind, argument: int = 0, values: tuple[float, ...] = ()
+        self, kind: CommandKind, argument: int = 0, values: tuple[float, ...] = ()
     ) -> int:
         """Leave a command and return its number."""
         self.posted += 1
@@ -66,7 +66,7 @@ class Mailbox:
         if not self._reader.backlog:
             return []
         return [
-            Command(number, Kind(kind), argument, tuple(values))
+            Command(number, CommandKind(kind), argument, tuple(values))
             for number, kind, argument, *values in _COMMAND.iter_unpack(
                 self._reader.read().tobytes()
             )
@@ -98,12 +98,12 @@ class LoopStatus:
     control: ControlStatus = field(default_factory=ControlStatus)
 
 
-class StatusBoard:
+class StatusSlot:
     """Writes and reads the loop's status; a verdict is put into words once."""
 
     def __init__(self, slot: Slot) -> None:
         self._slot = slot
-        self._verdict: Verdict | None = None
+        self._verdict: GuardVerdict | None = None
         self._text = b""
 
     def write(self, status: LoopStatus) -> None:
@@ -141,16 +141,16 @@ class StatusBoard:
         )
 
 
-def _verdict_text(verdict: Verdict | None) -> bytes:
+def _verdict_text(verdict: GuardVerdict | None) -> bytes:
     if verdict is None:
         return b""
     fields = (verdict.action.value, verdict.reason, verdict.facts, verdict.causes)
     return json.dumps(fields).encode()
 
 
-def _verdict_of(text: bytes) -> Verdict | None:
+def _verdict_of(text: bytes) -> GuardVerdict | None:
     if not text:
         return None
     action, reason, facts, causes = json.loads(text)
     pairs = tuple((name, value) for name, value in facts)
-    return Verdict(Action(action), reason, pairs, tuple(causes))
+    return GuardVerdict(Action(action), reason, pairs, tuple(causes))

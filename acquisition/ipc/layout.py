@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.devices import WrenchSample
-from acquisition.ipc.memory import SharedMemory
-from acquisition.ipc.rings import LINE, Ring, Slot, lines
+from acquisition.ipc.rings import LINE, Ring, SharedMemory, Slot, lines
 from acquisition.sample import Record
 from acquisition.schema import CYCLE
 
@@ -59,7 +58,7 @@ COMMAND_DTYPE = np.dtype(
 )
 
 
-class Role(IntEnum):
+class ProcessRole(IntEnum):
     """Who shows by its beats that it is alive."""
 
     CONSOLE = 0
@@ -68,22 +67,22 @@ class Role(IntEnum):
     READER = 3
 
 
-class Beats:
+class Heartbeats:
     """When each process was last seen alive [monotonic ns], 0 = never."""
 
     def __init__(self, memory: memoryview) -> None:
         self._times = memory.cast("Q")
 
-    def beat(self, role: Role, now_ns: int) -> None:
+    def beat(self, role: ProcessRole, now_ns: int) -> None:
         """Note that `role` is alive now."""
         self._times[role] = now_ns
 
-    def last_ns(self, role: Role) -> int:
+    def last_ns(self, role: ProcessRole) -> int:
         """Return when `role` was last alive, 0 = never."""
         return self._times[role]
 
 
-class Board:
+class SharedLayout:
     """The shared memory of one rig.
 
     Attributes:
@@ -102,7 +101,7 @@ class Board:
     def __init__(self, memory: SharedMemory) -> None:
         self.memory = memory
         self._end = 0
-        self.beats = Beats(self._take(lines(8 * len(Role))))
+        self.heartbeats = Heartbeats(self._take(lines(8 * len(ProcessRole))))
         self.status = Slot(self._take(LINE + _SLOT_BYTES))
         self.recorder = Slot(self._take(LINE + _SLOT_BYTES))
         self.health = Slot(self._take(LINE + _SLOT_BYTES))
@@ -113,7 +112,7 @@ class Board:
         self.timings = self._ring(TIMING_DTYPE, TIMING_SLOTS)
 
     @classmethod
-    def create(cls) -> "Board":
+    def create(cls) -> "SharedLayout":
         """Return a new, empty board."""
         return cls(SharedMemory.create(_SIZE))
 
@@ -130,7 +129,7 @@ class Board:
 
 
 _SIZE = (
-    lines(8 * len(Role))
+    lines(8 * len(ProcessRole))
     + 3 * (LINE + _SLOT_BYTES)
     + sum(
         lines(Ring.size_of(dtype, slots))

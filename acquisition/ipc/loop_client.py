@@ -7,8 +7,8 @@ from typing import Protocol
 from acquisition.clock import NS_PER_S, Clock
 from acquisition.control_loop.loop import PERIOD_NS, Loop
 from acquisition.control_loop.states import ArmState, ControlStatus
-from acquisition.ipc.commands import Kind, LoopStatus, Mailbox, StatusBoard
-from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
+from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.rings import RingReader
 from acquisition.recording.recorder import Recorder
 from acquisition.sample import Record
@@ -17,7 +17,7 @@ PORTION = 10  # cycles between two looks of the console: 20 ms
 _GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
 
 
-class Passing(Protocol):
+class Advance(Protocol):
     """How time passes for the console."""
 
     def __call__(self, cycles: int) -> None:
@@ -29,7 +29,7 @@ class Passing(Protocol):
         ...
 
 
-class InlinePassing:
+class InlineAdvance:
     """Loop and recorder in this thread: nothing runs unless the console waits.
 
     The recorder drains as often as it would flush anyway: a process of its own drains
@@ -53,7 +53,7 @@ class InlinePassing:
             raise self._recorder.failure
 
 
-class Desk:
+class LoopClient:
     """What the console has of the loop, wherever it runs.
 
     Attributes:
@@ -61,19 +61,21 @@ class Desk:
         on_pass: called after every 20 ms that pass.
     """
 
-    def __init__(self, board: Board, clock: Clock, passing: Passing) -> None:
-        self._board = board
+    def __init__(
+        self, shared: SharedLayout, clock: Clock, advance_cycles: Advance
+    ) -> None:
+        self._shared = shared
         self._clock = clock
-        self.passing = passing
-        self._mailbox = Mailbox(board.commands)
-        self._status_board = StatusBoard(board.status)
+        self.advance_cycles = advance_cycles
+        self._commands = CommandQueue(shared.commands)
+        self._status_slot = StatusSlot(shared.status)
         self._asked = 0
-        self.on_pass: list[Callable[[], None]] = []
+        self.on_tick: list[Callable[[], None]] = []
 
     @property
     def loop(self) -> LoopStatus:
         """The loop's newest status."""
-        return self._status_board.read()
+        return self._status_slot.read()
 
     @property
     def status(self) -> ControlStatus:
@@ -94,18 +96,18 @@ class Desk:
         while left > 0:
             portion = min(left, PORTION)
             self.beat()
-            self.passing(portion)
+            self.advance_cycles(portion)
             left -= portion
-            for look in self.on_pass:
+            for look in self.on_tick:
                 look()
 
     def beat(self) -> None:
         """Show the loop that the console is alive."""
-        self._board.beats.beat(Role.CONSOLE, self._clock.now_ns())
+        self._shared.heartbeats.beat(ProcessRole.CONSOLE, self._clock.now_ns())
 
     def request(self, state: ArmState) -> None:
         """Ask the loop for a state of the arm."""
-        self._asked = self._mailbox.post(Kind.ENTER, state)
+        self._asked = self._commands.post(CommandKind.ENTER, state)
 
     def idle(self, seconds: float = 1.0) -> bool:
         """Ask for the brakes and wait; return whether the arm is confirmed idle."""
@@ -123,36 +125,36 @@ class Desk:
 
         No joint is faster than `speed` [rad/s] on the way.
         """
-        self._asked = self._mailbox.post(Kind.MOVE, values=(*goal, speed))
+        self._asked = self._commands.post(CommandKind.MOVE, values=(*goal, speed))
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Tell the loop what the sensor reads without load [N, N m], six numbers."""
-        self._mailbox.post(Kind.SET_BIAS, values=tuple(bias))
+        self._commands.post(CommandKind.SET_BIAS, values=tuple(bias))
 
     def watch_trial(self, *, is_recording: bool) -> None:
         """Switch the guard's limits for a running trial on or off."""
-        self._mailbox.post(Kind.WATCH_TRIAL, int(is_recording))
+        self._commands.post(CommandKind.WATCH_TRIAL, int(is_recording))
 
     def leave(self) -> None:
         """Ask the loop to end."""
-        self._mailbox.post(Kind.LEAVE)
+        self._commands.post(CommandKind.LEAVE)
 
     def last(self, seconds: float) -> Record:
         """Return the records of the last `seconds`, oldest first."""
-        return self._board.cycles.last(round(seconds * NS_PER_S / PERIOD_NS))
+        return self._shared.cycles.last(round(seconds * NS_PER_S / PERIOD_NS))
 
     def latest(self) -> Record:
         """Return the newest record, shape (1,); empty before the first cycle."""
-        return self._board.cycles.last(1)
+        return self._shared.cycles.last(1)
 
     def wrenches(self) -> RingReader:
         """Return a reader of the sensor's samples from now on."""
-        return self._board.wrenches.reader()
+        return self._shared.wrenches.reader()
 
     def timings(self) -> RingReader:
         """Return a reader of the loop's timings from now on."""
-        return self._board.timings.reader()
+        return self._shared.timings.reader()
 
     def device_facts(self) -> dict[str, str]:
         """Return what the devices said last about themselves."""
-        return json.loads(self._board.health.read() or b"{}")
+        return json.loads(self._shared.health.read() or b"{}")

@@ -5,13 +5,19 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.guard import Action, GuardVerdict
 from acquisition.control_loop.loop import LoopStats, Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import pack_timing
 from acquisition.devices import Arm
-from acquisition.ipc.commands import Command, Kind, LoopStatus, Mailbox, StatusBoard
-from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.commands import (
+    Command,
+    CommandKind,
+    CommandQueue,
+    LoopStatus,
+    StatusSlot,
+)
+from acquisition.ipc.layout import ProcessRole, SharedLayout
 
 MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
@@ -21,7 +27,11 @@ _FACTS_EVERY = 500  # cycles
 _BELL_EVERY = 500  # cycles
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
-_CONSOLE, _CONTROL, _RECORDER = Role.CONSOLE, Role.CONTROL, Role.RECORDER
+_CONSOLE, _CONTROL, _RECORDER = (
+    ProcessRole.CONSOLE,
+    ProcessRole.CONTROL,
+    ProcessRole.RECORDER,
+)
 
 Facts = Callable[[], Mapping[str, str]]
 
@@ -31,7 +41,7 @@ def no_bell() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class LoopHooks:
     """What the loop knows of the machine it runs on.
 
     Attributes:
@@ -45,7 +55,7 @@ class Surroundings:
     ring: Callable[[], None] = no_bell
 
 
-class Attendant:
+class LoopServer:
     """Wraps a cycle for the loop: obeys the mailbox, publishes, watches the others.
 
     Attributes:
@@ -54,24 +64,24 @@ class Attendant:
     """
 
     def __init__(
-        self, cycle: Cycle, arm: Arm, board: Board, around: Surroundings
+        self, cycle: Cycle, arm: Arm, shared: SharedLayout, around: LoopHooks
     ) -> None:
         self.is_over = False
         self.is_orphaned = False
         self.stats = LoopStats()
         self._cycle = cycle
         self._arm = arm
-        self._board = board
+        self._shared = shared
         self._around = around
-        self._mailbox = Mailbox(board.commands)
-        self._status_board = StatusBoard(board.status)
+        self._commands = CommandQueue(shared.commands)
+        self._status_slot = StatusSlot(shared.status)
         self._status = LoopStatus(is_running=True, control=cycle.status)
         self._cycles = 0
         self._orphaned_ns = 0
 
     def __call__(self, tick: Tick) -> None:
         """Run one cycle with everything around it."""
-        for command in self._mailbox.take():
+        for command in self._commands.take():
             self._obey(command)
         self._watch(tick.now_ns)
         self._cycle(tick)
@@ -83,18 +93,18 @@ class Attendant:
     def leave(self) -> None:
         """Say that the loop has ended."""
         self._status.is_running = False
-        self._status_board.write(self._status)
+        self._status_slot.write(self._status)
 
     def _obey(self, command: Command) -> None:
         kind, cycle = command.kind, self._cycle
-        if kind is Kind.ENTER:
+        if kind is CommandKind.ENTER:
             cycle.request(ArmState(command.argument))
-        elif kind is Kind.WATCH_TRIAL:
+        elif kind is CommandKind.WATCH_TRIAL:
             cycle.is_recording = bool(command.argument)
             self._publish_facts()
-        elif kind is Kind.SET_BIAS:
+        elif kind is CommandKind.SET_BIAS:
             cycle.set_bias(command.values[:6])
-        elif kind is Kind.MOVE:
+        elif kind is CommandKind.MOVE:
             *goal, speed = command.values[:8]
             cycle.move_to(tuple(goal), speed)
         else:
@@ -102,18 +112,21 @@ class Attendant:
         self._status.obeyed = command.number
 
     def _publish_facts(self) -> None:
-        self._board.health.write(json.dumps(dict(self._around.facts())).encode())
+        self._shared.health.write(json.dumps(dict(self._around.facts())).encode())
 
     def _watch(self, now_ns: int) -> None:
         """Stop the arm when those who look after it have gone."""
-        beats = self._board.beats
-        console_ns = now_ns - beats.last_ns(_CONSOLE)
+        heartbeats = self._shared.heartbeats
+        console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
-            self._cycle.report(Verdict(Action.HOLD, "console-silent"))
+            self._cycle.report(GuardVerdict(Action.HOLD, "console-silent"))
             if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
                 self._around.ring()
-        if self._cycle.is_recording and now_ns - beats.last_ns(_RECORDER) > SILENT_NS:
-            self._cycle.report(Verdict(Action.HOLD, "recorder-silent"))
+        if (
+            self._cycle.is_recording
+            and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS
+        ):
+            self._cycle.report(GuardVerdict(Action.HOLD, "recorder-silent"))
         if self.is_orphaned:
             self._brake_alone(now_ns)
 
@@ -121,7 +134,7 @@ class Attendant:
         """Nobody will ever ask for anything again: hold, then brake, then end."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns
-            self._cycle.report(Verdict(Action.HOLD, "console-lost"))
+            self._cycle.report(GuardVerdict(Action.HOLD, "console-lost"))
         elif now_ns - self._orphaned_ns > ORPHAN_NS:
             self._cycle.request(ArmState.IDLE)
             self.is_over = True
@@ -133,9 +146,9 @@ class Attendant:
         status.cycles = self._cycles
         status.skipped, status.late = stats.skipped, stats.late
         status.worst_late_ns = stats.worst_late_ns
-        self._status_board.write(status)
+        self._status_slot.write(status)
         now_ns = self._around.now_ns()
-        self._board.beats.beat(_CONTROL, now_ns)
-        self._board.timings.write(
+        self._shared.heartbeats.beat(_CONTROL, now_ns)
+        self._shared.timings.write(
             pack_timing(tick, self._cycle.replies_ns, self._arm.sent_ns, now_ns)
         )

@@ -9,9 +9,9 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.errors import TrialFileError
-from acquisition.ipc.layout import Board, Role
+from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.sample import Record
-from acquisition.trial_file.verify import Verified, verify
+from acquisition.trial_file.verify import VerifiedFile, verify
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
     TRIAL_TOPICS,
@@ -51,7 +51,7 @@ class TrialRecording(Protocol):
         """Write an event of now into the file, if one is open."""
         ...
 
-    def finish(self, stop_reason: str) -> Verified:
+    def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file.
 
         Raises:
@@ -74,12 +74,12 @@ class Recorder:
         largest_backlog: cycles that waited at most since the trial began.
     """
 
-    def __init__(self, board: Board, clock: Clock) -> None:
-        self._board = board
+    def __init__(self, shared: SharedLayout, clock: Clock) -> None:
+        self._shared = shared
         self._clock = clock
-        self._cycles = board.cycles.reader()
-        self._wrenches = board.wrenches.reader()
-        self._frames = board.frames.reader()
+        self._cycles = shared.cycles.reader()
+        self._wrenches = shared.wrenches.reader()
+        self._frames = shared.frames.reader()
         self._writer: TrialWriter | None = None
         self._has_frames = False
         self._flushed_ns = 0
@@ -104,8 +104,8 @@ class Recorder:
             reader.read()
             reader.lost = 0
         self._cycles.rewind(int(PRE_ROLL * RATE_HZ))
-        self._wrenches.rewind(_since(self._board.wrenches.last(8192), earliest_ns))
-        self._frames.rewind(_since(self._board.frames.last(8192), earliest_ns))
+        self._wrenches.rewind(_since(self._shared.wrenches.last(8192), earliest_ns))
+        self._frames.rewind(_since(self._shared.frames.last(8192), earliest_ns))
         self.largest_backlog = 0
         self._flushed_ns = now_ns
         self.failure = None
@@ -122,7 +122,7 @@ class Recorder:
             except TrialFileError as error:
                 self.failure = error
                 self._let_go()
-        self._board.beats.beat(Role.RECORDER, self._clock.now_ns())
+        self._shared.heartbeats.beat(ProcessRole.RECORDER, self._clock.now_ns())
 
     def event(self, level: int, name: str, text: str) -> None:
         """Write an event of now into the file, if one is open."""
@@ -134,7 +134,7 @@ class Recorder:
             self.failure = error
             self._let_go()
 
-    def finish(self, stop_reason: str) -> Verified:
+    def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file; see `seal`."""
         writer = self._writer
         if writer is None:
@@ -171,7 +171,7 @@ class Recorder:
             if failure
             else None,
         }
-        self._board.recorder.write(json.dumps(state).encode())
+        self._shared.recorder.write(json.dumps(state).encode())
 
     def _write_new(self, writer: TrialWriter) -> None:
         self.largest_backlog = max(self.largest_backlog, self._cycles.backlog)
@@ -187,7 +187,7 @@ class Recorder:
             self._flushed_ns = self._clock.now_ns()
 
 
-def seal(writer: TrialWriter, stop_reason: str) -> Verified:
+def seal(writer: TrialWriter, stop_reason: str) -> VerifiedFile:
     """End a file, read it back, and give it its final name.
 
     Raises:

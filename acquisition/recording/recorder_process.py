@@ -7,30 +7,30 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
-from acquisition.control_loop.realtime import Wish, request
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
-from acquisition.ipc.child import Child, Station, name_process
-from acquisition.ipc.layout import Board, Role
-from acquisition.ipc.memory import give_back_heap
+from acquisition.ipc.child import Child, ChildContext, name_process
+from acquisition.ipc.layout import ProcessRole, SharedLayout
+from acquisition.ipc.rings import give_back_heap
 from acquisition.ipc.rpc import ChannelClosedError, Handler
 from acquisition.recording.recorder import Recorder
-from acquisition.trial_file.verify import Verified
+from acquisition.trial_file.verify import VerifiedFile
 from acquisition.trial_file.writer import TrialHeader
 
 DRAIN_S = 0.02
 NICE = 5
 _HEADER = TypeAdapter(TrialHeader)
-_VERIFIED = TypeAdapter(Verified)
+_VERIFIED = TypeAdapter(VerifiedFile)
 
 
-def main(station: Station) -> None:
+def main(station: ChildContext) -> None:
     """Record what the board shows until the console hangs up.
 
     A trial that is open then is ended properly: nothing is lost with the console.
     """
     name_process("traction-record")
-    request(Wish(nice=NICE, core=station.settings.get("core")))
-    recorder = Recorder(station.board, SystemClock())
+    request(RealtimeRequest(nice=NICE, core=station.settings.get("core")))
+    recorder = Recorder(station.shared, SystemClock())
     handlers: dict[str, Handler] = {
         "start": lambda told: recorder.start(
             Path(told["path"]), _HEADER.validate_python(told["header"])
@@ -60,9 +60,9 @@ def _finish(recorder: Recorder, reason: str) -> dict[str, Any]:
 class RemoteRecorder:
     """A recorder in another process (implements TrialRecording)."""
 
-    def __init__(self, child: Child, board: Board) -> None:
+    def __init__(self, child: Child, shared: SharedLayout) -> None:
         self._child = child
-        self._board = board
+        self._shared = shared
         self._is_recording = False
 
     @property
@@ -73,7 +73,7 @@ class RemoteRecorder:
     @property
     def is_beating(self) -> bool:
         """Whether it has ever shown that it is alive."""
-        return self._board.beats.last_ns(Role.RECORDER) > 0
+        return self._shared.heartbeats.last_ns(ProcessRole.RECORDER) > 0
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples."""
@@ -86,7 +86,7 @@ class RemoteRecorder:
         """Write an event of now into the file, if one is open."""
         self._child.ask("event", [level, name, text])
 
-    def finish(self, stop_reason: str) -> Verified:
+    def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file."""
         self._is_recording = False
         return _VERIFIED.validate_python(self._child.ask("finish", stop_reason))
@@ -117,4 +117,4 @@ class RemoteRecorder:
             raise TrialFileError(Path(path), reason, hint=hint)
 
     def _state(self) -> dict[str, Any]:
-        return json.loads(self._board.recorder.read() or b"{}")
+        return json.loads(self._shared.recorder.read() or b"{}")

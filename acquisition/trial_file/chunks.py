@@ -71,7 +71,7 @@ def unpacked_limit(file_bytes: int) -> int:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class RawRecord:
     """A record in a buffer.
 
     Attributes:
@@ -85,7 +85,7 @@ class Found:
     end: int
 
 
-def record_at(data: memoryview, offset: int) -> Found | None:
+def record_at(data: memoryview, offset: int) -> RawRecord | None:
     """Return the record at `offset`, None where the buffer does not hold all of it."""
     start = offset + _RECORD.size
     if offset < 0 or start > len(data):
@@ -93,7 +93,7 @@ def record_at(data: memoryview, offset: int) -> Found | None:
     opcode, length = _RECORD.unpack_from(data, offset)
     if length > len(data) - start:
         return None
-    return Found(opcode, data[start : start + length], start + length)
+    return RawRecord(opcode, data[start : start + length], start + length)
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,7 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.checksums import MAGIC, check_sections
 from acquisition.trial_file.chunks import (
     RECORD_LIMIT,
-    Found,
+    RawRecord,
     as_trial_file_error,
     read_file,
     record_at,
@@ -115,7 +115,7 @@ def _read_summary(data: memoryview, start: int, end: int, path: Path) -> Summary
     return summary
 
 
-def _add_record(summary: Summary, found: Found) -> None:
+def _add_record(summary: Summary, found: RawRecord) -> None:
     match found.opcode:
         case Opcode.CHUNK_INDEX:
             summary.chunk_indexes.append(_chunk_index(found.body))

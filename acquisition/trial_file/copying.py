@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
-from acquisition.trial_file.salvage import Salvage, Salvaged
+from acquisition.trial_file.salvage import Salvaged, SoundRecords
 from acquisition.trial_file.writer import CHUNK_BYTES
 
 
@@ -69,7 +69,7 @@ class TrialCopy:
             case _:
                 pass  # a schema or channel that was said before
 
-    def finish(self, salvage: Salvage) -> None:
+    def finish(self, salvage: SoundRecords) -> None:
         """Write what was saved and lost, and the summary.
 
         Raises:

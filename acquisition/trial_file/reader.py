@@ -31,7 +31,7 @@ _INDEX = struct.Struct("<HI")  # channel, bytes of pairs (log time, offset)
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class TopicRows:
     """Messages of one topic.
 
     Attributes:
@@ -82,11 +82,11 @@ class TrialReader:
         """Whether the trial came from simulated devices."""
         return self.metadata["trial"].get("simulated") == "true"
 
-    def cycles(self) -> Rows:
+    def cycles(self) -> TopicRows:
         """Return all records of `/cycle` in order."""
         return self._rows("/cycle", CYCLE)
 
-    def truth(self) -> Rows:
+    def truth(self) -> TopicRows:
         """Return all records of `/truth` in order (truth files of simulations)."""
         return self._rows("/truth", TRUTH)
 
@@ -96,7 +96,7 @@ class TrialReader:
         counts = self.summary.statistics.channel_message_counts
         return {c.topic: counts.get(i, 0) for i, c in self.summary.channels.items()}
 
-    def _rows(self, topic: str, layout: Layout) -> Rows:
+    def _rows(self, topic: str, layout: Layout) -> TopicRows:
         with as_trial_file_error(self.path):
             channel = self._channel(topic, layout.type_name)
             chunks = [
@@ -118,7 +118,7 @@ class TrialReader:
                     self.path, f"{topic}: {filled} messages, {count} announced"
                 )
             self._check_rows(heads, data, layout, channel)
-            return Rows(data, heads["log_time"].copy(), heads["sequence"].copy())
+            return TopicRows(data, heads["log_time"].copy(), heads["sequence"].copy())
 
     def _copy(self, index: ChunkIndex, channel: int, heads: Record, out: Record) -> int:
         """Copy the messages of `channel` in one chunk; return how many there were."""

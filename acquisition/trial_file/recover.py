@@ -13,8 +13,8 @@ from acquisition.trial_file.chunks import as_trial_file_error, read_file
 from acquisition.trial_file.copying import TrialCopy
 from acquisition.trial_file.publishing import publish_file
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.salvage import Salvage
-from acquisition.trial_file.verify import Verified, verify
+from acquisition.trial_file.salvage import SoundRecords
+from acquisition.trial_file.verify import VerifiedFile, verify
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Recovery:
 
     source: Path
     path: Path
-    verified: Verified
+    verified: VerifiedFile
     messages: int
     bytes_dropped: int = 0
     seconds_dropped: float = 0.0
@@ -87,7 +87,7 @@ def recover(source: Path) -> Recovery:
 def _recover(
     data: bytes, source: Path, facts: Mapping[str, str], written: Path
 ) -> Recovery:
-    salvage = Salvage(data, source)
+    salvage = SoundRecords(data, source)
     copy = _write(salvage, source, facts, written)
     try:
         verified = verify(written)
@@ -108,7 +108,7 @@ def _recover(
 
 
 def _write(
-    salvage: Salvage, source: Path, facts: Mapping[str, str], written: Path
+    salvage: SoundRecords, source: Path, facts: Mapping[str, str], written: Path
 ) -> TrialCopy:
     """Write what `salvage` gives into `written`, down to the disk."""
     with written.open("xb") as file:

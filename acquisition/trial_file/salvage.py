@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.checksums import MAGIC
 from acquisition.trial_file.chunks import (
-    Found,
+    RawRecord,
     Unpacker,
     as_trial_file_error,
     parse_chunk,
@@ -29,7 +29,7 @@ _INDEX = struct.Struct("<HI")  # channel, bytes of pairs of 16
 _LONGEST_NS = 3600 * 10**9  # a chunk that claims to be later than this is not believed
 
 
-class Salvage:
+class SoundRecords:
     """Iterates once over the sound records at the beginning of `data`.
 
     A chunk's records come when all of it proved sound, or not at all. The one damage
@@ -91,7 +91,7 @@ class Salvage:
             at = found.end
         return (last_ns - self.last_ns) * 1e-9
 
-    def _read(self, found: Found) -> Generator[Salvaged]:
+    def _read(self, found: RawRecord) -> Generator[Salvaged]:
         """Give the records of one top-level record; it raises before it gives any."""
         match found.opcode:
             case Opcode.CHUNK:
@@ -121,7 +121,7 @@ class Salvage:
             yield self._parse(found)
         self.last_ns = max(self.last_ns, chunk.end_ns)
 
-    def _split(self, data: memoryview) -> Generator[Found]:
+    def _split(self, data: memoryview) -> Generator[RawRecord]:
         at = 0
         while at < len(data):
             found = record_at(data, at)
@@ -131,7 +131,7 @@ class Salvage:
                 yield found
             at = found.end
 
-    def _parse(self, found: Found) -> Salvaged:
+    def _parse(self, found: RawRecord) -> Salvaged:
         if found.opcode == Opcode.MESSAGE:
             channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(found.body)
             if channel not in self._channels:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.chunks import as_trial_file_error
-from acquisition.trial_file.reader import Rows, TrialReader
+from acquisition.trial_file.reader import TopicRows, TrialReader
 from acquisition.trial_file.writer import WriterCounts
 
 PERIOD_NS = 2_000_000
@@ -18,7 +18,7 @@ REQUIRED_METADATA = ("trial", "clock", "provenance", "channels", "result")
 
 
 @dataclass(frozen=True, slots=True)
-class Verified:
+class VerifiedFile:
     """A file that was read back completely.
 
     Attributes:
@@ -38,7 +38,7 @@ class Verified:
     is_complete: bool
 
 
-def verify(path: Path, counts: WriterCounts | None = None) -> Verified:
+def verify(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
     """Check magics, CRCs, counts, cadence, clock and attachments of `path`.
 
     A recovered file may lack attachments, and its cadence is not judged: it is all
@@ -63,7 +63,9 @@ def verify(path: Path, counts: WriterCounts | None = None) -> Verified:
         cycles, duration, worst = _check_cycles(reader)
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return Verified(digest, reader.size, cycles, duration, worst, reader.is_complete)
+    return VerifiedFile(
+        digest, reader.size, cycles, duration, worst, reader.is_complete
+    )
 
 
 def _check_attachments(reader: TrialReader) -> None:
@@ -110,7 +112,9 @@ def _check_numbers(reader: TrialReader, numbers: NDArray[np.int64]) -> None:
         raise TrialFileError(reader.path, "lacks other cycles than it states")
 
 
-def _check_clock(reader: TrialReader, rows: Rows, host_ns: NDArray[np.int64]) -> None:
+def _check_clock(
+    reader: TrialReader, rows: TopicRows, host_ns: NDArray[np.int64]
+) -> None:
     offset = int(reader.metadata["clock"]["utc_offset_ns"])
     if bool((rows.log_time.astype(np.int64) - host_ns != offset).any()):
         raise TrialFileError(reader.path, "has times that do not follow its clock")

@@ -75,7 +75,7 @@ class Smoothed:
 
 
 @dataclass(frozen=True, slots=True)
-class Shares:
+class CoverageShares:
     """How the thinned samples of a trial divide by velocity; they sum to one.
 
     Attributes:
@@ -122,7 +122,7 @@ class PreparedTrial:
     F_n: Array
     F_t: Array
     indices: Indices
-    shares: Shares
+    shares: CoverageShares
     smooth: Smoothed
     travel: float
     is_countable: bool
@@ -208,8 +208,8 @@ def _smooth(series: TractionSeries, width: int) -> Smoothed:
     return Smoothed(t=series.t, **columns)
 
 
-def _shares(v: Array, options: PrepareOptions) -> Shares:
-    return Shares(
+def _shares(v: Array, options: PrepareOptions) -> CoverageShares:
+    return CoverageShares(
         window=float(np.mean((v >= options.slowest) & (v <= options.fastest))),
         sticking=float(np.mean(np.abs(v) < options.slowest)),
         backward=float(np.mean(v <= -options.slowest)),

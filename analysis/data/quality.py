@@ -28,7 +28,7 @@ ENOUGH = 0.02  # share of the samples a cell should hold
 
 
 @dataclass(frozen=True, slots=True)
-class Coverage:
+class CoverageGrid:
     """How the moving samples spread over speed and load.
 
     Attributes:
@@ -49,7 +49,7 @@ class Coverage:
         return float(self.shares[3].sum())
 
 
-def coverage(trials: Sequence[PreparedTrial]) -> Coverage:
+def coverage(trials: Sequence[PreparedTrial]) -> CoverageGrid:
     """Return how the kept samples of `trials` spread over speed and load."""
     counts = np.zeros((4, 4), np.int64)
     for trial in trials:
@@ -57,10 +57,10 @@ def coverage(trials: Sequence[PreparedTrial]) -> Coverage:
             np.abs(trial.v_t), trial.F_n, bins=(SPEED_EDGES, LOAD_EDGES)
         )
         counts += cells.astype(np.int64)
-    return Coverage(counts)
+    return CoverageGrid(counts)
 
 
-def suggest(found: Coverage) -> str:
+def suggest(found: CoverageGrid) -> str:
     """Return how the next push should be, in words; empty when nothing is missing.
 
     Of the cells that a person can aim at, the emptiest one below 2 % of the samples.

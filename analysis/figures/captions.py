@@ -6,8 +6,8 @@ import numpy as np
 
 from analysis.figures.selection import (
     FLAT,
-    Excerpt,
     Panel,
+    TimeWindow,
     excerpts,
     panels,
     terrain_class,
@@ -22,7 +22,7 @@ def say_excerpts(study: Study) -> str:
     return "Smoothed record at the full rate. " + " ".join(parts)
 
 
-def _say_excerpt(excerpt: Excerpt) -> str:
+def _say_excerpt(excerpt: TimeWindow) -> str:
     where = f"{excerpt.terrain}, trial {excerpt.trial}"
     slips = [slip for slip, _, _ in excerpt.slips]
     if not slips:

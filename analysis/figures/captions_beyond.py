@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.figures.selection import representatives
 from analysis.figures.uncertainty import BANDS, coverage_of
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.findings.surfaces import Surface
 from analysis.findings.trends import MEAN_FORCE
 from analysis.study.models import GP_SE, TITLES
@@ -15,7 +15,7 @@ from analysis.study.study import Study
 _KEPT_PER_SECOND = 100
 
 
-def say_mean(found: Findings) -> str:
+def say_mean(found: StudyResults) -> str:
     """Return how far the means reach."""
     said = [
         f"{surface.terrain} {surface.mean.min():.1f} to {surface.mean.max():.1f} N"
@@ -27,7 +27,7 @@ def say_mean(found: Findings) -> str:
     )
 
 
-def say_variance(found: Findings) -> str:
+def say_variance(found: StudyResults) -> str:
     """Return how much the variances of stones and plates differ."""
     said = [
         f"{surface.terrain} {float(np.median(surface.variance)):.2g} N²"
@@ -39,7 +39,7 @@ def say_variance(found: Findings) -> str:
     )
 
 
-def say_coverage(found: Findings) -> str:
+def say_coverage(found: StudyResults) -> str:
     """Return what the coverage map leaves out."""
     outside = sum(part.outside for part in found.coverage)
     total = outside + sum(float(part.counts.sum()) for part in found.coverage)
@@ -49,7 +49,7 @@ def say_coverage(found: Findings) -> str:
     )
 
 
-def say_calibration(found: Findings) -> str:
+def say_calibration(found: StudyResults) -> str:
     """Return how far the bands are from what they promise."""
     shares = [
         (nominal, name, model, share)
@@ -73,7 +73,7 @@ def say_calibration(found: Findings) -> str:
     )
 
 
-def say_noise(found: Findings) -> str:
+def say_noise(found: StudyResults) -> str:
     """Return where input-dependent noise helps."""
     better = [
         f"{s.terrain} {-s.paired.difference:.3f} (p = {s.paired.p:.2g})"
@@ -89,7 +89,7 @@ def say_noise(found: Findings) -> str:
     )
 
 
-def say_confusion(level: str, found: Findings) -> str:
+def say_confusion(level: str, found: StudyResults) -> str:
     """Return how many windows are recognised by either rule."""
     identification = found.identification
     if identification is None:
@@ -107,7 +107,7 @@ def say_confusion(level: str, found: Findings) -> str:
     )
 
 
-def say_trials(found: Findings) -> str:
+def say_trials(found: StudyResults) -> str:
     """Return how many trials are shown."""
     count = sum(len(result.trials) for result in found.study.terrains.values())
     return (
@@ -116,7 +116,7 @@ def say_trials(found: Findings) -> str:
     )
 
 
-def say_trends(found: Findings) -> str:
+def say_trends(found: StudyResults) -> str:
     """Return which terrains change from the first trial to the last."""
     changing = [
         f"{name} ({trend.slope:+.3f} ± {trend.slope_error:.3f} N per trial)"
@@ -135,7 +135,7 @@ def say_trends(found: Findings) -> str:
     )
 
 
-def say_residuals(found: Findings) -> str:
+def say_residuals(found: StudyResults) -> str:
     """Return how large bias and spread of the residuals are."""
     said = [
         f"{name} {bands[GP_SE].bias:+.2f} ± {bands[GP_SE].sd:.2f} N"
@@ -149,7 +149,7 @@ def say_residuals(found: Findings) -> str:
     )
 
 
-def say_stick_slip(found: Findings) -> str:
+def say_stick_slip(found: StudyResults) -> str:
     """Return how long slips are."""
     said = []
     for result in representatives(found.study):
@@ -167,7 +167,7 @@ def say_stick_slip(found: Findings) -> str:
     )
 
 
-def say_timing(found: Findings) -> str:
+def say_timing(found: StudyResults) -> str:
     """Return the longest period and the usual age of a force sample."""
     longest = max(trial.longest_gap for trial in found.rig)
     missed = sum(trial.missed for trial in found.rig)
@@ -180,7 +180,7 @@ def say_timing(found: Findings) -> str:
     )
 
 
-def say_rig(found: Findings) -> str:
+def say_rig(found: StudyResults) -> str:
     """Return the largest motion of joint 7 and the largest change of tare."""
     joint7 = max(found.rig, key=lambda trial: trial.joint7)
     parts = [f"Joint 7 moved at most {joint7.joint7:.1f} mrad ({joint7.name})"]

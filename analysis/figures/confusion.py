@@ -12,7 +12,7 @@ from analysis.figures.style import (
     plain,
     shade_table,
 )
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.terrains.confusion import Confusion
 
 _KEPT_PER_SECOND = 100
@@ -22,13 +22,13 @@ _MANY = 5  # kinds from which a matrix is a large one
 _RULES = (("by log density", "by_density"), ("smallest error (paper)", "by_error"))
 
 
-def draw_confusion(level: str) -> Callable[[Findings], Figure | None]:
+def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
     """Return a function that draws the matrices of a level for every window length.
 
     Above the log density's, below the paper's rule.
     """
 
-    def draw(found: Findings) -> Figure | None:
+    def draw(found: StudyResults) -> Figure | None:
         identification = found.identification
         if identification is None or not identification.sizes:
             return None

@@ -5,7 +5,7 @@ All panels of a figure share their axes, so that terrains can be compared by eye
 
 from collections.abc import Callable
 
-from analysis.figures.selection import Excerpt, Panel, excerpts, force_range, panels
+from analysis.figures.selection import Panel, TimeWindow, excerpts, force_range, panels
 from analysis.figures.style import (
     FORCE_LABEL,
     LOAD_LINES,
@@ -47,7 +47,7 @@ def draw_gp(study: Study) -> Figure | None:
     return _draw_panels(panels(study, GP_SE), _draw_band)
 
 
-def _draw_excerpt(above: Axes, below: Axes, excerpt: Excerpt) -> None:
+def _draw_excerpt(above: Axes, below: Axes, excerpt: TimeWindow) -> None:
     for k, (slip, onset, end) in enumerate(excerpt.slips):
         for ax in (above, below):
             ax.axvspan(

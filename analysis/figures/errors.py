@@ -128,7 +128,10 @@ def draw_cross_map(study: Study) -> Figure | None:
 
 
 def _draw_map(
-    ax: Axes, cross: dict[str, dict[str, float | None]], tested: list[str], top: float
+    ax: Axes,
+    cross: dict[str, dict[str, float | None]],
+    tested: list[str],
+    top: float,
 ) -> None:
     table = np.array(
         [

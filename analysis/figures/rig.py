@@ -5,14 +5,20 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from analysis.data.series import Array
-from analysis.figures.style import Axes, Figure, name_ticks, new_figure, terrain_colours
-from analysis.findings.findings import Findings
+from analysis.figures.style import (
+    Axes,
+    Figure,
+    name_ticks,
+    new_figure,
+    terrain_colours,
+)
+from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
 
 _WARNING_MRAD = 20.0  # motion of joint 7 that the guard warns of
 
 
-def draw_timing(found: Findings) -> Figure | None:
+def draw_timing(found: StudyResults) -> Figure | None:
     """Return histograms of the period and of the age of the force samples."""
     if not found.rig:
         return None
@@ -32,7 +38,7 @@ def draw_timing(found: Findings) -> Figure | None:
     return figure
 
 
-def draw_rig(found: Findings) -> Figure | None:
+def draw_rig(found: StudyResults) -> Figure | None:
     """Return tare bracket, joint 7, temperatures and load bias of every trial."""
     if not found.rig:
         return None

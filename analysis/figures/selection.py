@@ -7,7 +7,7 @@ import numpy as np
 
 from analysis.data.events import Slip
 from analysis.data.prepare import Smoothed
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.data.series import Array
 from analysis.study.models import FittedModel
 from analysis.study.study import Study, TerrainResult
@@ -28,7 +28,7 @@ _BEFORE, _AFTER = 0.3, 0.6  # s around a slip that an excerpt should hold
 
 
 @dataclass(frozen=True, slots=True)
-class Excerpt:
+class TimeWindow:
     """A stretch of one trial.
 
     Attributes:
@@ -64,7 +64,7 @@ class Panel:
 
     terrain: str
     fold: int
-    data: Rows
+    data: SampleTable
     v: Array
     loads: Array
     means: Array
@@ -89,12 +89,12 @@ def representatives(study: Study, most: int = 4) -> list[TerrainResult]:
     return list(first.values())[:most]
 
 
-def excerpts(study: Study) -> list[Excerpt]:
+def excerpts(study: Study) -> list[TimeWindow]:
     """Return one telling stretch per class of terrain."""
-    return [best_excerpt(result) for result in representatives(study)]
+    return [best_window(result) for result in representatives(study)]
 
 
-def best_excerpt(result: TerrainResult) -> Excerpt:
+def best_window(result: TerrainResult) -> TimeWindow:
     """Return the stretch with the most slips and bounces, else with the most motion."""
     candidates = [
         (_worth(trial.smooth, slips, start), k, start)
@@ -106,7 +106,7 @@ def best_excerpt(result: TerrainResult) -> Excerpt:
     _, k, start = max(candidates)
     smooth = result.trials[k].smooth
     rows = (smooth.t >= start) & (smooth.t <= start + EXCERPT)
-    return Excerpt(
+    return TimeWindow(
         terrain=result.terrain,
         trial=k + 1,
         t=smooth.t[rows] - start,
@@ -157,7 +157,7 @@ def _worth(
 
 def _panel(result: TerrainResult, model: str) -> Panel:
     fold = next(fold for fold in result.folds if model in fold.models)
-    everything = Rows.of(result.trials)
+    everything = SampleTable.of(result.trials)
     step = max(1, -(-everything.count // _MOST_POINTS))
     loads = np.quantile(everything.F_n, LOADS)
     span = float(everything.v_t.min()), float(everything.v_t.max())

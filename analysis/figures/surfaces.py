@@ -17,7 +17,7 @@ from analysis.figures.style import (
     panel_grid,
     titled,
 )
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.findings.surfaces import Surface, common_range
 
 _MOST_DIGITS = 15
@@ -27,7 +27,7 @@ _ROW = 1.75  # inches
 _MAP = "cividis"  # the same to every kind of colour sight
 
 
-def draw_mean(found: Findings) -> Figure | None:
+def draw_mean(found: StudyResults) -> Figure | None:
     """Return Fig. 7: the mean of the Gaussian process over (v_t, F_n)."""
     if not found.surfaces:
         return None
@@ -37,7 +37,7 @@ def draw_mean(found: Findings) -> Figure | None:
     return _draw(found, means, levels, "mean of $F_t$ [N]")
 
 
-def draw_variance(found: Findings) -> Figure | None:
+def draw_variance(found: StudyResults) -> Figure | None:
     """Return Fig. 8: its variance with the noise, colours on a logarithmic scale."""
     if not found.surfaces:
         return None
@@ -49,7 +49,7 @@ def draw_variance(found: Findings) -> Figure | None:
     return _draw(found, variances, levels, "variance of $F_t$ [N²]", norm=norm)
 
 
-def draw_coverage(found: Findings) -> Figure | None:
+def draw_coverage(found: StudyResults) -> Figure | None:
     """Return how many samples lie in every cell of velocity and load."""
     if not found.coverage:
         return None
@@ -69,7 +69,7 @@ def draw_coverage(found: Findings) -> Figure | None:
 
 
 def _draw(
-    found: Findings,
+    found: StudyResults,
     values: Sequence[Array],
     levels: Array,
     label: str,

@@ -17,7 +17,7 @@ from analysis.figures.style import (
     terrain_colours,
     titled,
 )
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.findings.trends import MEAN_FORCE, Trend
 from analysis.study.study import TerrainResult
 
@@ -26,7 +26,7 @@ _MOST_POINTS = 400  # of a curve
 _GAP = 0.08  # of a cell between two trials
 
 
-def draw_trials(found: Findings) -> Figure | None:
+def draw_trials(found: StudyResults) -> Figure | None:
     """Return small multiples: F_t over the way of every trial, a row per terrain."""
     results = list(found.study.terrains.values())
     figure = new_figure(0.95 * len(results) + 0.7)
@@ -54,7 +54,7 @@ def draw_trials(found: Findings) -> Figure | None:
     return figure
 
 
-def draw_trends(found: Findings) -> Figure | None:
+def draw_trends(found: StudyResults) -> Figure | None:
     """Return the mean F_t of every trial with its line: wear of the terrain."""
     shown = {
         name: trends[MEAN_FORCE]
@@ -78,7 +78,7 @@ def draw_trends(found: Findings) -> Figure | None:
     return figure
 
 
-def draw_stick_slip(found: Findings) -> Figure | None:
+def draw_stick_slip(found: StudyResults) -> Figure | None:
     """Return force over displacement of one trial per class of terrain."""
     chosen = representatives(found.study)
     if not chosen:

@@ -14,7 +14,7 @@ from analysis.figures.style import (
     plain,
     titled,
 )
-from analysis.findings.findings import RESIDUAL_MODELS, Findings
+from analysis.findings.findings import RESIDUAL_MODELS, StudyResults
 from analysis.study.models import TITLES
 from analysis.study.study import TerrainResult, mean_of
 
@@ -23,7 +23,7 @@ _FIRST, _SECOND = "#0072B2", "#D55E00"
 _ROW = 0.32  # inches of one terrain's gain
 
 
-def draw_calibration(found: Findings) -> Figure | None:
+def draw_calibration(found: StudyResults) -> Figure | None:
     """Return the share of held-out samples inside the 50, 90 and 95 % bands."""
     results = [r for r in found.study.terrains.values() if r.folds]
     models = [m for m in found.study.options.fit.models if any(map(_has(m), results))]
@@ -60,7 +60,7 @@ def coverage_of(result: TerrainResult, model: str, key: str) -> float:
     return float("nan") if value is None else value
 
 
-def draw_noise(found: Findings) -> Figure | None:
+def draw_noise(found: StudyResults) -> Figure | None:
     """Return what the chosen noise gains in log density, and what was chosen."""
     if not found.noise:
         return None
@@ -92,7 +92,7 @@ def draw_noise(found: Findings) -> Figure | None:
     return figure
 
 
-def draw_residuals(found: Findings) -> Figure | None:
+def draw_residuals(found: StudyResults) -> Figure | None:
     """Return quantiles of measured minus predicted F_t over velocity."""
     shown = {name: bands for name, bands in found.residuals.items() if bands}
     if not shown:

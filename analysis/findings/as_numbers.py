@@ -5,18 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from analysis.findings.findings import Findings
-from analysis.findings.noise_summary import NoiseSummary
-from analysis.findings.residuals import ResidualBand
+from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
-from analysis.findings.trends import TREND_UNITS, Trend
+from analysis.findings.trends import TREND_UNITS, NoiseSummary, ResidualBand, Trend
 from analysis.terrains.confusion import Confusion
 from analysis.terrains.identify import LEVELS, Identification
 
 _DIGITS = 5  # of the surfaces in fits.json
 
 
-def plain_findings(found: Findings) -> dict[str, Any]:
+def plain_findings(found: StudyResults) -> dict[str, Any]:
     """Return the findings as plain values for fits.json, with units."""
     return {
         "identification": _identification(found.identification),
@@ -46,7 +44,7 @@ def plain_findings(found: Findings) -> dict[str, Any]:
     }
 
 
-def findings_rows(found: Findings) -> list[tuple[str, str, str, str, float, str]]:
+def findings_rows(found: StudyResults) -> list[tuple[str, str, str, str, float, str]]:
     """Return the findings for fits.csv: terrain, model, fold, quantity, value, unit."""
     rows: list[tuple[str, str, str, str, float, str]] = []
     for s in found.noise:
@@ -114,7 +112,7 @@ def _residuals(band: ResidualBand) -> dict[str, Any]:
     }
 
 
-def _surfaces(found: Findings) -> dict[str, Any]:
+def _surfaces(found: StudyResults) -> dict[str, Any]:
     return {
         "F_n": _short(found.axes.F_n),
         "v_t": _short(found.axes.v_t),
@@ -125,7 +123,7 @@ def _surfaces(found: Findings) -> dict[str, Any]:
     }
 
 
-def _coverage(found: Findings) -> dict[str, Any]:
+def _coverage(found: StudyResults) -> dict[str, Any]:
     return {
         "F_n_edges": _short(found.edges.F_n),
         "v_t_edges": _short(found.edges.v_t),

@@ -3,19 +3,24 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.findings.noise_summary import NoiseSummary, noise_summaries
-from analysis.findings.residuals import ResidualBand, residual_band
 from analysis.findings.rig_health import RigTrial
 from analysis.findings.surfaces import (
-    Axes,
-    Coverage,
+    CoverageMap,
     Surface,
+    SurfaceAxes,
     cell_edges,
     coverages,
     surface_axes,
     surfaces,
 )
-from analysis.findings.trends import Trend, trends_of
+from analysis.findings.trends import (
+    NoiseSummary,
+    ResidualBand,
+    Trend,
+    noise_summaries,
+    residual_band,
+    trends_of,
+)
 from analysis.study.models import GP_SE, TUSTIN
 from analysis.study.study import Study
 from analysis.terrains.identify import Identification, identify_study
@@ -24,7 +29,7 @@ RESIDUAL_MODELS = (TUSTIN, GP_SE)
 
 
 @dataclass(frozen=True, slots=True)
-class Findings:
+class StudyResults:
     """A study and what follows from it.
 
     Attributes:
@@ -45,14 +50,14 @@ class Findings:
     noise: Sequence[NoiseSummary]
     trends: Mapping[str, Mapping[str, Trend]]
     residuals: Mapping[str, Mapping[str, ResidualBand]]
-    axes: Axes
+    axes: SurfaceAxes
     surfaces: Sequence[Surface]
-    edges: Axes
-    coverage: Sequence[Coverage]
+    edges: SurfaceAxes
+    coverage: Sequence[CoverageMap]
     rig: Sequence[RigTrial]
 
 
-def find(study: Study, rig: Sequence[RigTrial] = ()) -> Findings:
+def find(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
     """Return what follows from a study; models are only asked, nothing is fitted."""
     from threadpoolctl import threadpool_limits
 
@@ -60,9 +65,9 @@ def find(study: Study, rig: Sequence[RigTrial] = ()) -> Findings:
         return _find(study, rig)
 
 
-def _find(study: Study, rig: Sequence[RigTrial]) -> Findings:
+def _find(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
     results, axes, edges = study.terrains, surface_axes(study), cell_edges(study)
-    return Findings(
+    return StudyResults(
         study=study,
         identification=identify_study(study),
         noise=noise_summaries(study),

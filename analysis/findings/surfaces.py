@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.data.series import Array
 from analysis.study.study import Study, TerrainResult
 
@@ -26,13 +26,13 @@ class Surface:
     """
 
     terrain: str
-    data: Rows
+    data: SampleTable
     mean: Array
     variance: Array
 
 
 @dataclass(frozen=True, slots=True)
-class Coverage:
+class CoverageMap:
     """How many kept samples of a terrain lie in every cell of velocity and load.
 
     Attributes:
@@ -47,7 +47,7 @@ class Coverage:
 
 
 @dataclass(frozen=True, slots=True)
-class Axes:
+class SurfaceAxes:
     """Axes shared by all terrains, so that surfaces can be compared by eye.
 
     Attributes:
@@ -59,17 +59,17 @@ class Axes:
     F_n: Array
 
 
-def surface_axes(study: Study) -> Axes:
+def surface_axes(study: Study) -> SurfaceAxes:
     """Return the points at which surfaces are evaluated."""
     return _axes(study, _POINTS)
 
 
-def cell_edges(study: Study) -> Axes:
+def cell_edges(study: Study) -> SurfaceAxes:
     """Return the edges of the cells of coverage maps."""
     return _axes(study, _CELLS + 1)
 
 
-def surfaces(study: Study, model: str, axes: Axes) -> list[Surface]:
+def surfaces(study: Study, model: str, axes: SurfaceAxes) -> list[Surface]:
     """Return the surface of the first fold of `model` for every terrain with one."""
     v, load = (grid.ravel() for grid in np.meshgrid(axes.v_t, axes.F_n))
     shape = (axes.F_n.size, axes.v_t.size)
@@ -81,7 +81,7 @@ def surfaces(study: Study, model: str, axes: Axes) -> list[Surface]:
             found.append(
                 Surface(
                     terrain=result.terrain,
-                    data=Rows.of(result.trials),
+                    data=SampleTable.of(result.trials),
                     mean=prediction.mean.reshape(shape),
                     variance=(prediction.sd**2).reshape(shape),
                 )
@@ -89,7 +89,7 @@ def surfaces(study: Study, model: str, axes: Axes) -> list[Surface]:
     return found
 
 
-def coverages(study: Study, edges: Axes) -> list[Coverage]:
+def coverages(study: Study, edges: SurfaceAxes) -> list[CoverageMap]:
     """Return the coverage of every terrain that has kept samples."""
     return [
         _coverage(result, edges) for result in study.terrains.values() if result.kept
@@ -101,15 +101,15 @@ def common_range(values: Sequence[Array]) -> tuple[float, float]:
     return min(float(v.min()) for v in values), max(float(v.max()) for v in values)
 
 
-def _coverage(result: TerrainResult, edges: Axes) -> Coverage:
-    rows = Rows.of(result.trials)
+def _coverage(result: TerrainResult, edges: SurfaceAxes) -> CoverageMap:
+    rows = SampleTable.of(result.trials)
     counts, *_ = np.histogram2d(rows.F_n, rows.v_t, bins=[edges.F_n, edges.v_t])
-    return Coverage(result.terrain, counts, rows.count - int(counts.sum()))
+    return CoverageMap(result.terrain, counts, rows.count - int(counts.sum()))
 
 
-def _axes(study: Study, count: int) -> Axes:
+def _axes(study: Study, count: int) -> SurfaceAxes:
     options = study.options.prepare
-    loads = Rows.of([t for r in study.terrains.values() for t in r.trials]).F_n
+    loads = SampleTable.of([t for r in study.terrains.values() for t in r.trials]).F_n
     low, high = (
         (float(np.quantile(loads, 1.0 - _REACH)), float(np.quantile(loads, _REACH)))
         if loads.size
@@ -117,7 +117,7 @@ def _axes(study: Study, count: int) -> Axes:
     )
     low = min(low, 0.0)
     high = max(high, low + 1e-3)
-    return Axes(
+    return SurfaceAxes(
         v_t=np.linspace(options.slowest, options.fastest, count),
         F_n=np.linspace(low, high, count),
     )

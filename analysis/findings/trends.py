@@ -7,7 +7,10 @@ import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
-from analysis.study.study import TerrainResult
+from analysis.study.metrics import PairedComparison, compare
+from analysis.study.models import GP_SE, GP_SE_NOISE, GpModel
+from analysis.study.noise_selection import NAMES
+from analysis.study.study import Study, TerrainResult, mean_of
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}
@@ -87,3 +90,89 @@ _MEASURES: Mapping[str, Callable[[PreparedTrial], float]] = {
     MEAN_LOAD: lambda trial: float(trial.F_n.mean()),
     TRACTION_RATIO: _ratio,
 }
+
+
+SHARES = (0.05, 0.5, 0.95)  # quantiles of the residual that are shown
+_BINS = 10
+_FEWEST = 20  # residuals of a bin that quantiles are taken of
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualBand:
+    """Quantiles of measured minus predicted F_t in bins of velocity.
+
+    Attributes:
+        v: middle of every bin [m/s], shape (k,).
+        quantiles: 5 %, median and 95 % of the residual [N], shape (3, k).
+        bias: mean residual over all samples [N].
+        sd: their standard deviation [N].
+    """
+
+    v: Array
+    quantiles: Array
+    bias: float
+    sd: float
+
+
+def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
+    """Return the held-out residuals of a model; None without a fold that has it."""
+    pairs = [
+        (trial.v_t, trial.F_t - fold.models[model].model.mean(trial.F_n, trial.v_t))
+        for fold in result.folds
+        if model in fold.models
+        for trial in (result.trials[fold.fold],)
+    ]
+    if not pairs:
+        return None
+    v, residual = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    edges = np.linspace(v.min(), v.max(), _BINS + 1)
+    place = np.clip(np.searchsorted(edges, v, "right") - 1, 0, _BINS - 1)
+    full = [k for k in range(_BINS) if np.count_nonzero(place == k) >= _FEWEST]
+    return ResidualBand(
+        v=np.array([0.5 * (edges[k] + edges[k + 1]) for k in full]),
+        quantiles=np.array([np.quantile(residual[place == k], SHARES) for k in full])
+        .reshape(-1, len(SHARES))
+        .T,
+        bias=float(residual.mean()),
+        sd=float(residual.std()),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSummary:
+    """Constant noise beside the noise that was chosen, on trials left out.
+
+    Attributes:
+        terrain: its terrain.
+        counts: folds that chose each noise, by its name.
+        before: NLPD with constant noise [log N], mean over trials.
+        after: NLPD with the chosen noise.
+        paired: the second minus the first, trial by trial.
+    """
+
+    terrain: str
+    counts: dict[str, int]
+    before: float
+    after: float
+    paired: PairedComparison
+
+
+def noise_summaries(study: Study) -> list[NoiseSummary]:
+    """Return one summary per terrain that has both models; none if not fitted."""
+    found = (_summary(result) for result in study.terrains.values())
+    return [summary for summary in found if summary is not None]
+
+
+def _summary(result: TerrainResult) -> NoiseSummary | None:
+    before, after = (result.scores(model, "nlpd") for model in (GP_SE, GP_SE_NOISE))
+    paired, means = compare(before, after), (mean_of(before), mean_of(after))
+    if paired is None or means[0] is None or means[1] is None:
+        return None
+    fitted = [fold.model for fold in result.models(GP_SE_NOISE)]
+    chosen = [
+        model.choice.chosen
+        for model in fitted
+        if isinstance(model, GpModel) and model.choice is not None
+    ]
+    counts = {str(name): chosen.count(name) for name in NAMES}
+    return NoiseSummary(result.terrain, counts, means[0], means[1], paired)

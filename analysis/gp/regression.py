@@ -13,7 +13,7 @@ from analysis.data.series import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Likelihood, factorise, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import Optimum, Scores, Start, maximise, spread
+from analysis.gp.search import Optimum, Start, StartScores, maximise, spread
 
 MINIMUM_ROWS = 20
 
@@ -106,7 +106,7 @@ def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum
 
     every = -(-r.size // _ROUGH)
     rough = Likelihood(model, X[::every], r[::every])
-    scores = Scores(rough.value, likelihood.value)
+    scores = StartScores(rough.value, likelihood.value)
     return maximise(model, objective, X, float(np.std(r)), scores)
 
 

@@ -30,7 +30,7 @@ _FLAT = 3.0  # logarithm from which on a length or bias makes no difference
 _SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
 
 
-class Scores(NamedTuple):
+class StartScores(NamedTuple):
     """What tells a search where to start; either may raise SettingsError.
 
     Attributes:
@@ -79,7 +79,7 @@ def maximise(
     objective: Objective,
     X: Array,
     sd_y: float,
-    scores: Scores | None = None,
+    scores: StartScores | None = None,
 ) -> Optimum:
     """Return the hyperparameters of largest likelihood.
 

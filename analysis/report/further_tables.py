@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
-from analysis.report.page_model import ReportTable, Section
-from analysis.study.comparison import Paired, compare
+from analysis.report.page_model import ReportSection, ReportTable
+from analysis.study.metrics import PairedComparison, compare
 from analysis.study.models import TITLES
 from analysis.study.study import Study, TerrainResult, mean_of
 from analysis.terrains.identify import LEVELS
@@ -23,7 +23,7 @@ _HEADS = (
 )
 
 
-def beyond_tables(found: Findings) -> list[ReportTable]:
+def beyond_tables(found: StudyResults) -> list[ReportTable]:
     """Return the tables beyond the paper's; one without rows is left out."""
     study = found.study
     tables = [
@@ -52,7 +52,7 @@ def uncertainty(study: Study) -> ReportTable:
         "CRPS: continuous ranked probability score; both reward an honest spread, less "
         "is better. A band that holds much less than it promises is too narrow. The "
         "variance is that of a measurement, noise included.",
-        section=Section.BEYOND,
+        section=ReportSection.BEYOND,
     )
 
 
@@ -79,11 +79,11 @@ def paired_table(study: Study, key: str, unit: str) -> ReportTable:
         note=f"Difference to {TITLES[first]} ± its standard error over the trials; "
         "below zero is better. p: how often chance alone makes a difference as large, "
         "by all patterns of signs.",
-        section=Section.BEYOND,
+        section=ReportSection.BEYOND,
     )
 
 
-def paired_cell(paired: Paired | None) -> str:
+def paired_cell(paired: PairedComparison | None) -> str:
     """Return a comparison as text."""
     if paired is None:
         return "–"
@@ -91,7 +91,7 @@ def paired_cell(paired: Paired | None) -> str:
     return f"{paired.difference:+.3f}{error} (p {paired.p:.2g})"
 
 
-def noise_table(found: Findings) -> ReportTable:
+def noise_table(found: StudyResults) -> ReportTable:
     """Return which noise was chosen per terrain, and NLPD before and after."""
     rows = [
         [
@@ -107,11 +107,11 @@ def noise_table(found: Findings) -> ReportTable:
         name="Noise chosen",
         header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
         rows=rows,
-        section=Section.BEYOND,
+        section=ReportSection.BEYOND,
     )
 
 
-def recognition_tables(found: Findings) -> list[ReportTable]:
+def recognition_tables(found: StudyResults) -> list[ReportTable]:
     """Return how well windows of motion tell the terrains apart; none for one."""
     identification = found.identification
     if identification is None:
@@ -141,12 +141,12 @@ def recognition_tables(found: Findings) -> list[ReportTable]:
             note="Share of windows recognised by models that never saw the trial, mean "
             "over kinds. By error, the paper's rule: the model with the smallest mean "
             "absolute error.",
-            section=Section.BEYOND,
+            section=ReportSection.BEYOND,
         )
     ]
 
 
-def trend_table(found: Findings) -> ReportTable:
+def trend_table(found: StudyResults) -> ReportTable:
     """Return repeatability and first-to-last trend of every terrain."""
     rows = []
     for name, trends in found.trends.items():
@@ -180,7 +180,7 @@ def trend_table(found: Findings) -> ReportTable:
         rows=rows,
         note="Means of the trials ± their standard deviation; slopes ± standard error. "
         "A slope of more than two standard errors points to wear of the terrain.",
-        section=Section.BEYOND,
+        section=ReportSection.BEYOND,
     )
 
 

@@ -12,41 +12,43 @@ from analysis.figures.style import Figure, render, styled
 from analysis.figures.surfaces import draw_coverage, draw_mean, draw_variance
 from analysis.figures.trials import draw_stick_slip, draw_trends, draw_trials
 from analysis.figures.uncertainty import draw_calibration, draw_noise, draw_residuals
-from analysis.findings.findings import Findings
-from analysis.report.page_model import Exhibit, Section
+from analysis.findings.findings import StudyResults
+from analysis.report.page_model import ReportFigure, ReportSection
 from analysis.study.jobs import run_tasks
 from analysis.study.study import Study
 
-Draw = Callable[[Findings], Figure | None]
-Say = Callable[[Findings], str]
+Draw = Callable[[StudyResults], Figure | None]
+Say = Callable[[StudyResults], str]
 
 
 @dataclass(frozen=True, slots=True)
-class _Recipe:
+class FigureSpec:
+    """A figure: what it is called, what draws it and what explains it."""
+
     key: str
     title: str
     alt: str
     draw: Draw
     say: Say
-    section: Section = Section.BEYOND
+    section: ReportSection = ReportSection.BEYOND
 
 
-def exhibits(found: Findings, n_jobs: int = 1) -> list[Exhibit]:
+def report_figures(found: StudyResults, n_jobs: int = 1) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
         found: what is shown.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
     """
-    lots = [Lot(found, k, n_jobs) for k in range(n_jobs)]
-    drawn: dict[str, Exhibit] = {}
-    for lot in run_tasks(draw_lot, lots, n_jobs):
-        drawn |= {exhibit.picture.key: exhibit for exhibit in lot}
+    batches = [FigureBatch(found, k, n_jobs) for k in range(n_jobs)]
+    drawn: dict[str, ReportFigure] = {}
+    for batch in run_tasks(draw_batch, batches, n_jobs):
+        drawn |= {exhibit.picture.key: exhibit for exhibit in batch}
     return [drawn[recipe.key] for recipe in _RECIPES if recipe.key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
-class Lot:
+class FigureBatch:
     """The figures that one process draws.
 
     Attributes:
@@ -55,25 +57,27 @@ class Lot:
         step: from one of its figures to the next.
     """
 
-    found: Findings
+    found: StudyResults
     first: int
     step: int
 
 
-def draw_lot(lot: Lot) -> list[Exhibit]:
+def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
     """Return the figures of a lot that there are numbers for."""
     with styled():
-        shown = [_draw(recipe, lot.found) for recipe in _RECIPES[lot.first :: lot.step]]
+        shown = [
+            _draw(recipe, batch.found) for recipe in _RECIPES[batch.first :: batch.step]
+        ]
     return [exhibit for exhibit in shown if exhibit is not None]
 
 
-def _draw(recipe: _Recipe, found: Findings) -> Exhibit | None:
+def _draw(recipe: FigureSpec, found: StudyResults) -> ReportFigure | None:
     figure = recipe.draw(found)
     if figure is None:
         return None
     picture = render(recipe.key, figure, found.study.simulated)
     text = recipe.say(found)
-    return Exhibit(recipe.section, recipe.title, recipe.alt, text, picture)
+    return ReportFigure(recipe.section, recipe.title, recipe.alt, text, picture)
 
 
 def _paper(
@@ -82,19 +86,19 @@ def _paper(
     alt: str,
     draw: Callable[[Study], Figure | None],
     say: Callable[[Study], str],
-) -> _Recipe:
-    return _Recipe(
+) -> FigureSpec:
+    return FigureSpec(
         key,
         title,
         alt,
         lambda found: draw(found.study),
         lambda found: say(found.study),
-        Section.PAPER,
+        ReportSection.PAPER,
     )
 
 
-def _confusion(level: str, key: str, title: str) -> _Recipe:
-    return _Recipe(
+def _confusion(level: str, key: str, title: str) -> FigureSpec:
+    return FigureSpec(
         key,
         title,
         "Confusion matrices for windows of 0.5, 1 and 2 s: rows are the true kinds, "
@@ -130,23 +134,23 @@ _RECIPES = (
         draw_gp,
         captions.say_gp,
     ),
-    _Recipe(
+    FigureSpec(
         "fig7_gp_mean",
         "Fig. 7 Mean of the Gaussian process over velocity and load",
         "Filled contours of predicted traction force over slip velocity and normal "
         "force, one panel per terrain, with the samples as dots.",
         draw_mean,
         captions_beyond.say_mean,
-        Section.PAPER,
+        ReportSection.PAPER,
     ),
-    _Recipe(
+    FigureSpec(
         "fig8_gp_variance",
         "Fig. 8 Variance of the Gaussian process over velocity and load",
         "Filled contours of predictive variance over slip velocity and normal force, "
         "one panel per terrain; plates are far below stones.",
         draw_variance,
         captions_beyond.say_variance,
-        Section.PAPER,
+        ReportSection.PAPER,
     ),
     _paper(
         "fig9_errors",
@@ -172,7 +176,7 @@ _RECIPES = (
         draw_cross_map,
         lambda _: "The numbers of the bars above; a terrain's own model in bold.",
     ),
-    _Recipe(
+    FigureSpec(
         "calibration",
         "Calibration: do the bands hold what they promise?",
         "Share of held-out samples inside the 50, 90 and 95 percent band for every "
@@ -180,7 +184,7 @@ _RECIPES = (
         draw_calibration,
         captions_beyond.say_calibration,
     ),
-    _Recipe(
+    FigureSpec(
         "noise",
         "Noise that depends on the inputs",
         "Gain in log predictive density by chosen noise for every terrain with its "
@@ -191,7 +195,7 @@ _RECIPES = (
     _confusion("terrain", "confusion_terrains", "Telling terrains apart: each terrain"),
     _confusion("stones", "confusion_stones", "Telling terrains apart: size of stones"),
     _confusion("surface", "confusion_surface", "Telling terrains apart: flat or rocky"),
-    _Recipe(
+    FigureSpec(
         "coverage",
         "Coverage of velocity and load",
         "Number of kept samples in cells of slip velocity and normal force, one panel "
@@ -199,7 +203,7 @@ _RECIPES = (
         draw_coverage,
         captions_beyond.say_coverage,
     ),
-    _Recipe(
+    FigureSpec(
         "trials",
         "All trials side by side",
         "Small curves of traction force over the way of each trial, one row per "
@@ -207,14 +211,14 @@ _RECIPES = (
         draw_trials,
         captions_beyond.say_trials,
     ),
-    _Recipe(
+    FigureSpec(
         "trends",
         "From the first trial to the last",
         "Mean traction of every trial in order, with a straight line per terrain.",
         draw_trends,
         captions_beyond.say_trends,
     ),
-    _Recipe(
+    FigureSpec(
         "residuals",
         "What the models leave unexplained",
         "Quantiles of measured minus predicted force over slip velocity for Tustin and "
@@ -222,7 +226,7 @@ _RECIPES = (
         draw_residuals,
         captions_beyond.say_residuals,
     ),
-    _Recipe(
+    FigureSpec(
         "stick_slip",
         "Sticking and slipping: force over displacement",
         "Traction force over the displacement of the sole for one trial per class of "
@@ -230,22 +234,22 @@ _RECIPES = (
         draw_stick_slip,
         captions_beyond.say_stick_slip,
     ),
-    _Recipe(
+    FigureSpec(
         "timing",
         "Period of the loop and age of the force samples",
         "Histograms over all cycles, logarithmic counts: left the period, right how "
         "much later the joints are than the force sample.",
         draw_timing,
         captions_beyond.say_timing,
-        Section.HEALTH,
+        ReportSection.HEALTH,
     ),
-    _Recipe(
+    FigureSpec(
         "rig",
         "Tare, joint 7, temperatures and load, trial by trial",
         "Four panels with one dot per trial: change of tare to the next trial, motion "
         "of the locked joint, warmest puck or motor, load above what was set.",
         draw_rig,
         captions_beyond.say_rig,
-        Section.HEALTH,
+        ReportSection.HEALTH,
     ),
 )

@@ -13,11 +13,11 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.findings.as_numbers import findings_rows, plain_findings
-from analysis.findings.findings import Findings, find
+from analysis.findings.findings import StudyResults, find
 from analysis.findings.rig_health import RigTrial
 from analysis.report.further_tables import beyond_tables
-from analysis.report.gallery import exhibits
-from analysis.report.page_model import Exhibit, ReportTable, Section
+from analysis.report.gallery import report_figures
+from analysis.report.page_model import ReportFigure, ReportSection, ReportTable
 from analysis.report.paper_tables import (
     choices,
     parameters,
@@ -76,7 +76,7 @@ class ReportContext:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class PageSection:
     """One section of the page with everything in it.
 
     Attributes:
@@ -86,10 +86,10 @@ class Part:
         exhibits: its figures.
     """
 
-    section: Section
+    section: ReportSection
     sentences: Sequence[str]
     tables: Sequence[ReportTable]
-    exhibits: Sequence[Exhibit]
+    report_figures: Sequence[ReportFigure]
 
 
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
@@ -106,7 +106,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(found))
     write_atomic(out_dir / "fits.csv", table.encode())
-    shown = exhibits(found, _processes(study))
+    shown = report_figures(found, _processes(study))
     for exhibit in shown:
         picture = exhibit.picture
         write_atomic(out_dir / "figures" / f"{picture.key}.png", picture.png)
@@ -123,7 +123,7 @@ def _processes(study: Study) -> int:
     return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)
 
 
-def all_numbers(found: Findings, context: ReportContext) -> dict[str, Any]:
+def all_numbers(found: StudyResults, context: ReportContext) -> dict[str, Any]:
     """Return everything that the report shows as plain values, for fits.json."""
     tables = [
         asdict(table) | {"section": table.section.value} for table in context.tables
@@ -133,7 +133,7 @@ def all_numbers(found: Findings, context: ReportContext) -> dict[str, Any]:
 
 
 def render_page(
-    found: Findings, shown: Sequence[Exhibit], context: ReportContext
+    found: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> str:
     """Return the page as HTML; every text is escaped, every picture embedded."""
     environment = Environment(
@@ -155,8 +155,8 @@ def render_page(
 
 
 def parts(
-    found: Findings, shown: Sequence[Exhibit], context: ReportContext
-) -> list[Part]:
+    found: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
+) -> list[PageSection]:
     """Return the sections that have something to show, in the order of the page."""
     study = found.study
     tables = [
@@ -170,12 +170,12 @@ def parts(
         *context.tables,
     ]
     every = [
-        Part(
+        PageSection(
             section,
-            verdicts(study) if section is Section.SUMMARY else (),
+            verdicts(study) if section is ReportSection.SUMMARY else (),
             [table for table in tables if table.section is section],
             [exhibit for exhibit in shown if exhibit.section is section],
         )
-        for section in Section
+        for section in ReportSection
     ]
-    return [part for part in every if part.tables or part.exhibits]
+    return [part for part in every if part.tables or part.report_figures]

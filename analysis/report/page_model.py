@@ -7,7 +7,7 @@ from enum import Enum
 from analysis.figures.style import Picture
 
 
-class Section(Enum):
+class ReportSection(Enum):
     """A part of the report; the value is its heading, the order that of the page."""
 
     SUMMARY = "Summary"
@@ -40,11 +40,11 @@ class ReportTable:
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    section: Section = Section.ORIGIN
+    section: ReportSection = ReportSection.ORIGIN
 
 
 @dataclass(frozen=True, slots=True)
-class Exhibit:
+class ReportFigure:
     """A figure of the report.
 
     Attributes:
@@ -55,7 +55,7 @@ class Exhibit:
         picture: its files.
     """
 
-    section: Section
+    section: ReportSection
     title: str
     alt: str
     caption: str

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from analysis.report.page_model import ReportTable, Section
+from analysis.report.page_model import ReportSection, ReportTable
 from analysis.study.fits import flag_counts, tustin_medians
 from analysis.study.models import FITTERS, TITLES, TUSTIN
 from analysis.study.study import LIFTED_WARNING, Study, TerrainResult
@@ -45,7 +45,7 @@ def summary(study: Study) -> ReportTable:
         "over trials ± its standard error. Constant: always the median F_t of the "
         "other trials. F_n ≤ 0: share of the kept samples with the foot off the "
         f"ground or the tare wrong; above {LIFTED_WARNING:.0%} is a warning.",
-        section=Section.SUMMARY,
+        section=ReportSection.SUMMARY,
     )
 
 
@@ -73,7 +73,7 @@ def parameters(study: Study) -> ReportTable:
         note="Intervals from whole trials drawn with replacement: samples of one trial "
         "repeat each other. A wide interval means that the curve is known, not the "
         "parameter.",
-        section=Section.SUMMARY,
+        section=ReportSection.SUMMARY,
     )
 
 
@@ -109,7 +109,7 @@ def table_one(study: Study) -> ReportTable:
         rows=rows,
         note="Medians over the folds, parameter by parameter, so a row is not one "
         "coherent fit; all predictions come from the coherent fits. " + _flag_legend(),
-        section=Section.PAPER,
+        section=ReportSection.PAPER,
     )
 
 
@@ -130,7 +130,7 @@ def velocity_shares(study: Study) -> ReportTable:
         rows=rows,
         note="Means over trials. Only the window is fitted and tested; the last column "
         "is its share of the samples that move.",
-        section=Section.BEYOND,
+        section=ReportSection.BEYOND,
     )
 
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.findings.findings import Findings
+from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import RigTrial
-from analysis.report.page_model import ReportTable, Section
+from analysis.report.page_model import ReportSection, ReportTable
 
 _SATURATED = 1e-9  # share of cycles
 
 
-def rig_tables(found: Findings) -> list[ReportTable]:
+def rig_tables(found: StudyResults) -> list[ReportTable]:
     """Return rig health by trial and its reach by terrain; none without a rig."""
     return [health(found.rig), reach(found)] if found.rig else []
 
@@ -52,11 +52,11 @@ def health(rig: Sequence[RigTrial]) -> ReportTable:
         note="Age: how much earlier the force was sampled than the joints answered. "
         "Change of tare: distance to the offset found before the next trial, which "
         "brackets the drift of the sensor. – where it is not known.",
-        section=Section.HEALTH,
+        section=ReportSection.HEALTH,
     )
 
 
-def reach(found: Findings) -> ReportTable:
+def reach(found: StudyResults) -> ReportTable:
     """Return for every terrain what the rig could have seen, beside the errors."""
     rows = []
     for name, result in found.study.terrains.items():
@@ -104,7 +104,7 @@ def reach(found: Findings) -> ReportTable:
         "Drag: what the joints' Coulomb friction takes from the hand's push if they "
         "rub as the arm model says. It is not in F_t, which is measured below them, "
         "but tilts the push, so that it biases F_n. Medians over trials.",
-        section=Section.REACH,
+        section=ReportSection.REACH,
     )
 
 

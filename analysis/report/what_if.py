@@ -8,8 +8,8 @@ from typing import Any
 from acquisition.errors import SettingsError
 from analysis.data.load import Frame
 from analysis.report.further_tables import paired_cell
-from analysis.report.page_model import ReportTable, Section
-from analysis.study.comparison import Paired, compare
+from analysis.report.page_model import ReportSection, ReportTable
+from analysis.study.metrics import PairedComparison, compare
 from analysis.study.models import (
     FITTERS,
     GP_NN,
@@ -33,7 +33,7 @@ _MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class StudyVariant:
     """One choice made otherwise.
 
     Attributes:
@@ -61,7 +61,7 @@ class Choice:
         return self.change(replace(before, fit=fit))
 
 
-def parse_choice(text: str) -> Choice:
+def parse_choice(text: str) -> StudyVariant:
     """Return the choice in `text`: KEY=VALUE.
 
     Raises:
@@ -81,7 +81,7 @@ def parse_choice(text: str) -> Choice:
         ) from error
 
 
-def side_by_side(choice: Choice, before: Study, after: Study) -> ReportTable:
+def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTable:
     """Return errors of both studies per terrain and model, trial by trial."""
     rows = [
         [
@@ -111,11 +111,11 @@ def side_by_side(choice: Choice, before: Study, after: Study) -> ReportTable:
         "error over the trials that both have, below zero is better under the choice; "
         "p by all patterns of signs. Choices that change which samples are kept are "
         "tested on other samples.",
-        section=Section.CHANGED,
+        section=ReportSection.CHANGED,
     )
 
 
-def plain_choice(choice: Choice, before: Study, after: Study) -> dict[str, Any]:
+def plain_choice(choice: StudyVariant, before: Study, after: Study) -> dict[str, Any]:
     """Return the comparison as plain values for fits.json."""
     return {
         "choice": choice.text,
@@ -137,7 +137,7 @@ def plain_choice(choice: Choice, before: Study, after: Study) -> dict[str, Any]:
 Place = tuple[str, str, str]  # terrain, model, measure
 
 
-def _pair(before: Study, after: Study, place: Place) -> Paired | None:
+def _pair(before: Study, after: Study, place: Place) -> PairedComparison | None:
     terrain, model, key = place
     first, second = (s.terrains[terrain].scores(model, key) for s in (before, after))
     return compare(first, second)
@@ -166,7 +166,7 @@ def _listed() -> str:
     )
 
 
-def _smoothing(value: str) -> Choice:
+def _smoothing(value: str) -> StudyVariant:
     width = int(value)
     if not 1 <= width <= _WIDEST:
         raise ValueError(value)
@@ -175,7 +175,7 @@ def _smoothing(value: str) -> Choice:
     )
 
 
-def _window(value: str) -> Choice:
+def _window(value: str) -> StudyVariant:
     slowest, fastest = (float(part) for part in value.split(":"))
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
         raise ValueError(value)
@@ -186,9 +186,11 @@ def _window(value: str) -> Choice:
     )
 
 
-def _of_samples(key: str, value: str, prepare: Callable[[StudyOptions], Any]) -> Choice:
+def _of_samples(
+    key: str, value: str, prepare: Callable[[StudyOptions], Any]
+) -> StudyVariant:
     prepare(StudyOptions())  # refused here, not in the middle of a study
-    return Choice(
+    return StudyVariant(
         key,
         value,
         tuple(FITTERS),
@@ -197,18 +199,18 @@ def _of_samples(key: str, value: str, prepare: Callable[[StudyOptions], Any]) ->
     )
 
 
-def _frame(value: str) -> Choice:
+def _frame(value: str) -> StudyVariant:
     frames: Mapping[str, Frame] = {"sole": "sole", "terrain": "terrain"}
     if value not in frames:
         raise ValueError(value)
-    return Choice(
+    return StudyVariant(
         "frame", value, tuple(FITTERS), frames[value], lambda options: options
     )
 
 
-def _kernel(value: str) -> Choice:
+def _kernel(value: str) -> StudyVariant:
     printed = _one_of(value, "as_printed", "default")
-    return Choice(
+    return StudyVariant(
         "kernel",
         value,
         (GP_NN, GP_NN_TUSTIN),
@@ -217,13 +219,13 @@ def _kernel(value: str) -> Choice:
     )
 
 
-def _static_friction(value: str) -> Choice:
+def _static_friction(value: str) -> StudyVariant:
     form = (
         TustinForm(static="proportional")
         if _one_of(value, "proportional", "constant")
         else TustinForm()
     )
-    return Choice(
+    return StudyVariant(
         "static_friction",
         value,
         (TUSTIN, GP_SE_TUSTIN, GP_NN_TUSTIN),
@@ -238,7 +240,7 @@ def _one_of(value: str, yes: str, no: str) -> bool:
     return value == yes
 
 
-_PARSERS: Mapping[str, Callable[[str], Choice]] = {
+_PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
     "smoothing": _smoothing,
     "window": _window,
     "frame": _frame,

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition.errors import TractionError
 from analysis.data.prepare import PreparedTrial
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Indices
 from analysis.study.metrics import Score, mean_absolute_error, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, fit_model
@@ -36,10 +36,10 @@ class FoldTask:
 
     terrain: str
     fold: int
-    training: Rows
+    training: SampleTable
     lengths: tuple[int, ...]
-    own: Rows
-    others: Mapping[str, tuple[Rows, ...]]
+    own: SampleTable
+    others: Mapping[str, tuple[SampleTable, ...]]
     options: FitOptions
 
 
@@ -105,7 +105,7 @@ def plan_folds(
 def run_fold(task: FoldTask) -> FoldResult:
     """Return the models of one fold and their errors."""
     chosen = choose_rows(task)
-    training = Training(task.training, task.lengths, chosen)
+    training = TrainingSet(task.training, task.lengths, chosen)
     models: dict[str, ModelFold] = {}
     notes: list[str] = []
     for name in task.options.models:
@@ -175,7 +175,7 @@ def _task(
     own = trials[terrain]
     others = {
         other: tuple(
-            Rows.of([trials[other][j]])
+            SampleTable.of([trials[other][j]])
             for k, j in pair_trials(usable[terrain], usable[other])
             if k == fold
         )
@@ -185,9 +185,9 @@ def _task(
     return FoldTask(
         terrain=terrain,
         fold=fold,
-        training=Rows.of([own[k] for k in usable[terrain] if k != fold]),
+        training=SampleTable.of([own[k] for k in usable[terrain] if k != fold]),
         lengths=tuple(own[k].kept for k in usable[terrain] if k != fold),
-        own=Rows.of([own[fold]]),
+        own=SampleTable.of([own[fold]]),
         others=others,
         options=options,
     )
@@ -196,7 +196,7 @@ def _task(
 def _examine(model: FittedModel, task: FoldTask) -> ModelFold:
     own = task.own
     foreign = [rows for trials in task.others.values() for rows in trials]
-    tested = Rows.joined([task.training, *foreign])
+    tested = SampleTable.joined([task.training, *foreign])
     # one call for all rows: small ones cost more than they compute
     error = np.abs(model.mean(tested.F_n, tested.v_t) - tested.F_t)
     ends = np.cumsum([task.training.count, *(rows.count for rows in foreign)])

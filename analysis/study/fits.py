@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.study.comparison import compare, standard_error
-from analysis.study.metrics import Score
+from analysis.study.metrics import Score, compare, standard_error
 from analysis.study.models import TUSTIN
 from analysis.study.study import Study, TerrainResult, mean_of
 from analysis.tustin.model import UNITS, TustinFit

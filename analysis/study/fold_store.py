@@ -10,7 +10,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.gp import kernels, noise, sparse
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.regression import GaussianProcess
@@ -21,7 +21,7 @@ from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
 from analysis.study.serialise import decode, encode
-from analysis.study.terrain_fit import TerrainFit, TerrainTask
+from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
 from analysis.tustin import model as tustin
 from analysis.tustin.identifiability import Interval, Profiles
 
@@ -40,11 +40,11 @@ TYPES = {
         ModelFold,
         NoiseChoice,
         Profiles,
-        Rows,
+        SampleTable,
         Score,
         Start,
         TailedNoise,
-        TerrainFit,
+        PooledTustinFit,
         TerrainTask,
         TustinModel,
         kernels.Product,

@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from acquisition.errors import SettingsError
-from analysis.data.rows import Training
+from analysis.data.samples import TrainingSet
 from analysis.data.series import Array
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import Kernel, SquaredExponential
@@ -178,26 +178,26 @@ class GpModel:
         return mean if self.curve is None else mean + self.curve.mean(F_n, v_t)
 
 
-Fitter = Callable[[Training, FitOptions], FittedModel]
+Fitter = Callable[[TrainingSet, FitOptions], FittedModel]
 
 
 @lru_cache(maxsize=1)  # three models of a fold share it
-def tustin_of(training: Training, options: FitOptions) -> TustinFit:
+def tustin_of(training: TrainingSet, options: FitOptions) -> TustinFit:
     """Return the Tustin fit of all training rows."""
     rows = training.rows
     return fit_tustin(rows.F_n, rows.v_t, rows.F_t, options.bounds, options.form)
 
 
-def _fit_tustin(training: Training, options: FitOptions) -> FittedModel:
+def _fit_tustin(training: TrainingSet, options: FitOptions) -> FittedModel:
     return TustinModel(tustin_of(training, options))
 
 
-def _fit_gp(kernel: Kernel, training: Training) -> GpModel:
+def _fit_gp(kernel: Kernel, training: TrainingSet) -> GpModel:
     return GpModel(fit_gp(training.subset.inputs, training.subset.F_t, kernel))
 
 
 def _fit_around_tustin(
-    kernel: Kernel, training: Training, options: FitOptions
+    kernel: Kernel, training: TrainingSet, options: FitOptions
 ) -> GpModel:
     """Tustin by all rows, then a zero-mean process on the residuals of the chosen."""
     curve, subset = tustin_of(training, options), training.subset
@@ -206,7 +206,7 @@ def _fit_around_tustin(
     return GpModel(process, curve)
 
 
-def _fit_with_chosen_noise(training: Training, options: FitOptions) -> FittedModel:
+def _fit_with_chosen_noise(training: TrainingSet, options: FitOptions) -> FittedModel:
     choice = choose_noise(training, options.gp_points, options.seed)
     noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
     process = fit_gp(training.subset.inputs, training.subset.F_t, None, noise)
@@ -216,7 +216,7 @@ def _fit_with_chosen_noise(training: Training, options: FitOptions) -> FittedMod
     return GpModel(process, tails=tails, choice=choice)
 
 
-def _fit_all_samples(training: Training, options: FitOptions) -> FittedModel:
+def _fit_all_samples(training: TrainingSet, options: FitOptions) -> FittedModel:
     rows = training.rows
     return GpModel(fit_sparse(rows.inputs, rows.F_t, inducing=options.inducing))
 
@@ -244,7 +244,7 @@ BEYOND: Mapping[str, Fitter] = {
 }
 
 
-def fit_model(name: str, training: Training, options: FitOptions) -> FittedModel:
+def fit_model(name: str, training: TrainingSet, options: FitOptions) -> FittedModel:
     """Return the model `name` fitted to the training rows.
 
     Raises:

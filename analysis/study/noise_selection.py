@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.regression import GaussianProcess, fit_gp
@@ -36,7 +36,9 @@ class TailedNoise(NamedTuple):
     spread: float
 
     @classmethod
-    def of(cls, process: GaussianProcess, training: Training) -> "TailedNoise | None":
+    def of(
+        cls, process: GaussianProcess, training: TrainingSet
+    ) -> "TailedNoise | None":
         """Return the t of largest density on training rows outside the chosen ones.
 
         None where too few of them are left: the chosen rows pulled the mean to
@@ -77,7 +79,7 @@ class NoiseChoice(NamedTuple):
     nlpd: dict[str, float]
 
 
-def choose_noise(training: Training, points: int, seed: int) -> NoiseChoice:
+def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
     """Return the noise that predicts left-out training trials best.
 
     The trials are left out in up to three groups. Another noise than the constant one
@@ -102,13 +104,13 @@ def choose_noise(training: Training, points: int, seed: int) -> NoiseChoice:
     return NoiseChoice(NAMES[int(np.argmin(mean))], averages)
 
 
-def predict_normal(process: GaussianProcess, rows: Rows) -> Prediction:
+def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
     """Return what a process predicts for `rows`, noise included."""
     mean, variance = process.predict(rows.inputs)
     return Prediction(mean, np.sqrt(variance))
 
 
-def _left_out(training: Training, group: int, points: int, seed: int) -> Array:
+def _left_out(training: TrainingSet, group: int, points: int, seed: int) -> Array:
     """Return the NLPD of every trial of a group under every noise, (trials, 3)."""
     trial = training.trial_of()
     is_inner = trial % _GROUPS != group
@@ -117,7 +119,7 @@ def _left_out(training: Training, group: int, points: int, seed: int) -> Array:
     rng = np.random.default_rng((seed, group))
     chosen = rng.choice(inner_rows.count, count, replace=False)
     lengths = tuple(n for k, n in enumerate(training.lengths) if k % _GROUPS != group)
-    inner = Training(inner_rows, lengths, chosen)
+    inner = TrainingSet(inner_rows, lengths, chosen)
     subset = inner.subset
     processes = (
         fit_gp(subset.inputs, subset.F_t, None, ConstantNoise()),
@@ -133,7 +135,7 @@ def _left_out(training: Training, group: int, points: int, seed: int) -> Array:
 
 
 def _nlpds(
-    rows: Rows,
+    rows: SampleTable,
     processes: tuple[GaussianProcess, GaussianProcess],
     tails: TailedNoise | None,
 ) -> list[float]:

@@ -8,12 +8,12 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.events import Slip, find_slips
 from analysis.data.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
-from analysis.study.terrain_fit import TerrainFit, TerrainTask, fit_terrain
+from analysis.study.terrain_fit import PooledTustinFit, TerrainTask, fit_terrain
 
 LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
 
@@ -52,7 +52,7 @@ class TerrainResult:
     trials: tuple[PreparedTrial, ...]
     slips: tuple[tuple[Slip, ...], ...]
     folds: tuple[FoldResult, ...]
-    whole: TerrainFit
+    whole: PooledTustinFit
 
     def per_trial(
         self, model: str, measure: Callable[[ModelFold], float]
@@ -198,7 +198,9 @@ def _wholes(
     prepared: Mapping[str, Sequence[PreparedTrial]], options: StudyOptions
 ) -> list[TerrainTask]:
     return [
-        TerrainTask(terrain, tuple(Rows.of([t]) for t in trials if t.kept), options.fit)
+        TerrainTask(
+            terrain, tuple(SampleTable.of([t]) for t in trials if t.kept), options.fit
+        )
         for terrain, trials in prepared.items()
     ]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.errors import TractionError
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.study.models import FitOptions
 from analysis.tustin.bootstrap import bootstrap_tustin
 from analysis.tustin.identifiability import Interval
@@ -27,12 +27,12 @@ class TerrainTask:
     """
 
     terrain: str
-    trials: tuple[Rows, ...]
+    trials: tuple[SampleTable, ...]
     options: FitOptions
 
 
 @dataclass(frozen=True, slots=True)
-class TerrainFit:
+class PooledTustinFit:
     """Tustin parameters of a terrain with their uncertainty.
 
     Attributes:
@@ -47,7 +47,7 @@ class TerrainFit:
     intervals: Mapping[str, Interval]
 
 
-def fit_terrain(task: TerrainTask) -> TerrainFit:
+def fit_terrain(task: TerrainTask) -> PooledTustinFit:
     """Return the fit of all trials of a terrain; a pure function of the task."""
     options = task.options
     columns = [(rows.F_n, rows.v_t, rows.F_t) for rows in task.trials]
@@ -55,10 +55,10 @@ def fit_terrain(task: TerrainTask) -> TerrainFit:
         F_n, v_t, F_t = (np.concatenate(c) for c in zip(*columns, strict=True))
         fit = fit_tustin(F_n, v_t, F_t, options.bounds, options.form)
     except (TractionError, ValueError):  # no trial at all unpacks into no columns
-        return TerrainFit(task.terrain, None, {})
+        return PooledTustinFit(task.terrain, None, {})
     if len(columns) < 2 or options.draws < 1:
-        return TerrainFit(task.terrain, fit, {})
+        return PooledTustinFit(task.terrain, fit, {})
     key = (options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
     rng = np.random.default_rng(key)
     intervals = bootstrap_tustin(columns, fit, rng, options.bounds, options.draws)
-    return TerrainFit(task.terrain, fit, intervals)
+    return PooledTustinFit(task.terrain, fit, intervals)

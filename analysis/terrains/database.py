@@ -33,7 +33,7 @@ _MOST_TERRAINS = 200
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class TractionEstimate:
     """What is to be expected of a terrain at one point.
 
     Attributes:
@@ -77,7 +77,7 @@ class KnownTerrain:
     parameters: Mapping[str, Any]
     default: str
 
-    def predict(self, F_n: float, v_t: float, model: str = "") -> Answer:
+    def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
         """Return the traction to expect.
 
         Args:
@@ -88,7 +88,7 @@ class KnownTerrain:
         Raises:
             SettingsError: there is no such model.
         """
-        return Answer(*self._table(model).at(F_n, v_t))
+        return TractionEstimate(*self._table(model).at(F_n, v_t))
 
     def predict_many(self, F_n: Array, v_t: Array, model: str = "") -> Prediction:
         """Return the same for many points, shape (n,)."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.errors import SettingsError, TractionError
 from analysis.data.prepare import PreparedTrial, PrepareOptions
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import BEYOND, FITTERS, GP_SE, TITLES, FitOptions
@@ -37,7 +37,7 @@ class TableTask:
     """
 
     terrain: str
-    trials: tuple[Rows, ...]
+    trials: tuple[SampleTable, ...]
     axes: tuple[Array, Array]
     options: FitOptions
 
@@ -48,11 +48,13 @@ def tabulate(task: TableTask) -> dict[str, Any]:
     A model that cannot be fitted is left out.
     """
     columns = [(rows.F_n, rows.v_t, rows.F_t) for rows in task.trials]
-    rows = Rows(*(np.concatenate(column) for column in zip(*columns, strict=True)))
+    rows = SampleTable(
+        *(np.concatenate(column) for column in zip(*columns, strict=True))
+    )
     key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
     count = min(task.options.gp_points, rows.count)
     chosen = np.random.default_rng(key).choice(rows.count, count, replace=False)
-    training = Training(rows, tuple(trial.count for trial in task.trials), chosen)
+    training = TrainingSet(rows, tuple(trial.count for trial in task.trials), chosen)
     F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
     models: dict[str, Any] = {}
     for name in task.options.models:
@@ -123,7 +125,10 @@ def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
     axes = _axes([t for of in trials.values() for t in of], study.options.prepare)
     return axes, [
         TableTask(
-            name, tuple(Rows.of([trial]) for trial in of), axes, study.options.fit
+            name,
+            tuple(SampleTable.of([trial]) for trial in of),
+            axes,
+            study.options.fit,
         )
         for name, of in trials.items()
     ]

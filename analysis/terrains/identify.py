@@ -32,7 +32,7 @@ _SMALLEST_SD = 1e-6  # N
 _SPIKE = 10.0  # standard deviations beyond which a sample says no more
 _KINDS = {"S": "small", "B": "big", "T": "flat"}
 Predictor = Callable[[Array, Array], Prediction]
-Kind = Callable[[str], str]
+CommandKind = Callable[[str], str]
 
 
 def kind_of(terrain: str) -> str:
@@ -45,7 +45,7 @@ def surface_of(terrain: str) -> str:
     return "flat" if kind_of(terrain) == "flat" else "rocky"
 
 
-LEVELS: Mapping[str, Kind] = {
+LEVELS: Mapping[str, CommandKind] = {
     "terrain": lambda terrain: terrain,
     "stones": kind_of,
     "surface": surface_of,
@@ -96,7 +96,7 @@ def _is_next(trial: PreparedTrial) -> np.ndarray:
 
 
 @dataclass(frozen=True, slots=True)
-class Scores:
+class TerrainScores:
     """How a trial fits each terrain, sample by sample.
 
     Attributes:
@@ -132,7 +132,7 @@ class Scores:
         """Return the terrain of the largest log density."""
         return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
 
-    def likeliest_kind(self, rows: slice, kind: Kind) -> str:
+    def likeliest_kind(self, rows: slice, kind: CommandKind) -> str:
         """Return the kind whose terrains have most of the posterior together."""
         total: dict[str, float] = {}
         for name, share in zip(self.terrains, self.posterior(rows), strict=True):
@@ -140,7 +140,7 @@ class Scores:
         return max(total, key=lambda name: total[name])
 
 
-def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> Scores:
+def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
     """Return how `trial` fits what every expert expects."""
     found = [
         (expert.predict(trial.F_n, trial.v_t), expert.rho)
@@ -156,7 +156,7 @@ def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> Scores:
         np.column_stack(values) if values else empty
         for values in (density, error, strain)
     ]
-    return Scores(tuple(experts), *columns)
+    return TerrainScores(tuple(experts), *columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +218,7 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     return Identification(rho, density, error, limits)
 
 
-def own_limit(scored: Sequence[Scores], terrain: str, size: int) -> float:
+def own_limit(scored: Sequence[TerrainScores], terrain: str, size: int) -> float:
     """Return the mean strain that 99 % of a terrain's own windows stay below."""
     means = [
         float(scores.strain[rows, scores.terrains.index(terrain)].mean())
@@ -253,7 +253,7 @@ def _held_out(
 
 def _score_folds(
     study: Study, model: str, rho: Mapping[str, float]
-) -> dict[str, list[Scores]]:
+) -> dict[str, list[TerrainScores]]:
     experts: dict[int, dict[str, Expert]] = {}
     for name, result in study.terrains.items():
         for fold in result.folds:
@@ -266,7 +266,7 @@ def _score_folds(
         for k, trial in enumerate(result.trials)
         if name in experts.get(k, {}) and len(experts[k]) > 1 and trial.kept
     ]
-    scored: dict[str, list[Scores]] = {}
+    scored: dict[str, list[TerrainScores]] = {}
     done = run_tasks(run_score, tasks, study.options.n_jobs)
     for task, scores in zip(tasks, done, strict=True):
         scored.setdefault(task.trial.terrain, []).append(scores)
@@ -281,6 +281,6 @@ class ScoreTask:
     experts: Mapping[str, Expert]
 
 
-def run_score(task: ScoreTask) -> Scores:
+def run_score(task: ScoreTask) -> TerrainScores:
     """Return how the trial fits what every expert expects."""
     return score_trial(task.trial, task.experts)

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 from analysis.data.prepare import PreparedTrial
 from analysis.terrains.database import KnownTerrain, TerrainDatabase
-from analysis.terrains.identify import NONE, Expert, Scores, score_trial
+from analysis.terrains.identify import NONE, Expert, TerrainScores, score_trial
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
+class WindowEvidence:
     """What one window says.
 
     Attributes:
@@ -35,7 +35,7 @@ class Recognition:
     """
 
     terrains: tuple[str, ...]
-    moments: tuple[Moment, ...]
+    moments: tuple[WindowEvidence, ...]
     posterior: tuple[float, ...]
     best: str
     least_error: str
@@ -66,7 +66,7 @@ def recognise(
         return None
     known = list(database.terrains.values())
     moments = [
-        Moment(
+        WindowEvidence(
             t=float(trial.smooth.t[trial.indices[rows.stop - 1]]),
             posterior=tuple(scores.posterior(rows).tolist()),
             best=_best(scores, rows, known, window),
@@ -85,7 +85,9 @@ def recognise(
     )
 
 
-def _best(scores: Scores, rows: slice, known: list[KnownTerrain], window: int) -> str:
+def _best(
+    scores: TerrainScores, rows: slice, known: list[KnownTerrain], window: int
+) -> str:
     best = scores.likeliest(rows)
     place = scores.terrains.index(best)
     limit = known[place].limits.get(window)

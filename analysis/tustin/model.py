@@ -14,8 +14,7 @@ import numpy as np
 from acquisition.errors import SettingsError
 from analysis.data.series import Array
 from analysis.tustin.identifiability import Profiles, is_identifiable, is_straight
-from analysis.tustin.moments import Moments, profiles
-from analysis.tustin.robust import Loss, search_robustly
+from analysis.tustin.moments import Loss, Moments, profiles, search_robustly
 from analysis.tustin.varpro import Box, Point, Problem, search, stribeck_power
 
 MINIMUM_ROWS = 20  # four per parameter

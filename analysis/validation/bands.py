@@ -29,7 +29,7 @@ class Band:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class BandResult:
     """One measure beside its band.
 
     Attributes:
@@ -105,10 +105,10 @@ BANDS = (
 )
 
 
-def hold_against_bands(measures: Mapping[str, Sequence[float]]) -> list[Finding]:
+def hold_against_bands(measures: Mapping[str, Sequence[float]]) -> list[BandResult]:
     """Return every band with what was measured, in order.
 
     Args:
         measures: values by the id of the band; one that is missing is not met.
     """
-    return [Finding(band, tuple(measures.get(band.id, ()))) for band in BANDS]
+    return [BandResult(band, tuple(measures.get(band.id, ()))) for band in BANDS]

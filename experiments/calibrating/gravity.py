@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.calibrating.pose_walk import Walk
-from experiments.run.console_loop import Stage
+from experiments.calibrating.pose_walk import PoseWalk
+from experiments.run.console_loop import ConsoleLoop
 from experiments.session.store import iso_utc
 from wam.calibration.gravity_file import GravityCalibration
-from wam.calibration.poses import Halt, choose_poses, plan_halts
+from wam.calibration.poses import MeasurementPose, choose_poses, plan_halts
 from wam.model.constants import Array
 from wam.model.moments import MomentFit, check_fit, fit_moments
 
@@ -17,7 +17,7 @@ AVERAGE = 0.5  # s of torques that are averaged
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredMoments:
     """One pose as measured.
 
     Attributes:
@@ -34,10 +34,10 @@ class Measured:
 class GravityGuide:
     """Leads the arm through the poses of a gravity calibration."""
 
-    def __init__(self, stage: Stage) -> None:
-        self._walk = Walk(stage)
-        self._rig = stage.rig
-        self._console = stage.company.console
+    def __init__(self, console_loop: ConsoleLoop) -> None:
+        self._walk = PoseWalk(console_loop)
+        self._rig = console_loop.rig
+        self._console = console_loop.company.console
 
     def run(self, count: int, *, is_forced: bool) -> GravityCalibration:
         """Measure in `count` poses and return the calibration.
@@ -49,18 +49,18 @@ class GravityGuide:
         Raises:
             SettingsError: no safe way, or the fit is bad.
             PreflightError: not activated, or touched while it was weighed.
-            StopAskedError, FaultedError: as `Stage.tick`.
+            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
         """
         model = self._rig.model
 
-        def plan(start: Array, floor: float) -> list[Halt]:
+        def plan(start: Array, floor: float) -> list[MeasurementPose]:
             return plan_halts(model, start, choose_poses(model, count, floor), floor)
 
         found = self._measure(self._walk.begin(plan, 2 * AVERAGE))
         self._walk.end()
         return self._fit(found, is_forced=is_forced)
 
-    def _measure(self, halts: Sequence[Halt]) -> list[Measured]:
+    def _measure(self, halts: Sequence[MeasurementPose]) -> list[MeasuredMoments]:
         found: dict[int, list[tuple[Array, Array]]] = {}
         for halt in halts:
             self._walk.go_to(halt)
@@ -71,7 +71,9 @@ class GravityGuide:
                 self._console.say(f"pose {halt.pose + 1} measured")
         return [_both(approaches) for approaches in found.values()]
 
-    def _fit(self, measured: list[Measured], *, is_forced: bool) -> GravityCalibration:
+    def _fit(
+        self, measured: list[MeasuredMoments], *, is_forced: bool
+    ) -> GravityCalibration:
         rig = self._rig
         q = np.array([pose.q for pose in measured])
         tau = np.array([pose.tau for pose in measured])
@@ -92,7 +94,7 @@ class GravityGuide:
             torques=tau,
         )
 
-    def _say_residuals(self, fit: MomentFit, measured: list[Measured]) -> None:
+    def _say_residuals(self, fit: MomentFit, measured: list[MeasuredMoments]) -> None:
         friction = np.abs([pose.friction for pose in measured]).mean(axis=0)
         rows = [_row(str(i), rest) for i, rest in enumerate(fit.residuals, 1)]
         rows.append(_row("dry friction", friction))
@@ -108,6 +110,6 @@ def _row(name: str, values: Array) -> list[str]:
     return [name, *(f"{value:.3f}" for value in values)]
 
 
-def _both(approaches: list[tuple[Array, Array]]) -> Measured:
+def _both(approaches: list[tuple[Array, Array]]) -> MeasuredMoments:
     (q_a, tau_a), (q_b, tau_b) = approaches
-    return Measured((q_a + q_b) / 2, (tau_a + tau_b) / 2, (tau_a - tau_b) / 2)
+    return MeasuredMoments((q_a + q_b) / 2, (tau_a + tau_b) / 2, (tau_a - tau_b) / 2)

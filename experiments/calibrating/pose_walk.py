@@ -4,35 +4,74 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition.errors import PreflightError
+from acquisition.errors import PreflightError, TractionError
+from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator.prompts import Prompt
 from experiments.run.activation import activate
-from experiments.run.console_loop import TICK, Stage
-from wam.calibration.poses import APPROACH_SPEED, Halt, way_seconds
+from experiments.run.console_loop import TICK, ConsoleLoop
+from experiments.run.participants import ArmFaultError, StopRequestedError
+from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
 from wam.control.joint_move import JointMove
 from wam.model.constants import Array
+
+INTERRUPTED = 130
+_NOTHING = "Nothing was written."
+_HOLD = 0.2  # s between a stop and the brakes
+
+
+def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
+    """Do `work` and return the exit code; what goes wrong is said on the console.
+
+    Every way out leaves the arm idle: after a stop it holds first, or damps when the
+    stop was asked for twice.
+    """
+    console = console_loop.company.console
+    try:
+        work()
+    except StopRequestedError:
+        console_loop.obey_stop()
+        console_loop.control.advance(_HOLD)
+        console.say(f"Stopped as asked. {_NOTHING}")
+        return INTERRUPTED
+    except ArmFaultError as fault:
+        place = FaultContext(
+            "The calibration", is_bus_down=console_loop.control.loop.is_bus_down
+        )
+        console.problem(fault_text(fault.verdict, place, _NOTHING))
+        return 4
+    except TractionError as error:
+        console.problem(f"{error} {_NOTHING}")
+        return error.exit_code
+    finally:
+        confirmed = console_loop.make_safe()
+        mode = console_loop.rig.backend.safety_mode()
+        console.say(rest_text(mode, is_confirmed=confirmed))
+    return 0
+
 
 SETTLE = 0.5  # s after a move
 CLEARANCE = 0.10  # m that sole, plate and elbow stay above the highest container
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
 ATTEMPTS = 4  # at an arm that does not come to rest
 
-Plan = Callable[[Array, float], Sequence[Halt]]
+AcceptancePlan = Callable[[Array, float], Sequence[MeasurementPose]]
 
 
-class Walk:
+class PoseWalk:
     """Moves the arm from halt to halt and knows where it was sent last.
 
     At 0.5 rad/s and 0.3 m/s at most, after a person has said that the space is clear.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self.stage = stage
-        self._rig = stage.rig
-        self._console = stage.company.console
+    def __init__(self, console_loop: ConsoleLoop) -> None:
+        self.console_loop = console_loop
+        self._rig = console_loop.rig
+        self._console = console_loop.company.console
         self._here = np.zeros(7)
 
-    def begin(self, plan: Plan, seconds_per_pose: float) -> Sequence[Halt]:
+    def begin(
+        self, plan: AcceptancePlan, seconds_per_pose: float
+    ) -> Sequence[MeasurementPose]:
         """Activate the arm, plan the way and ask for free space; return the halts.
 
         Args:
@@ -43,18 +82,18 @@ class Walk:
         Raises:
             SettingsError: no safe way.
             PreflightError: not activated.
-            StopAskedError, FaultedError: as `Stage.tick`.
+            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
         """
-        activate(self.stage)
-        start = self._rig.crew.desk.latest()["position"][0].copy()
+        activate(self.console_loop)
+        start = self._rig.backend.loop_client.latest()["position"][0].copy()
         rows = self._rig.settings.matrix.terrains
         floor = max(row.far_end[2] for row in rows) + CLEARANCE
-        halts = self.stage.aside(lambda: plan(start, floor))
+        halts = self.console_loop.aside(lambda: plan(start, floor))
         number = len({halt.pose for halt in halts} - {None})
         stops = len(halts) * SETTLE + number * seconds_per_pose
         # Held by position: the weight may not be known yet, and the hand lets go.
         self._here = start
-        self.go_to(Halt(start, APPROACH_SPEED, None))
+        self.go_to(MeasurementPose(start, APPROACH_SPEED, None))
         self.ask(
             f"The arm will move by itself through {number} poses, about "
             f"{(way_seconds(start, halts) + stops) / 60:.1f} min. Let go of it and "
@@ -63,16 +102,16 @@ class Walk:
         )
         return halts
 
-    def go_to(self, halt: Halt) -> None:
+    def go_to(self, halt: MeasurementPose) -> None:
         """Move to a halt and wait until the arm has settled."""
-        self._rig.crew.desk.move_to(halt.q.tolist(), halt.speed)
+        self._rig.backend.loop_client.move_to(halt.q.tolist(), halt.speed)
         self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
         self._here = halt.q
 
     def end(self) -> None:
         """Ask for support and idle the arm; nobody need hold it afterwards."""
         self.ask("Support the arm, it goes idle. [space]", Prompt.SUPPORT)
-        self.stage.make_safe()
+        self.console_loop.make_safe()
 
     def rest(self, seconds: float) -> tuple[Array, Array]:
         """Return mean (positions [rad], torques [N m]) of `seconds` at rest, (7,) each.
@@ -83,7 +122,7 @@ class Walk:
         speed = np.zeros(7)
         for _ in range(ATTEMPTS):
             self.wait(seconds)
-            records = self._rig.crew.desk.last(seconds)
+            records = self._rig.backend.loop_client.last(seconds)
             q = records["position"]
             speed = np.abs(q[-1] - q[0]) / seconds
             if speed.max() <= STILL:
@@ -97,10 +136,10 @@ class Walk:
     def ask(self, text: str, prompt: Prompt) -> None:
         """Say `text` and wait for [space]."""
         self._console.say(text)
-        while self.stage.tick(prompt) != " ":
+        while self.console_loop.tick(prompt) != " ":
             pass
 
     def wait(self, seconds: float) -> None:
         """Let `seconds` pass."""
         for _ in range(round(seconds / TICK) + 1):
-            self.stage.tick(Prompt.MOVING)
+            self.console_loop.tick(Prompt.MOVING)

@@ -7,12 +7,12 @@ import numpy as np
 from acquisition.errors import PreflightError
 from acquisition.ipc.layout import WRENCH_SLOTS
 from acquisition.sample import Record
-from experiments.calibrating.pose_walk import Walk
-from experiments.run.console_loop import Stage
+from experiments.calibrating.pose_walk import PoseWalk
+from experiments.run.console_loop import ConsoleLoop
 from experiments.session.store import iso_utc
 from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor
 from ft_sensor.calibration.sensor_file import SensorCalibration
-from wam.calibration.poses import Halt, choose_orientations, plan_halts
+from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
 from wam.model.constants import Array
 
 AVERAGE = 2.0  # s of readings that are averaged in each orientation
@@ -22,10 +22,10 @@ _FEWEST = 100  # readings in an average
 class SensorGuide:
     """Leads arm and foot through the orientations of a sensor's calibration."""
 
-    def __init__(self, stage: Stage) -> None:
-        self._walk = Walk(stage)
-        self._rig = stage.rig
-        self._console = stage.company.console
+    def __init__(self, console_loop: ConsoleLoop) -> None:
+        self._walk = PoseWalk(console_loop)
+        self._rig = console_loop.rig
+        self._console = console_loop.company.console
 
     def run(
         self, count: int, mounting: tuple[float, float] | None, *, is_forced: bool
@@ -42,11 +42,11 @@ class SensorGuide:
         Raises:
             SettingsError: no safe way, or the fit is bad.
             PreflightError: not activated, touched meanwhile, or too few readings.
-            StopAskedError, FaultedError: as `Stage.tick`.
+            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
         """
         model = self._rig.model
 
-        def plan(start: Array, floor: float) -> list[Halt]:
+        def plan(start: Array, floor: float) -> list[MeasurementPose]:
             poses = choose_orientations(model, count, floor)
             poses.append(poses[0])
             return plan_halts(model, start, poses, floor, is_two_sided=False)
@@ -69,7 +69,7 @@ class SensorGuide:
             readings=readings,
         )
 
-    def _measure(self, halts: Sequence[Halt]) -> list[tuple[Array, Array]]:
+    def _measure(self, halts: Sequence[MeasurementPose]) -> list[tuple[Array, Array]]:
         found: list[tuple[Array, Array]] = []
         for halt in halts:
             self._walk.go_to(halt)
@@ -86,7 +86,7 @@ class SensorGuide:
         Raises:
             PreflightError: too few readings, or one that is not valid.
         """
-        records: Record = self._rig.board.wrenches.last(WRENCH_SLOTS)
+        records: Record = self._rig.shared.wrenches.last(WRENCH_SLOTS)
         since = self._rig.clock.now_ns() - int(AVERAGE * 1e9)
         records = records[records["t_ns"].astype(np.int64) >= since]
         bad = int(np.count_nonzero(~records["is_valid"] | records["saturated"]))

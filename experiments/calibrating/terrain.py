@@ -6,11 +6,11 @@ from acquisition.control_loop.states import ArmState
 from acquisition.errors import PreflightError
 from experiments.operator.prompts import Prompt
 from experiments.run.activation import activate
-from experiments.run.console_loop import Stage
+from experiments.run.console_loop import ConsoleLoop
 from experiments.trial.header import TrialName
 from ft_sensor.calibration.terrain_fit import (
     CORNERS,
-    TerrainFit,
+    ContainerFit,
     check_terrain,
     fit_terrain,
 )
@@ -24,12 +24,12 @@ MOST = 60  # points
 class TerrainGuide:
     """Asks a person to touch the corners of a container, and takes the points."""
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
-        self._rig = stage.rig
-        self._console = stage.company.console
+    def __init__(self, console_loop: ConsoleLoop) -> None:
+        self._stage = console_loop
+        self._rig = console_loop.rig
+        self._console = console_loop.company.console
 
-    def run(self, *, is_forced: bool) -> tuple[TerrainFit, list[Array]]:
+    def run(self, *, is_forced: bool) -> tuple[ContainerFit, list[Array]]:
         """Return the container as touched, and the points [m], shape (3,) each.
 
         Args:
@@ -38,7 +38,7 @@ class TerrainGuide:
         Raises:
             SettingsError: the corners make no container, or not this one.
             PreflightError: not activated.
-            StopAskedError, FaultedError: as `Stage.tick`.
+            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
         """
         activate(self._stage)
         self._stage.control.request(ArmState.FLOAT)
@@ -96,7 +96,7 @@ class TerrainGuide:
             )
         return at.mean(axis=0)
 
-    def _say(self, fit: TerrainFit, points: int) -> None:
+    def _say(self, fit: ContainerFit, points: int) -> None:
         frame, row = fit.frame, self._rig.row
         x, y, z = frame.far_end
         say = self._console.say

@@ -34,7 +34,7 @@ def run(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
     from experiments.preflight.preflight import connect_rig, start_devices
-    from experiments.rig.processes import ProcessCrew
+    from experiments.rig.processes import MultiProcessBackend
     from experiments.rig.rig import FakeOptions
     from experiments.settings.load import load_settings
     from experiments.tools.bench import run_bench
@@ -48,11 +48,11 @@ def run(args: argparse.Namespace) -> int:
     settings = load_settings(args.config)
     fake = FakeOptions(is_fast=False, seed=1) if args.fake else None
     rig = connect_rig(settings, settings.matrix.terrains[0], fake)
-    crew = rig.crew
-    assert isinstance(crew, ProcessCrew)
-    with closing(crew):
+    backend = rig.backend
+    assert isinstance(backend, MultiProcessBackend)
+    with closing(backend):
         start_devices(rig)
-        processes = {**crew.processes(), "console": os.getpid()}
+        processes = {**backend.processes(), "console": os.getpid()}
         report = run_bench(rig, processes, args.seconds)
     if args.json:
         console.say(json.dumps(report.as_dict(), indent=2))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.run.console_loop import Stage
+    from experiments.run.console_loop import ConsoleLoop
     from experiments.settings.load import Settings
     from experiments.settings.matrix import TerrainRow
 
@@ -51,15 +51,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.calibrating.run import guided
+    from experiments.calibrating.pose_walk import guided
     from experiments.operator.console import Console
-    from experiments.operator.prompts import RehearsedHand
+    from experiments.operator.prompts import SimulatedHand
     from experiments.operator.select import choose_keys
     from experiments.operator.terminal import keyboard
     from experiments.preflight.preflight import connect_rig, run_preflight
     from experiments.rig.bus_log import logging_bus
     from experiments.rig.rig import FakeOptions
-    from experiments.run.console_loop import Stage
+    from experiments.run.console_loop import ConsoleLoop
     from experiments.run.participants import Company, StopFlag, signals_ask
     from experiments.settings.load import load_settings
 
@@ -78,43 +78,45 @@ def run(args: argparse.Namespace) -> int:
     stop = StopFlag()
     with logging_bus(rig, None, console), signals_ask(stop), keyboard(keys):
         run_preflight(rig, Path(args.data), console)
-        hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
-        stage = Stage(rig, Company(keys, console, stop, hand))
-        return guided(stage, lambda: _WORK[args.what](stage, args, out))
+        hand = SimulatedHand(rig.simulation) if rig.simulation else None
+        console_loop = ConsoleLoop(rig, Company(keys, console, stop, hand))
+        return guided(console_loop, lambda: _WORK[args.what](console_loop, args, out))
 
 
-def _gravity(stage: Stage, args: argparse.Namespace, out: Path) -> None:
+def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.gravity import GravityGuide
     from experiments.session.store import write_new_text
     from wam.calibration.gravity_file import gravity_to_toml
 
-    found = GravityGuide(stage).run(args.poses, is_forced=args.force)
+    found = GravityGuide(console_loop).run(args.poses, is_forced=args.force)
     write_new_text(out, gravity_to_toml(found))
-    _say_use(stage, out, '[gravity] model = "calibrated"', "rig.toml")
+    _say_use(console_loop, out, '[gravity] model = "calibrated"', "rig.toml")
 
 
-def _sensor(stage: Stage, args: argparse.Namespace, out: Path) -> None:
+def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.sensor import SensorGuide
     from experiments.session.store import write_new_text
     from ft_sensor.calibration.sensor_file import sensor_to_toml
 
-    tool = stage.rig.model.tool
+    tool = console_loop.rig.model.tool
     assert tool is not None
     is_foot = args.what == "foot"
     mounting = (tool.sensor_angle, tool.sensor_sign) if is_foot else None
-    found = SensorGuide(stage).run(args.poses, mounting, is_forced=args.force)
+    found = SensorGuide(console_loop).run(args.poses, mounting, is_forced=args.force)
     write_new_text(out, sensor_to_toml(found))
     section = f"feet.{found.foot}" if is_foot else "ft_sensor"
-    _say_use(stage, out, f'calibration = "{out.name}" in [{section}]', "rig.toml")
+    _say_use(
+        console_loop, out, f'calibration = "{out.name}" in [{section}]', "rig.toml"
+    )
 
 
-def _terrain(stage: Stage, args: argparse.Namespace, out: Path) -> None:
+def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
     from experiments.calibrating.terrain import TerrainGuide
     from experiments.session.store import iso_utc, write_new_text
     from ft_sensor.calibration.files import terrain_to_toml
 
-    rig = stage.rig
-    fit, points = TerrainGuide(stage).run(is_forced=args.force)
+    rig = console_loop.rig
+    fit, points = TerrainGuide(console_loop).run(is_forced=args.force)
     facts = {
         "simulated": str(rig.is_simulated).lower(),
         "measured_utc": iso_utc(rig.clock.utc_ns()),
@@ -124,11 +126,11 @@ def _terrain(stage: Stage, args: argparse.Namespace, out: Path) -> None:
     }
     write_new_text(out, terrain_to_toml(rig.row.name, fit.frame, facts))
     line = f'calibration = "{out.name}" in the row of {rig.row.name}'
-    _say_use(stage, out, line, "matrix.toml")
+    _say_use(console_loop, out, line, "matrix.toml")
 
 
-def _say_use(stage: Stage, out: Path, line: str, file: str) -> None:
-    stage.company.console.say(f"Written: {out}. To use it: {line} of {file}.")
+def _say_use(console_loop: ConsoleLoop, out: Path, line: str, file: str) -> None:
+    console_loop.company.console.say(f"Written: {out}. To use it: {line} of {file}.")
 
 
 _WORK = {"gravity": _gravity, "sensor": _sensor, "foot": _sensor, "terrain": _terrain}

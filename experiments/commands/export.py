@@ -29,7 +29,11 @@ def run(args: argparse.Namespace) -> int:
     from acquisition.errors import SettingsError
     from experiments.operator.console import Console
     from experiments.report.export import export_sessions
-    from experiments.report.sessions import Order, choose_sessions, export_terrains
+    from experiments.report.sessions import (
+        ReportRequest,
+        choose_sessions,
+        export_terrains,
+    )
     from experiments.settings.load import load_settings
 
     if (args.to is None) == (args.terrain_db is None):
@@ -49,6 +53,6 @@ def run(args: argparse.Namespace) -> int:
             hint="Choose another name. Nothing was written.",
         )
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = Order(order, args.seed)
+    wanted = ReportRequest(order, args.seed)
     export_terrains(sessions, args.data, args.terrain_db, wanted, console)
     return 0

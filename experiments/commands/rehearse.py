@@ -11,9 +11,9 @@ from experiments.arguments import FRICTION
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.validation.bands import Finding
+    from analysis.validation.bands import BandResult
     from experiments.operator.console import Console
-    from experiments.tools.acceptance import Plan
+    from experiments.tools.acceptance import AcceptancePlan
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
@@ -49,12 +49,17 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.session.store import write_text
     from experiments.settings.load import load_settings
-    from experiments.tools.acceptance import Plan, analyse, as_plain, record_study
+    from experiments.tools.acceptance import (
+        AcceptancePlan,
+        analyse,
+        as_plain,
+        record_study,
+    )
 
     _check_arguments(args)
     settings = load_settings(args.config)
     rows = settings.matrix.terrains
-    plan = Plan(
+    plan = AcceptancePlan(
         config=args.config,
         terrains=tuple(row.name for row in rows),
         plates=tuple(row.name for row in rows if row.stones == "none"),
@@ -76,7 +81,9 @@ def run(args: argparse.Namespace) -> int:
     return _print(plan, found, folder, console)
 
 
-def _print(plan: Plan, found: Sequence[Finding], folder: Path, console: Console) -> int:
+def _print(
+    plan: AcceptancePlan, found: Sequence[BandResult], folder: Path, console: Console
+) -> int:
     from experiments.operator.console import BAD, GOOD
 
     rows = [

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.operator.console import Console
-    from wam.bus.decoder import Spoken, Tally
+    from wam.bus.decoder import BusSummary, DecodedLine
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
@@ -86,7 +86,7 @@ def _show_log(args: argparse.Namespace) -> int:
     reader = BusReader()
     start_ns: int | None = None
 
-    def tell(spoken: list[Spoken]) -> None:
+    def tell(spoken: list[DecodedLine]) -> None:
         if args.summary:
             return
         for said in spoken:
@@ -111,7 +111,7 @@ def _show_log(args: argparse.Namespace) -> int:
     return 0
 
 
-def _sum_up(tally: Tally, console: Console) -> None:
+def _sum_up(tally: BusSummary, console: Console) -> None:
     silent = sum(tally.silent.values())
     console.say(
         f"{tally.frames} frames, {tally.foreign} of other kinds. {tally.questions} "

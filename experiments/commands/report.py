@@ -37,7 +37,11 @@ def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     from analysis.report.what_if import parse_choice
     from experiments.operator.console import Console
-    from experiments.report.sessions import Order, choose_sessions, report_sessions
+    from experiments.report.sessions import (
+        ReportRequest,
+        choose_sessions,
+        report_sessions,
+    )
     from experiments.settings.load import load_settings
 
     choices = [parse_choice(text) for text in args.what_if]
@@ -45,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = Order(order, args.seed, args.scheduler, choices)
+    wanted = ReportRequest(order, args.seed, args.scheduler, choices)
     page = report_sessions(sessions, data, wanted, console)
     console.say(str(page))
     return 0

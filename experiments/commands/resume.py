@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from experiments.arguments import add_reopening
 
 if TYPE_CHECKING:
-    from experiments.run.resume import Reopening
+    from experiments.run.resume import ResumeRequest
     from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
@@ -35,12 +35,12 @@ def run(args: argparse.Namespace) -> int:
     return resume(folder, reopening(args))
 
 
-def reopening(args: argparse.Namespace) -> "Reopening":
+def reopening(args: argparse.Namespace) -> "ResumeRequest":
     """Return what the options say about how a session is opened once more."""
     from experiments.operator.console import Console
-    from experiments.run.resume import Reopening
+    from experiments.run.resume import ResumeRequest
 
-    return Reopening(
+    return ResumeRequest(
         data=args.data,
         config=args.config,
         console=Console(color=not args.no_color),

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from experiments.arguments import FRICTION, PACES, add_fault, data_option
 
 if TYPE_CHECKING:
-    from experiments.run.resume import Reopening
-    from experiments.run.session import Request
-    from experiments.session.unfinished import Unfinished
+    from experiments.run.resume import ResumeRequest
+    from experiments.run.session import SessionRequest
+    from experiments.session.unfinished import UnfinishedSession
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.select import choose_keys
     from experiments.rig.rig import FakeOptions
     from experiments.run.resume import resume
-    from experiments.run.session import Opening, Request, conduct
+    from experiments.run.session import OpenMode, SessionRequest, run_session
     from experiments.session.states import Event
     from experiments.settings.load import load_settings
 
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     fake: FakeOptions | None = None
     if args.fake:
         fake = FakeOptions(args.fast, args.seed, args.friction, args.pace)
-    request = Request(
+    request = SessionRequest(
         data=args.data,
         settings=settings,
         config=args.config,
@@ -90,13 +90,13 @@ def run(args: argparse.Namespace) -> int:
         return resume(unfinished.folder, _as_reopening(args, request))
     trials = args.trials or request.row.trials
     asked = {"terrain": request.row.name, "trials": trials}
-    return conduct(request, Opening(Event.STARTED, asked))
+    return run_session(request, OpenMode(Event.STARTED, asked))
 
 
-def _make_room(request: Request, *, is_new: bool) -> Unfinished | None:
+def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | None:
     """Return the session to be resumed instead, None when none is in the way."""
     from experiments.run.resume import close
-    from experiments.run.resume_prompt import Choice, choose
+    from experiments.run.resume_prompt import ResumeChoice, choose
     from experiments.session.unfinished import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
@@ -106,21 +106,21 @@ def _make_room(request: Request, *, is_new: bool) -> Unfinished | None:
         if session.folder.is_simulated is is_fake
     ]
     while found:
-        choice = Choice.CLOSE
+        choice = ResumeChoice.CLOSE
         if not is_new:
             data = data_option(request.data)
             choice = choose(found, terrain, data, request.keys, request.console)
         newest = found.pop()
-        if choice is Choice.RESUME:
+        if choice is ResumeChoice.RESUME:
             return newest
         close(newest.folder, f"closed to start {terrain}", request.console)
     return None
 
 
-def _as_reopening(args: argparse.Namespace, request: Request) -> Reopening:
-    from experiments.run.resume import Reopening
+def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRequest:
+    from experiments.run.resume import ResumeRequest
 
-    return Reopening(
+    return ResumeRequest(
         data=request.data,
         config=request.config,
         console=request.console,

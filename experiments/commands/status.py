@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from experiments.operator.console import Console
-    from experiments.session.matrix_board import BoardLine
+    from experiments.session.matrix_board import MatrixRow
 
 EXAMPLES = """\
   traction status                           the board, and what comes next
@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
     from experiments.operator.console import Console
     from experiments.session.matrix_board import (
-        KnownDigests,
+        DigestCache,
         count_board,
         next_steps,
         parse_where,
@@ -47,13 +47,13 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings.load import load_settings
 
     settings = load_settings(args.config)
-    where, digest = parse_where(args.where), KnownDigests()
+    where, digest = parse_where(args.where), DigestCache()
     console = Console(color=not args.no_color)
 
-    def count() -> list[BoardLine]:
+    def count() -> list[MatrixRow]:
         return count_board(args.data, settings.matrix, where, digest)
 
-    def steps(board: Sequence[BoardLine]) -> list[str]:
+    def steps(board: Sequence[MatrixRow]) -> list[str]:
         kinds = {line.is_simulated for line in board if line.sessions} or {False}
         return [
             step
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _row(line: BoardLine) -> tuple[str, ...]:
+def _row(line: MatrixRow) -> tuple[str, ...]:
     return (
         line.terrain,
         "simulated" if line.is_simulated else "live",
@@ -86,7 +86,7 @@ def _row(line: BoardLine) -> tuple[str, ...]:
     )
 
 
-def _plain(board: Sequence[BoardLine]) -> list[str]:
+def _plain(board: Sequence[MatrixRow]) -> list[str]:
     """Return the board as lines of text."""
     rows = [_HEADER, *(_row(line) for line in board)]
     widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADER))]

@@ -48,10 +48,10 @@ def run(args: argparse.Namespace) -> int:
             console.say("Nothing was changed. ARM: idle, braked.")
             return 5
         _check_encoders(rig, _start(rig), console)  # it was moved until now
-        rig.crew.define_position(home.tolist())
+        rig.backend.define_position(home.tolist())
         console.check(GOOD, "zero", "positions defined at home")
     finally:
-        rig.crew.close()
+        rig.backend.close()
     return 0
 
 
@@ -60,7 +60,7 @@ def _start(rig: Rig) -> ArmInfo:
     from acquisition.errors import PreflightError, TractionError
 
     try:
-        return rig.crew.start_arm()
+        return rig.backend.start_arm()
     except TractionError as error:
         raise PreflightError(
             error.message, hint=error.hint, arm_state="not touched"

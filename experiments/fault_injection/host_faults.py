@@ -18,12 +18,12 @@ _ALMOST_NOTHING = 2_100_000_000  # bytes free, less than any session is allowed
 _ROOM = 4096  # bytes that a full disk still takes of a running trial
 
 
-class RehearsedBugError(Exception):
+class InjectedBugError(Exception):
     """A bug that was asked for."""
 
 
 @dataclass(slots=True)
-class Computer:
+class HostFaults:
     """Lets the computer fail as it does in earnest, and ends it all in `undo`.
 
     Attributes:
@@ -37,7 +37,7 @@ class Computer:
     is_locked: bool = False
     _undo: ExitStack = field(default_factory=ExitStack)
 
-    def strike(self, name: str, trial: int) -> None:
+    def inject(self, name: str, trial: int) -> None:
         """Let a fault happen while `trial` is recorded, or before everything (0)."""
         if name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
@@ -50,13 +50,13 @@ class Computer:
         elif name == "write-failed":
             _flip_a_bit(self._partial(trial))
         else:
-            raise RehearsedBugError("rehearsed")
+            raise InjectedBugError("rehearsed")
 
     def undo(self) -> None:
         """End what has not ended by itself; safe to repeat."""
         self._undo.close()
 
-    def occupy(self, folder: SessionFolder) -> None:
+    def hold_lock(self, folder: SessionFolder) -> None:
         """Hold the lock of a new session, as another process would, if planned."""
         self.folder = folder
         if self.is_locked:
@@ -86,7 +86,7 @@ def _full_disk(rig: Rig, path: Path) -> Generator[None]:
     The kernel then refuses to write, as it does on a full disk. Journal and sidecars
     are far smaller and stay writable, as the last blocks of a disk often are.
     """
-    number = rig.crew.recorder_pid
+    number = rig.backend.recorder_pid
     before = resource.prlimit(number, resource.RLIMIT_FSIZE)
     size = path.stat().st_size + _ROOM
     limits = (size, before[1])

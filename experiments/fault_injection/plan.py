@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from acquisition.errors import SettingsError
-from experiments.fault_injection.host_faults import COMPUTER_FAULTS, Computer
-from experiments.rig.simulation import Rehearsing
+from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
+from experiments.rig.simulation import SimulationControl
 
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
@@ -19,7 +19,7 @@ AT_PREFLIGHT = frozenset(
 )
 
 
-class Moment(Enum):
+class FaultTrigger(Enum):
     """What a fault comes into, and from which its seconds are counted."""
 
     TARE = "tare"
@@ -27,7 +27,7 @@ class Moment(Enum):
 
 
 _AT_TARE = frozenset({"tare-moved", "residual"})
-_USUALLY_AFTER = {Moment.TARE: 0.0, Moment.RECORDING: 2.0}  # s
+_USUALLY_AFTER = {FaultTrigger.TARE: 0.0, FaultTrigger.RECORDING: 2.0}  # s
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +45,9 @@ class FaultPlan:
     seconds: float
 
     @property
-    def moment(self) -> Moment:
+    def moment(self) -> FaultTrigger:
         """What it comes into."""
-        return Moment.TARE if self.name in _AT_TARE else Moment.RECORDING
+        return FaultTrigger.TARE if self.name in _AT_TARE else FaultTrigger.RECORDING
 
     def text(self) -> str:
         """Return it as it is written on the command line."""
@@ -65,10 +65,10 @@ class Faults:
     """
 
     plans: list[FaultPlan]
-    devices: Rehearsing
-    computer: Computer
+    devices: SimulationControl
+    host_faults: HostFaults
 
-    def raise_due(self, moment: Moment, trial: int, seconds: float) -> None:
+    def raise_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
         """Raise what is due `seconds` after the beginning of a moment in `trial`."""
         for plan in [p for p in self.plans if (p.trial, p.moment) == (trial, moment)]:
             if seconds >= plan.seconds:
@@ -83,7 +83,7 @@ class Faults:
 
     def _raise(self, plan: FaultPlan) -> None:
         if plan.name in COMPUTER_FAULTS:
-            self.computer.strike(plan.name, plan.trial)
+            self.host_faults.inject(plan.name, plan.trial)
         else:
             self.devices.inject(plan.name)
 
@@ -111,16 +111,16 @@ def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
 
 
 def plan_faults(
-    texts: Sequence[str], rehearsal: Rehearsing | None, computer: Computer
+    texts: Sequence[str], simulation: SimulationControl | None, host_faults: HostFaults
 ) -> Faults | None:
     """Return the faults of a rehearsal; those of the preflight are raised at once.
 
     Raises:
         SettingsError: as `parse_fault`.
     """
-    if rehearsal is None:
+    if simulation is None:
         return None
-    known = (*rehearsal.fault_names, *COMPUTER_FAULTS)
-    faults = Faults([parse_fault(t, known) for t in texts], rehearsal, computer)
+    known = (*simulation.fault_names, *COMPUTER_FAULTS)
+    faults = Faults([parse_fault(t, known) for t in texts], simulation, host_faults)
     faults.raise_first()
     return faults

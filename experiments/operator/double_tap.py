@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.rig.rig import Rig
+
 PRESSED = 8.0  # F_n above which the foot is pressed down [N]
 RELEASED = 5.0  # and below which it is let go: it rests with less than that [N]
 SHORTEST, LONGEST = 0.02, 0.40  # a press lasts this long [s]
@@ -60,3 +62,24 @@ class DoubleTap:
             return True
         self._first_at = pressed_at
         return False
+
+
+_SECONDS = 0.1  # of samples looked at; those seen before are passed over
+
+
+class FootKeys:
+    """Turns a double tap of the foot into a key, if rig.toml wants it."""
+
+    def __init__(self, rig: Rig) -> None:
+        is_wanted = rig.settings.rig.operator.double_tap
+        self._taps = DoubleTap() if is_wanted else None
+        self._loop_client = rig.backend.loop_client
+
+    def key(self, key: str) -> str:
+        """Return `key` when the foot was tapped twice since the last call, else ""."""
+        if self._taps is None:
+            return ""
+        records = self._loop_client.last(_SECONDS)
+        t = records["host_ns"].astype(float) * 1e-9
+        v_t, _, F_n = records["traction"].T
+        return key if self._taps.feed(t, F_n, v_t) else ""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
 
-from experiments.rig.simulation import Rehearsing
+from experiments.rig.simulation import SimulationControl
 
 REJECT_REASONS = {
     "1": "foot left the bed",
@@ -42,7 +42,7 @@ class Prompt(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class PromptState:
     """A prompt with what it is about.
 
     Attributes:
@@ -60,7 +60,7 @@ class Asked:
     since: float
 
 
-class Keys(Protocol):
+class OperatorInput(Protocol):
     """Answers prompts with keys: space, k, r and a digit, q; and notes with a line."""
 
     @property
@@ -68,16 +68,16 @@ class Keys(Protocol):
         """What has been typed of a line so far."""
         ...
 
-    def answer(self, asked: Asked) -> str:
+    def answer(self, asked: PromptState) -> str:
         """Return the keys pressed since the last call, "" for none."""
         ...
 
-    def line(self, asked: Asked) -> str | None:
+    def line(self, asked: PromptState) -> str | None:
         """Return the line that was typed, "" where it was given up, None before."""
         ...
 
 
-class AutoKeys:
+class AutoOperator:
     """Presses the obvious key: space when ready, keep what is complete.
 
     It gives up where a person would: a rehearsal must come to an end.
@@ -85,39 +85,39 @@ class AutoKeys:
 
     draft = ""
 
-    def answer(self, asked: Asked) -> str:
+    def answer(self, asked: PromptState) -> str:
         """Return a key as soon as it makes sense."""
         answer = _AUTOMATIC.get(asked.prompt)
         return answer(asked) if answer is not None else ""
 
-    def line(self, asked: Asked) -> str | None:
+    def line(self, asked: PromptState) -> str | None:
         """Return nothing: it never has anything to note."""
         del asked
         return ""
 
 
-def _lift_key(asked: Asked) -> str:
+def _lift_key(asked: PromptState) -> str:
     return "q" if asked.since > AUTO_PATIENCE else ""
 
 
-def _ready_key(asked: Asked) -> str:
+def _ready_key(asked: PromptState) -> str:
     return " " if asked.since > READY_SECONDS else ""
 
 
-def _review_key(asked: Asked) -> str:
+def _review_key(asked: PromptState) -> str:
     if asked.is_complete:
         return "k"
     return "r5" if asked.attempt < AUTO_ATTEMPTS else "q"
 
 
-def _touch_key(asked: Asked) -> str:
+def _touch_key(asked: PromptState) -> str:
     """Touch a dozen points, each until the foot is at rest."""
     if asked.since < TOUCH_SECONDS:
         return ""
     return " " if asked.trial <= TOUCHES else "d"
 
 
-_AUTOMATIC: dict[Prompt, Callable[[Asked], str]] = {
+_AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.SUPPORT: lambda _: " ",
     Prompt.CLEAR: lambda _: " ",
     Prompt.LIFT: _lift_key,
@@ -132,32 +132,32 @@ _AUTOMATIC: dict[Prompt, Callable[[Asked], str]] = {
 _ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
 
 
-class RehearsedHand:
+class SimulatedHand:
     """Moves the simulated hand and pendant as the prompts ask."""
 
-    def __init__(self, rehearsal: Rehearsing) -> None:
-        self._rehearsal = rehearsal
+    def __init__(self, simulation: SimulationControl) -> None:
+        self._simulation = simulation
         self._seen: tuple[Prompt, int, int] | None = None
 
-    def follow(self, asked: Asked) -> None:
+    def follow(self, asked: PromptState) -> None:
         """Do what a person would do at this prompt; once per prompt."""
         key = (asked.prompt, asked.trial, asked.attempt)
         if key == self._seen or asked.prompt in _ASIDE:
             return
         self._seen = key
         if asked.prompt is Prompt.SUPPORT:
-            self._rehearsal.lift()
-            self._rehearsal.pendant("activate")
+            self._simulation.lift()
+            self._simulation.pendant("activate")
         elif asked.prompt is Prompt.LIFT:
-            self._rehearsal.lift()
+            self._simulation.lift()
         elif asked.prompt is Prompt.CLEAR:
-            self._rehearsal.let_go()
+            self._simulation.let_go()
         elif asked.prompt is Prompt.TOUCH:
-            self._rehearsal.touch(asked.trial)
+            self._simulation.touch(asked.trial)
         elif asked.prompt is Prompt.READY:
-            self._rehearsal.prepare(asked.trial + 1000 * (asked.attempt - 1))
-            self._rehearsal.put_down()
+            self._simulation.prepare(asked.trial + 1000 * (asked.attempt - 1))
+            self._simulation.put_down()
         elif asked.prompt is Prompt.RECORDING:
-            self._rehearsal.push()
+            self._simulation.push()
         elif asked.prompt is Prompt.REVIEW:
-            self._rehearsal.rest()
+            self._simulation.rest()

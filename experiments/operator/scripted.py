@@ -6,9 +6,9 @@ from acquisition.errors import SettingsError
 from experiments.operator.prompts import (
     READY_SECONDS,
     REJECT_REASONS,
-    Asked,
-    AutoKeys,
+    AutoOperator,
     Prompt,
+    PromptState,
 )
 
 # word of a line: the key it presses
@@ -19,7 +19,7 @@ _KEYS = {Prompt.READY: _BEFORE, Prompt.REVIEW: _AFTER}
 _LARGEST = 1_000_000  # bytes; a script has a few hundred
 
 
-class ScriptKeys:
+class ScriptedOperator:
     """Presses keys line by line, each at its own prompt; the rest like AutoKeys.
 
     At a review: `keep`, `redo REASON` (1-5), `remark TEXT` (a note on the trial),
@@ -34,13 +34,13 @@ class ScriptKeys:
     draft = ""
 
     def __init__(self, path: Path) -> None:
-        self._auto = AutoKeys()
+        self._auto = AutoOperator()
         lines = enumerate(_read(path).splitlines(), 1)
         bare = [(number, line.split("#")[0].split()) for number, line in lines]
         self._lines = [_parse(path, number, words) for number, words in bare if words]
         self._text = ""
 
-    def answer(self, asked: Asked) -> str:
+    def answer(self, asked: PromptState) -> str:
         """Return the key of the next line where it is its turn."""
         keys = _KEYS.get(asked.prompt, {})
         word, rest = self._lines[0] if self._lines else ("", "")
@@ -52,7 +52,7 @@ class ScriptKeys:
         self._text = rest
         return keys[word] + (rest if word == "redo" else "")
 
-    def line(self, asked: Asked) -> str | None:
+    def line(self, asked: PromptState) -> str | None:
         """Return the text of the line that asked for the note."""
         del asked
         return self._text

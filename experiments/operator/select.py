@@ -5,12 +5,12 @@ from pathlib import Path
 
 from acquisition.errors import SettingsError
 from experiments.messages import CATALOGUE
-from experiments.operator.prompts import AutoKeys, Keys
-from experiments.operator.scripted import ScriptKeys
-from experiments.operator.terminal import TerminalKeys
+from experiments.operator.prompts import AutoOperator, OperatorInput
+from experiments.operator.scripted import ScriptedOperator
+from experiments.operator.terminal import TerminalInput
 
 
-def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
+def choose_keys(script: str | None, *, is_fake: bool) -> OperatorInput:
     """Return who answers: a script, `auto`, or the keyboard.
 
     Raises:
@@ -19,10 +19,10 @@ def choose_keys(script: str | None, *, is_fake: bool) -> Keys:
     stdin = sys.stdin
     has_person = stdin is not None and stdin.isatty()
     if script == "auto" or (script is None and is_fake and not has_person):
-        return AutoKeys()
+        return AutoOperator()
     if script is not None:
-        return ScriptKeys(Path(script))
+        return ScriptedOperator(Path(script))
     if stdin is None or not has_person:
         message = CATALOGUE["nobody"]
         raise SettingsError(message.what, hint=message.do)
-    return TerminalKeys(stdin.fileno())
+    return TerminalInput(stdin.fileno())

@@ -10,7 +10,12 @@ import tty
 from types import TracebackType
 from typing import Self
 
-from experiments.operator.prompts import REJECT_REASONS, Asked, Keys, Prompt
+from experiments.operator.prompts import (
+    REJECT_REASONS,
+    OperatorInput,
+    Prompt,
+    PromptState,
+)
 
 _AT_ONCE = 256  # bytes
 LONGEST_LINE = 500  # characters of a note
@@ -54,14 +59,14 @@ class Cbreak:
                 termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
 
 
-def keyboard(keys: Keys) -> contextlib.AbstractContextManager[object]:
+def keyboard(keys: OperatorInput) -> contextlib.AbstractContextManager[object]:
     """Return what switches the terminal over while `keys` come from it."""
-    if isinstance(keys, TerminalKeys):
+    if isinstance(keys, TerminalInput):
         return Cbreak(keys.descriptor)
     return contextlib.nullcontext()
 
 
-class TerminalKeys:
+class TerminalInput:
     """Keys as they are pressed, from a keyboard or anything that looks like one.
 
     A pedal that types a space or a letter is a keyboard too. `r` waits for the digit
@@ -81,7 +86,7 @@ class TerminalKeys:
         self._is_rejecting = False
         self._prompt: Prompt | None = None
 
-    def answer(self, asked: Asked) -> str:
+    def answer(self, asked: PromptState) -> str:
         """Return the next key that was pressed, "" for none, q when all have gone.
 
         What was typed before the prompt came was not meant for it and is forgotten.
@@ -93,7 +98,7 @@ class TerminalKeys:
                 return found
         return "q" if self._is_end else ""
 
-    def line(self, asked: Asked) -> str | None:
+    def line(self, asked: PromptState) -> str | None:
         """Return the line when Enter ends it, "" when Esc gives it up, None before.
 
         Backspace takes a character back. An arrow key, which begins like Esc, does

@@ -5,9 +5,9 @@ from pathlib import Path
 from acquisition.errors import SessionError
 from experiments.messages import CATALOGUE
 from experiments.operator.console import GOOD, WARNING, Console
-from experiments.operator.prompts import Keys, Prompt
+from experiments.operator.prompts import OperatorInput, Prompt
 from experiments.preflight.conditions import FILE
-from experiments.preflight.host_checks import Finding
+from experiments.preflight.host_checks import CheckResult
 from experiments.run.resume_prompt import ask
 from experiments.session.store import SessionFolder, list_sessions, read_json
 from experiments.settings.matrix import TerrainRow
@@ -41,16 +41,16 @@ def foot_before(data: Path, *, is_simulated: bool) -> tuple[SessionFolder, str] 
 def confirm_foot(
     row: TerrainRow,
     before: tuple[SessionFolder, str] | None,
-    keys: Keys,
+    keys: OperatorInput,
     console: Console,
-) -> Finding:
+) -> CheckResult:
     """Return the line about the foot for the page; ask when it is another one.
 
     Raises:
         SessionError: nobody confirmed it.
     """
     if before is None or before[1] == row.foot:
-        return Finding(GOOD, "foot", row.foot)
+        return CheckResult(GOOD, "foot", row.foot)
     folder, foot = before
     message = CATALOGUE["foot-changed"]
     facts = {"session": folder.id, "before": foot, "terrain": row.name}
@@ -60,4 +60,4 @@ def confirm_foot(
     if ask(keys, Prompt.FOOT, {" ", "q"}) == "q":
         raise SessionError(what, hint="Nothing was started.")
     text = f"{row.foot}, mounted since {folder.id} ({foot}), as confirmed"
-    return Finding(GOOD, "foot", text)
+    return CheckResult(GOOD, "foot", text)

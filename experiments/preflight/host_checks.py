@@ -18,7 +18,7 @@ NOISY = 0.5  # N, several times what a quiet sensor shows
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class CheckResult:
     """One line of the page."""
 
     mark: str
@@ -26,7 +26,7 @@ class Finding:
     text: str
 
 
-def check_governor(cpus: Path = CPUS) -> Finding:
+def check_governor(cpus: Path = CPUS) -> CheckResult:
     """Grade how the processors' clocks are governed."""
     found: set[str] = set()
     for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
@@ -35,24 +35,24 @@ def check_governor(cpus: Path = CPUS) -> Finding:
         except OSError:
             continue
     if not found:
-        return Finding(GOOD, "CPU governor", "none on this machine")
+        return CheckResult(GOOD, "CPU governor", "none on this machine")
     if found == {FAST}:
-        return Finding(GOOD, "CPU governor", FAST)
+        return CheckResult(GOOD, "CPU governor", FAST)
     names = ", ".join(sorted(found))
     fix = "cpupower frequency-set -g performance"
-    return Finding(WARNING, "CPU governor", f"{names}: {fix}")
+    return CheckResult(WARNING, "CPU governor", f"{names}: {fix}")
 
 
-def check_code(facts: dict[str, str]) -> Finding:
+def check_code(facts: dict[str, str]) -> CheckResult:
     """Grade the version of the program; `facts` are those of provenance."""
     commit = facts["commit"][:10]
     if facts["dirty"] == "true":
         text = f"{facts['software']} {commit}, changed since: the diff is recorded"
-        return Finding(WARNING, "code", text)
-    return Finding(GOOD, "code", f"{facts['software']} {commit}")
+        return CheckResult(WARNING, "code", text)
+    return CheckResult(GOOD, "code", f"{facts['software']} {commit}")
 
 
-def check_wrenches(samples: Record, now_ns: int) -> Finding:
+def check_wrenches(samples: Record, now_ns: int) -> CheckResult:
     """Grade rate, age and noise of force samples.
 
     Args:
@@ -62,7 +62,7 @@ def check_wrenches(samples: Record, now_ns: int) -> Finding:
     name = "F/T samples"
     times = samples["t_ns"].astype(np.int64) * 1e-9
     if len(samples) < 2 or times[-1] <= times[0]:
-        return Finding(WARNING, name, f"{len(samples)} while the loop was tested")
+        return CheckResult(WARNING, name, f"{len(samples)} while the loop was tested")
     rate = (len(samples) - 1) / float(times[-1] - times[0])
     age = (now_ns - int(samples["t_ns"][-1])) * 1e-6
     forces = samples["wrench"][-max(2, int(rate * 0.2)) :, :3]
@@ -73,7 +73,7 @@ def check_wrenches(samples: Record, now_ns: int) -> Finding:
         axes = axis_names(int(np.bitwise_or.reduce(samples["saturated"])))
         text += f", {saturated} saturated ({', '.join(axes)})"
     is_fine = age < OLD_MS and noise < NOISY and not saturated
-    return Finding(GOOD if is_fine else WARNING, name, text)
+    return CheckResult(GOOD if is_fine else WARNING, name, text)
 
 
 def reach_words(facts: Mapping[str, str], lever: float) -> str:
@@ -88,13 +88,13 @@ def reach_words(facts: Mapping[str, str], lever: float) -> str:
     return f"F_t up to {most:.0f} N"
 
 
-def check_stream(facts: Mapping[str, str]) -> Finding | None:
+def check_stream(facts: Mapping[str, str]) -> CheckResult | None:
     """Grade a serial stream by what became of it; None for a sensor on the bus."""
     name = "F/T stream"
     if "frames" not in facts and "trouble" not in facts:
         return None
     if facts.get("trouble"):
-        return Finding(BAD, name, facts["trouble"])
+        return CheckResult(BAD, name, facts["trouble"])
     text = f"{facts['lost']} of {int(facts['frames']) + int(facts['lost'])} lost"
     text += f", {facts['bad_checks']} damaged"
     bursts, reads = int(facts["bursts"]), int(facts["reads"])
@@ -102,4 +102,4 @@ def check_stream(facts: Mapping[str, str]) -> Finding | None:
     if is_bursty:
         text += ", comes in bursts: latency timer of the adapter to 1 ms"
     is_fine = not is_bursty and facts["lost"] == facts["bad_checks"] == "0"
-    return Finding(GOOD if is_fine else WARNING, name, text)
+    return CheckResult(GOOD if is_fine else WARNING, name, text)

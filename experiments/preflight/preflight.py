@@ -18,7 +18,7 @@ from experiments import provenance
 from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.preflight.host_checks import (
-    Finding,
+    CheckResult,
     check_code,
     check_governor,
     check_stream,
@@ -55,7 +55,7 @@ class Preflight:
     checks: tuple[Check, ...]
     devices: dict[str, str]
 
-    def after(self, finding: Finding) -> "Preflight":
+    def after(self, finding: CheckResult) -> "Preflight":
         """Return the page with what was found before it."""
         first = Check(finding.mark, finding.name, finding.text)
         return replace(self, checks=(first, *self.checks))
@@ -93,7 +93,7 @@ def run_preflight(
         checks.append(Check(mark, name, text))
         console.check(mark, name, text)
 
-    def note(finding: Finding) -> None:
+    def note(finding: CheckResult) -> None:
         add(finding.mark, finding.name, finding.text)
 
     weight = gravity_words(rig.settings.rig, rig.gravity_text, rig.row.foot)
@@ -106,8 +106,8 @@ def run_preflight(
     sensor = _check_sensor(rig, add)
     _check_exchange(rig, add)
     grants = _check_rights(rig, add)
-    wrenches = rig.board.wrenches.reader()
-    rig.crew.begin()
+    wrenches = rig.shared.wrenches.reader()
+    rig.backend.begin()
     _check_loop(rig, seconds, add)
     note(check_wrenches(wrenches.read(), rig.clock.now_ns()))
     _check_stream(rig, note)
@@ -117,7 +117,7 @@ def run_preflight(
 
 def _check_arm(rig: Rig, add: Add) -> None:
     try:
-        info = rig.crew.start_arm()
+        info = rig.backend.start_arm()
     except TractionError as error:
         add(BAD, "arm", str(error))
         raise _not_reached(error, rig.settings.rig) from error
@@ -142,7 +142,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
 
 def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
     try:
-        facts = rig.crew.open_sensor()
+        facts = rig.backend.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
         raise _as_preflight(error, "idle") from error
@@ -158,9 +158,9 @@ def _lever(rig: Rig) -> float:
     return float(tool.sole[2] - tool.sensor_height)
 
 
-def _check_stream(rig: Rig, note: Callable[[Finding], None]) -> None:
+def _check_stream(rig: Rig, note: Callable[[CheckResult], None]) -> None:
     """Grade what became of the sensor's stream while the loop was tested."""
-    facts = rig.crew.sensor_facts()
+    facts = rig.backend.sensor_facts()
     found = check_stream(facts)
     if found is None:
         return
@@ -176,16 +176,16 @@ def start_devices(rig: Rig) -> None:
         PreflightError: the arm or the sensor is not fit.
     """
     try:
-        rig.crew.start_arm()
-        rig.crew.open_sensor()
+        rig.backend.start_arm()
+        rig.backend.open_sensor()
     except TractionError as error:
         raise _as_preflight(error, "not touched") from error
-    rig.crew.begin()
+    rig.backend.begin()
 
 
 def _check_exchange(rig: Rig, add: Add) -> None:
     """Grade the way from the request to the seventh position over this adapter."""
-    times = np.array(rig.crew.measure_exchange())
+    times = np.array(rig.backend.measure_exchange())
     lost = EXCHANGE_CYCLES - len(times)
     if len(times) < EXCHANGE_CYCLES // 2:
         add(BAD, "exchange", f"{lost} of {EXCHANGE_CYCLES} cycles incomplete")
@@ -201,7 +201,7 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
     """Say what the kernel refused to each process; return it for the recording."""
     facts: dict[str, str] = {}
     refused: list[str] = []
-    for process, grants in rig.crew.grants().items():
+    for process, grants in rig.backend.grants().items():
         words = [
             grant.what if grant.is_granted else f"no {grant.what} ({grant.reason})"
             for grant in grants
@@ -221,8 +221,8 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
 def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     """Run the loop for a while, the arm idle, and grade its cadence."""
     seconds = STEPPED_TEST if rig.is_stepped else seconds
-    timings = rig.crew.desk.timings()
-    rig.crew.desk.advance(seconds)
+    timings = rig.backend.loop_client.timings()
+    rig.backend.loop_client.advance(seconds)
     report = loop_report(timings.read())
     if report is None:
         add(BAD, "loop", "no cycle ran")

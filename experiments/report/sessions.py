@@ -11,7 +11,7 @@ from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions
 from analysis.findings.rig_health import rig_health
 from analysis.report.page import ReportContext, write_report
-from analysis.report.what_if import Choice, plain_choice, side_by_side
+from analysis.report.what_if import StudyVariant, plain_choice, side_by_side
 from analysis.study.fold_store import ResultStore
 from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
@@ -21,7 +21,7 @@ from experiments.messages import CATALOGUE
 from experiments.operator.console import Console
 from experiments.operator.progress import ProgressLine
 from experiments.report.tables import report_tables
-from experiments.report.truth_tables import truth_tables
+from experiments.report.truth_errors import truth_tables
 from experiments.session.store import (
     SessionFolder,
     find_session,
@@ -35,7 +35,7 @@ REPORTED = (*FITTERS, GP_SE_NOISE)  # the models of a report: Fig. 9, and chosen
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ReportRequest:
     """How a report is made.
 
     Attributes:
@@ -48,7 +48,7 @@ class Order:
     terrains: Sequence[str]
     seed: int
     scheduler: str | None = None
-    choices: Sequence[Choice] = ()
+    choices: Sequence[StudyVariant] = ()
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -113,7 +113,7 @@ def _load_trials(
 
 
 @dataclass(frozen=True, slots=True)
-class Studied:
+class StudySession:
     """Sessions and what a study makes of them.
 
     Attributes:
@@ -130,10 +130,10 @@ class Studied:
 def study_sessions(
     sessions: Sequence[SessionFolder],
     data: Path,
-    order: Order,
+    order: ReportRequest,
     console: Console,
     fit: FitOptions,
-) -> Studied:
+) -> StudySession:
     """Load the kept trials and fit; finished folds are kept below `data`.
 
     Raises:
@@ -159,7 +159,7 @@ def study_sessions(
         study = run_study(
             series, options, is_simulated, progress, ResultStore(data / FOLDS)
         )
-    return Studied(study, trials, problems)
+    return StudySession(study, trials, problems)
 
 
 @contextmanager
@@ -172,7 +172,9 @@ def fitting(console: Console) -> Generator[ProgressLine]:
         progress.end()
 
 
-def repeated(done: Studied, choice: Choice, data: Path, console: Console) -> Study:
+def repeated(
+    done: StudySession, choice: StudyVariant, data: Path, console: Console
+) -> Study:
     """Return the study once more under a choice."""
     console.say(f"What if {choice.text}: fitting ...")
     series = {
@@ -190,7 +192,7 @@ def export_terrains(
     sessions: Sequence[SessionFolder],
     data: Path,
     out: Path,
-    order: Order,
+    order: ReportRequest,
     console: Console,
 ) -> None:
     """Write a terrain database of all models of the sessions' terrains to `out`.
@@ -214,7 +216,10 @@ def export_terrains(
 
 
 def report_sessions(
-    sessions: Sequence[SessionFolder], data: Path, order: Order, console: Console
+    sessions: Sequence[SessionFolder],
+    data: Path,
+    order: ReportRequest,
+    console: Console,
 ) -> Path:
     """Load the kept trials, fit, and write the report; return the page.
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import cast
 
 from analysis.data.load import RecordedTrial
-from analysis.report.page_model import ReportTable, Section
+from analysis.report.page_model import ReportSection, ReportTable
 from experiments.session.store import SessionFolder, read_json
 
 _ROW = (
@@ -48,7 +48,7 @@ def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
         "Sessions",
         ("session", "terrain", "date", "kind", "kept", "rejected"),
         rows,
-        section=Section.SUMMARY,
+        section=ReportSection.SUMMARY,
     )
 
 
@@ -70,7 +70,7 @@ def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
         ("session", "trial", "status", "reason", "who", "when (UTC)"),
         rows,
         note="" if rows else "None: every recorded trial was kept.",
-        section=Section.HEALTH,
+        section=ReportSection.HEALTH,
     )
 
 
@@ -87,7 +87,7 @@ def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
         "Checks before the sessions",
         ("check", "", "found", "sessions"),
         [(*found, ", ".join(ids)) for found, ids in sorted(said.items())],
-        section=Section.HEALTH,
+        section=ReportSection.HEALTH,
     )
 
 

@@ -1,6 +1,6 @@
 """What was measured beside what was true, in simulated trials."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,8 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import moving_average
+from analysis.report.page_model import ReportSection, ReportTable
+from analysis.study.study import Study, TerrainResult
 
 _FEWEST = 50  # cycles, or a truth file is none of this trial
 _WIDTH = 11  # of the moving average, as the models see the trial
@@ -74,3 +76,96 @@ def _parameters(facts: Mapping[str, str]) -> dict[str, float]:
 
 def _smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([moving_average(column, _WIDTH) for column in values.T])
+
+
+_NAMES = {
+    "mu_k": "μ_k, sliding friction",
+    "mu_s": "F_s = μ_s F_n at the median F_n [N]",
+    "v_S": "v_S, Stribeck velocity [m/s]",
+    "b": "b, viscous [kg/s]",
+}
+_RECOVERED = {"mu_k": "mu", "mu_s": "F_s", "v_S": "v_s", "b": "b"}
+
+
+def truth_tables(
+    study: Study, trials: Mapping[str, Sequence[RecordedTrial]]
+) -> list[ReportTable]:
+    """Return measured and recovered beside the truth; none without truth files."""
+    errors = {
+        name: [
+            (trial.name, error)
+            for trial in group
+            if (error := truth_errors(trial)) is not None
+        ]
+        for name, group in trials.items()
+    }
+    if not any(errors.values()):
+        return []
+    return [_measured(errors), _recovered(study, errors)]
+
+
+def _measured(errors: Mapping[str, list[tuple[str, TruthErrors]]]) -> ReportTable:
+    return ReportTable(
+        "Measured against true",
+        ("trial", "v_t, rms [mm/s]", "F_t, mean |error| [N]", "F_n, mean |error| [N]"),
+        [
+            (
+                f"{terrain} {name}",
+                f"{error.v_t * 1e3:.2f}",
+                f"{error.F_t:.2f}",
+                f"{error.F_n:.2f}",
+            )
+            for terrain, found in errors.items()
+            for name, error in found
+        ],
+        note="Simulated trials only; after the same smoothing on both.",
+        section=ReportSection.REACH,
+    )
+
+
+def _recovered(
+    study: Study, errors: Mapping[str, list[tuple[str, TruthErrors]]]
+) -> ReportTable:
+    rows = [
+        row
+        for terrain, found in errors.items()
+        for row in _rows(study.terrains[terrain], [error for _, error in found])
+    ]
+    return ReportTable(
+        "True parameters beside the recovered ones",
+        ("terrain", "parameter", "true, mean (range)", "Tustin, all trials"),
+        rows,
+        note="A simulated plate follows eq. (1) with δ_s = 2 and a static force that "
+        "grows with F_n. A bed of stones has no Tustin parameters: its own are given, "
+        "and only curves can be compared. In brackets the 95% interval.",
+        section=ReportSection.REACH,
+    )
+
+
+def _rows(
+    result: TerrainResult, errors: Sequence[TruthErrors]
+) -> list[tuple[str, ...]]:
+    names = dict.fromkeys(name for error in errors for name in error.parameters)
+    rows: list[tuple[str, ...]] = []
+    for name in names:
+        values = np.array([e.parameters[name] for e in errors if name in e.parameters])
+        if name == "mu_s":
+            loads = [trial.F_n for trial in result.trials if trial.kept]
+            values = values * (np.median(np.concatenate(loads)) if loads else np.nan)
+        true = f"{values.mean():.3g}"
+        if np.ptp(values) > 0:
+            true += f" ({values.min():.3g} to {values.max():.3g})"
+        title = _NAMES.get(name, name)
+        rows.append((result.terrain, title, true, _fitted(result, name)))
+    return rows
+
+
+def _fitted(result: TerrainResult, name: str) -> str:
+    whole, key = result.whole, _RECOVERED.get(name)
+    if whole.fit is None or key is None:
+        return "no counterpart" if key is None else "no fit"
+    text = f"{getattr(whole.fit.parameters, key):.3g}"
+    if key in whole.intervals:
+        low, high = whole.intervals[key]
+        text += f" ({low:.3g} to {high:.3g})"
+    return text

@@ -9,7 +9,7 @@ from acquisition.clock import Clock
 from acquisition.control_loop.loop import PERIOD_NS
 from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode
-from acquisition.ipc.loop_client import Desk
+from acquisition.ipc.loop_client import LoopClient
 from acquisition.recording.recorder import TrialRecording
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
@@ -18,14 +18,14 @@ ARM_INFO = TypeAdapter(ArmInfo)
 EXCHANGE_CYCLES = 100
 
 
-class Crew(Protocol):
+class RigBackend(Protocol):
     """What the console asks of those who work the rig.
 
     Attributes:
         desk: the console's side of the loop.
     """
 
-    desk: Desk
+    loop_client: LoopClient
 
     @property
     def recorder(self) -> TrialRecording:

@@ -9,12 +9,12 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Limits
+from acquisition.control_loop.guard import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
 from acquisition.ipc.frame_tape import FrameTape
-from acquisition.ipc.layout import Board
-from acquisition.ipc.loop_server import Attendant, Surroundings, no_bell
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_server import LoopHooks, LoopServer, no_bell
 from acquisition.ipc.shared_sensor import SharedSensor, publish
 from acquisition.sample import Flag
 from experiments.settings.matrix import TerrainRow
@@ -25,14 +25,13 @@ from ft_sensor.payload import TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
-from wam.bus.link import CanLink
-from wam.bus.tap import FrameTap
+from wam.bus.link import CanLink, FrameTap
 from wam.control.controller import FootController
 from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.driver.arm import WamArm
 from wam.driver.health import health_facts
-from wam.driver.safety_limits import WARNING_SHARE, SafetyLimits
+from wam.driver.safety_module import WARNING_SHARE, SafetyLimits
 from wam.driver.settings import ArmSettings
 from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Body
@@ -68,10 +67,10 @@ def build_tool(rig: RigSettings, foot: str) -> Tool:
     )
 
 
-def build_limits(rig: RigSettings, constants: ArmConstants) -> Limits:
+def build_limits(rig: RigSettings, constants: ArmConstants) -> GuardLimits:
     """Return the guard's limits of rig.toml."""
     limits = rig.limits
-    return Limits(
+    return GuardLimits(
         q_lower=tuple(constants.q_lower.tolist()),
         q_upper=tuple(constants.q_upper.tolist()),
         qd=limits.speed,
@@ -109,11 +108,11 @@ def build_arm(
     rig: RigSettings,
     constants: ArmConstants,
     link: CanLink,
-    board: Board,
+    shared: SharedLayout,
     clock: Clock,
 ) -> WamArm:
     """Return the driver of the arm on `link`; every frame goes onto the board."""
-    link.tap = FrameTap(FrameTape(board.frames), clock)
+    link.tap = FrameTap(FrameTape(shared.frames), clock)
     settings = ArmSettings(j2mp=constants.j2mp, safety_limits=build_safety_limits(rig))
     return WamArm(link, clock, settings)
 
@@ -127,7 +126,7 @@ def open_bus_sensor(arm: WamArm, link: CanLink, clock: Clock) -> BarrettSensor:
     """
     sensor = BarrettSensor(link, clock)
     sensor.open()
-    arm.accompany(sensor)
+    arm.attach_device(sensor)
     return sensor
 
 
@@ -148,7 +147,7 @@ def build_sensor(
 
 
 @dataclass(frozen=True, slots=True)
-class LoopParts:
+class LoopConfig:
     """What a loop is made of.
 
     Attributes:
@@ -170,21 +169,21 @@ class LoopParts:
     law_model: ArmModel
     arm: WamArm
     sensor: WrenchSensor
-    board: Board
+    shared: SharedLayout
     clock: Clock
     is_simulated: bool
     ring: Callable[[], None] = no_bell
 
 
-def build_attendant(parts: LoopParts) -> Attendant:
+def build_loop_server(parts: LoopConfig) -> LoopServer:
     """Join arm, sensor, law and guard into a cycle that is ready to run."""
-    control, model, board = parts.rig.control, parts.model, parts.board
+    control, model, shared = parts.rig.control, parts.model, parts.shared
     assert model.tool is not None
     is_shared = isinstance(parts.sensor, SharedSensor)
 
     def on_wrench(samples: list[WrenchSample]) -> None:
         if not is_shared:  # those of a shared sensor are on the board already
-            publish(samples, board.wrenches)
+            publish(samples, shared.wrenches)
 
     def facts() -> dict[str, str]:
         arm = parts.arm
@@ -205,9 +204,9 @@ def build_attendant(parts: LoopParts) -> Attendant:
         ),
         LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
         build_limits(parts.rig, model.constants),
-        board.cycles.write,
+        shared.cycles.write,
         on_wrench,
         extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
     )
-    around = Surroundings(parts.clock.now_ns, facts, parts.ring)
-    return Attendant(cycle, parts.arm, board, around)
+    around = LoopHooks(parts.clock.now_ns, facts, parts.ring)
+    return LoopServer(cycle, parts.arm, shared, around)

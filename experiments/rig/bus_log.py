@@ -64,7 +64,7 @@ def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None
         SettingsError: as `open_bus_log`.
     """
     channel = "fake0" if rig.is_simulated else rig.settings.rig.can.channel
-    reader = rig.board.frames.reader()
+    reader = rig.shared.frames.reader()
 
     def drain(log: CanLog) -> None:
         for frame in reader.read():
@@ -73,15 +73,15 @@ def logging_bus(rig: Rig, path: Path | None, console: Console) -> Generator[None
             log.add(int(frame["can_id"]), data, int(frame["t_ns"]))
 
     with (
-        closing(rig.crew),  # closed even where the log cannot be opened
+        closing(rig.backend),  # closed even where the log cannot be opened
         open_bus_log(path, rig.clock, channel, console) as log,
     ):
         if log is not None:
-            rig.crew.desk.on_pass.append(lambda: drain(log))
+            rig.backend.loop_client.on_tick.append(lambda: drain(log))
         try:
             yield
         finally:
-            rig.crew.close()  # what the arm says in parting is logged
+            rig.backend.close()  # what the arm says in parting is logged
             if log is not None:
                 drain(log)
             if reader.lost:

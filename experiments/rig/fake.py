@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
 from acquisition.errors import SettingsError
-from acquisition.ipc.layout import Board
-from experiments.rig.backend import Crew
+from acquisition.ipc.layout import SharedLayout
+from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
-    LoopParts,
+    LoopConfig,
     build_arm,
     build_sensor,
     build_tool,
     open_bus_sensor,
     terrain_frame,
 )
-from experiments.rig.inline import InlineCrew
-from experiments.rig.simulation import Rehearsing
+from experiments.rig.inline import InProcessBackend
+from experiments.rig.simulation import SimulationControl
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class World:
+class SimulatedRig:
     """What is simulated: the settings as written, before any calibration.
 
     Attributes:
@@ -92,12 +92,12 @@ def sensor_facts(section: SensorSection) -> dict[str, Any]:
 
 
 def stepped(
-    world: World,
+    world: SimulatedRig,
     settings: Settings,
     row: TerrainRow,
     models: tuple[ArmModel, ArmModel],
-    board: Board,
-) -> tuple[Clock, Crew, Rehearsing]:
+    shared: SharedLayout,
+) -> tuple[Clock, RigBackend, SimulationControl]:
     """Return (clock, crew, handle) of a simulation that runs in this thread.
 
     `models`: the arm with its tool, and as the control law weighs it.
@@ -106,7 +106,7 @@ def stepped(
     from fakes.plant.plant import PlantOptions
     from fakes.plant.push import PACES
     from fakes.serving.rig_process import scene_of
-    from fakes.world.rig import FakeRig, Rehearsal
+    from fakes.world.rig import FakeRig, LocalSimulation
 
     clock, facts = SteppedClock(), world.facts()
     model, law_model = models
@@ -119,28 +119,28 @@ def stepped(
     )
     clock.world = simulation
     link = CanLink(simulation.bus)
-    arm = build_arm(settings.rig, model.constants, link, board, clock)
+    arm = build_arm(settings.rig, model.constants, link, shared, clock)
 
     def sensor() -> WrenchSensor:
         if settings.rig.ft_sensor.is_on_bus:
             return open_bus_sensor(arm, link, clock)
         return _opened_sensor(settings.rig, simulation.open_port(), clock)
 
-    def parts(opened: WrenchSensor) -> LoopParts:
-        return LoopParts(
+    def parts(opened: WrenchSensor) -> LoopConfig:
+        return LoopConfig(
             rig=settings.rig,
             row=row,
             model=model,
             law_model=law_model,
             arm=arm,
             sensor=opened,
-            board=board,
+            shared=shared,
             clock=clock,
             is_simulated=True,
         )
 
-    crew = InlineCrew(board, clock, arm, sensor, parts)
-    return clock, crew, Rehearsal(simulation, PACES[facts["pace"]])
+    backend = InProcessBackend(shared, clock, arm, sensor, parts)
+    return clock, backend, LocalSimulation(simulation, PACES[facts["pace"]])
 
 
 def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSensor:
@@ -197,13 +197,13 @@ def build_server(
         SettingsError: the socket's path is in use or cannot be one.
         LinkError: the bus cannot be opened.
     """
-    from fakes.serving.puck_server import Home, build_home_server, open_can_port
+    from fakes.serving.puck_server import HomePose, build_home_server, open_can_port
 
     row = settings.matrix.terrains[0]
     port = open_can_port(*bus, settings.rig.can.bitrate)
     tool = build_tool(settings.rig, row.foot)
     served = _sensor_line(settings, *line) if line is not None else None
-    found = Home(tool, terrain_frame(row), served, is_idle)
+    found = HomePose(tool, terrain_frame(row), served, is_idle)
     try:
         return build_home_server(port, found, SystemClock())
     except SettingsError:

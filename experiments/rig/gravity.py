@@ -4,7 +4,7 @@ from pathlib import Path
 
 from acquisition.errors import SettingsError
 from experiments.rig.build import build_tool
-from experiments.settings.calibration_files import NOTHING, check_kind, read_calibration
+from experiments.settings.calibrations import NOTHING, check_kind, read_calibration
 from experiments.settings.load import Settings
 from experiments.settings.rig import RigSettings
 from wam.calibration.gravity_file import (

@@ -9,34 +9,34 @@ from acquisition.clock import Clock
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode, WrenchSensor
-from acquisition.ipc.layout import Board
-from acquisition.ipc.loop_client import Desk, InlinePassing
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_client import InlineAdvance, LoopClient
 from acquisition.recording.recorder import Recorder
 from experiments.rig.backend import measure_exchange
-from experiments.rig.build import LoopParts, build_attendant
+from experiments.rig.build import LoopConfig, build_loop_server
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 
 
-class InlineCrew:
+class InProcessBackend:
     """Arm, sensor, loop and recorder in this thread, on any clock."""
 
     def __init__(
         self,
-        board: Board,
+        shared: SharedLayout,
         clock: Clock,
         arm: WamArm,
         open_sensor: Callable[[], WrenchSensor],
-        parts: Callable[[WrenchSensor], LoopParts],
+        parts: Callable[[WrenchSensor], LoopConfig],
     ) -> None:
         self.arm = arm
-        self._board = board
+        self._shared = shared
         self._clock = clock
         self._open_sensor = open_sensor
         self._parts = parts
         self._sensor: WrenchSensor | None = None
-        self.recorder = Recorder(board, clock)
-        self.desk = Desk(board, clock, _not_begun)
+        self.recorder = Recorder(shared, clock)
+        self.loop_client = LoopClient(shared, clock, _not_begun)
 
     @property
     def recorder_pid(self) -> int:
@@ -68,11 +68,11 @@ class InlineCrew:
         """Let the loop run from here on, whenever the console waits."""
         if self._sensor is None:
             raise RuntimeError("the sensor was not opened")
-        attendant = build_attendant(self._parts(self._sensor))
-        loop = Loop(attendant, self._clock)
-        attendant.stats = loop.stats
-        self.desk.passing = InlinePassing(loop, self.recorder)
-        self.desk.beat()
+        loop_server = build_loop_server(self._parts(self._sensor))
+        loop = Loop(loop_server, self._clock)
+        loop_server.stats = loop.stats
+        self.loop_client.advance_cycles = InlineAdvance(loop, self.recorder)
+        self.loop_client.beat()
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return nothing: this thread asks for nothing."""
@@ -93,7 +93,7 @@ class InlineCrew:
         if self._sensor is not None:
             self._sensor.close()
             self._sensor = None
-        self._board.close()
+        self._shared.close()
 
 
 def _not_begun(cycles: int) -> None:

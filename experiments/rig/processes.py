@@ -12,8 +12,8 @@ from acquisition.control_loop.realtime import Grant, choose_cores
 from acquisition.devices import SafetyMode
 from acquisition.errors import TractionError
 from acquisition.ipc.child import Child, ProcessLostError
-from acquisition.ipc.layout import Board
-from acquisition.ipc.loop_client import Desk
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.loop_client import LoopClient
 from acquisition.recording.recorder_process import RemoteRecorder
 from experiments.rig.backend import ARM_INFO
 from wam.driver.startup import ArmInfo
@@ -22,7 +22,7 @@ _GRANTS = TypeAdapter(list[Grant])
 
 
 @dataclass(frozen=True, slots=True)
-class Jobs:
+class WorkerConfigs:
     """What the processes are told at their start.
 
     Attributes:
@@ -37,15 +37,15 @@ class Jobs:
     fake: dict[str, Any] | None
 
 
-class ProcessCrew:
+class MultiProcessBackend:
     """A process for the loop, one for the recorder, one for a serial sensor.
 
     The simulated devices have a process of their own too. All die with the console;
     the one with the arm brakes it first.
     """
 
-    def __init__(self, jobs: Jobs, board: Board, clock: Clock) -> None:
-        self._board = board
+    def __init__(self, jobs: WorkerConfigs, shared: SharedLayout, clock: Clock) -> None:
+        self._shared = shared
         self._clock = clock
         self._children: dict[str, Child] = {}
         self._told: set[str] = set()
@@ -75,8 +75,8 @@ class ProcessCrew:
             self._reader = self._spawn(
                 "sensor reader", "experiments.rig.workers:reader", jobs.reader
             )
-        self.recorder = RemoteRecorder(recorder, board)
-        self.desk = Desk(board, clock, self._pass)
+        self.recorder = RemoteRecorder(recorder, shared)
+        self.loop_client = LoopClient(shared, clock, self._pass)
 
     @property
     def recorder_pid(self) -> int:
@@ -108,7 +108,7 @@ class ProcessCrew:
 
     def begin(self) -> None:
         """Let the loop run from here on."""
-        self.desk.beat()
+        self.loop_client.beat()
         self._control.ask("begin")
 
     def grants(self) -> dict[str, list[Grant]]:
@@ -117,7 +117,7 @@ class ProcessCrew:
         return {
             child.name: _GRANTS.validate_python(child.ask("grants"))
             for child in asked
-            if not (child is self._control and self.desk.loop.is_running)
+            if not (child is self._control and self.loop_client.loop.is_running)
         }
 
     @property
@@ -127,8 +127,8 @@ class ProcessCrew:
 
     def end_loop(self) -> None:
         """Let the loop end; the process with the arm answers again."""
-        self.desk.leave()
-        while self.desk.loop.is_running and self._control.is_alive:
+        self.loop_client.leave()
+        while self.loop_client.loop.is_running and self._control.is_alive:
             self._clock.sleep_until(self._clock.now_ns() + PERIOD_NS)
 
     def processes(self) -> dict[str, int]:
@@ -139,14 +139,14 @@ class ProcessCrew:
         """Brake the arm; when its process has died, a new one does it."""
         if not self._control.is_alive:
             return self._rescue()
-        if self.desk.loop.is_running:
-            return self.desk.idle()
+        if self.loop_client.loop.is_running:
+            return self.loop_client.idle()
         return bool(self._control.ask("idle"))
 
     def safety_mode(self) -> SafetyMode:
         """Return what the safety module said last."""
-        if self.desk.loop.is_running or not self._control.is_alive:
-            return self.desk.status.safety
+        if self.loop_client.loop.is_running or not self._control.is_alive:
+            return self.loop_client.status.safety
         return SafetyMode(self._control.ask("mode"))
 
     def close(self) -> None:
@@ -155,18 +155,18 @@ class ProcessCrew:
             return
         try:
             self.idle()
-            if self._control.is_alive and self.desk.loop.is_running:
-                self.desk.leave()
+            if self._control.is_alive and self.loop_client.loop.is_running:
+                self.loop_client.leave()
         except TractionError:
             pass  # the safety module brakes an arm that nobody asks any more
         finally:
             for child in reversed(self._children.values()):
                 child.stop()
             self._children.clear()
-            self._board.close()
+            self._shared.close()
 
     def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
-        child = Child(name, target, settings, self._board)
+        child = Child(name, target, settings, self._shared)
         self._children[name] = child
         return child
 

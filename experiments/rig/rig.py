@@ -11,17 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from acquisition.clock import Clock, SystemClock
-from acquisition.ipc.layout import Board
+from acquisition.ipc.layout import SharedLayout
 from experiments.arguments import FRICTION
-from experiments.rig.backend import Crew
+from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
     build_tool,
     terrain_frame,
 )
-from experiments.rig.fake import World, stepped
+from experiments.rig.fake import SimulatedRig, stepped
 from experiments.rig.gravity import build_law_model, read_gravity
-from experiments.rig.processes import Jobs, ProcessCrew
-from experiments.rig.simulation import Rehearsing, RemoteRehearsal
+from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
+from experiments.rig.simulation import RemoteSimulation, SimulationControl
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -73,8 +73,8 @@ class Rig:
     """
 
     clock: Clock
-    crew: Crew
-    board: Board
+    backend: RigBackend
+    shared: SharedLayout
     model: ArmModel
     payload: Payload
     tared: Payload
@@ -82,14 +82,14 @@ class Rig:
     row: TerrainRow
     settings: Settings
     gravity_text: str
-    rehearsal: Rehearsing | None
+    simulation: SimulationControl | None
     is_stepped: bool
     free_bytes: Callable[[Path], int] = free_bytes
 
     @property
     def is_simulated(self) -> bool:
         """Whether the devices are simulated."""
-        return self.rehearsal is not None
+        return self.simulation is not None
 
 
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
@@ -100,9 +100,9 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         LinkError: a process cannot open its bus or port.
     """
     # A simulated world does not know what was calibrated.
-    world: World | None = None
+    world: SimulatedRig | None = None
     if fake is not None:
-        world = World(settings.rig, row, fake.seed, fake.friction, fake.pace)
+        world = SimulatedRig(settings.rig, row, fake.seed, fake.friction, fake.pace)
     settings = with_calibrations(settings, is_simulated=world is not None)
     row = settings.row(row.name)
     tool = build_tool(settings.rig, row.foot)
@@ -111,23 +111,25 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     law_model = build_law_model(
         settings.rig, gravity_text, row.foot, is_simulated=world is not None
     )
-    board = Board.create()
-    rehearsal: Rehearsing | None = None
+    shared = SharedLayout.create()
+    simulation: SimulationControl | None = None
     is_stepped = fake is not None and fake.is_fast
     if world is not None and is_stepped:
         models = model, law_model
-        clock, crew, rehearsal = stepped(world, settings, row, models, board)
+        clock, backend, simulation = stepped(world, settings, row, models, shared)
     else:
         facts = world.facts() if world is not None else None
         clock = SystemClock()
-        crew = ProcessCrew(_jobs(settings, row, gravity_text, facts), board, clock)
-        if crew.fake is not None:
-            rehearsal = RemoteRehearsal(crew.fake)
+        backend = MultiProcessBackend(
+            _jobs(settings, row, gravity_text, facts), shared, clock
+        )
+        if backend.fake is not None:
+            simulation = RemoteSimulation(backend.fake)
     payload = payload_of(tool)
     return Rig(
         clock=clock,
-        crew=crew,
-        board=board,
+        backend=backend,
+        shared=shared,
         model=model,
         payload=payload,
         tared=payload,
@@ -135,7 +137,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         row=row,
         settings=settings,
         gravity_text=gravity_text,
-        rehearsal=rehearsal,
+        simulation=simulation,
         is_stepped=is_stepped,
     )
 
@@ -145,7 +147,7 @@ def _jobs(
     row: TerrainRow,
     gravity_text: str,
     world: dict[str, Any] | None,
-) -> Jobs:
+) -> WorkerConfigs:
     """Return what the processes are told; `world` is of the simulated rig."""
     rig = settings.rig
     common: dict[str, Any] = {
@@ -161,4 +163,4 @@ def _jobs(
     }
     sensor = rig.ft_sensor
     reader = None if sensor.is_on_bus else {**common, "port": sensor.port}
-    return Jobs(control, reader, world)
+    return WorkerConfigs(control, reader, world)

@@ -10,7 +10,7 @@ from acquisition.sample import Record
 from acquisition.schema import TRUTH
 
 
-class Rehearsing(Protocol):
+class SimulationControl(Protocol):
     """What only a simulated rig can be asked; see fakes.world.rig.Rehearsal."""
 
     @property
@@ -54,7 +54,7 @@ class Rehearsing(Protocol):
         """Let a device fail."""
         ...
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
         ...
 
@@ -67,8 +67,8 @@ class Rehearsing(Protocol):
         ...
 
 
-class RemoteRehearsal:
-    """The handle of a simulation in another process; implements `Rehearsing`."""
+class RemoteSimulation:
+    """The handle of a simulation in another process; implements `SimulationControl`."""
 
     def __init__(self, child: Child) -> None:
         self._child = child
@@ -110,9 +110,9 @@ class RemoteRehearsal:
         """Let a device fail."""
         self._child.ask("inject", fault)
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
-        self._child.ask("mend")
+        self._child.ask("clear_faults")
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""

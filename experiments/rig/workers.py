@@ -12,19 +12,19 @@ import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import Wish, request
+from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.devices import WrenchSensor
 from acquisition.errors import TractionError
-from acquisition.ipc.child import Station, name_process
-from acquisition.ipc.layout import Role
-from acquisition.ipc.loop_server import Attendant
+from acquisition.ipc.child import ChildContext, name_process
+from acquisition.ipc.layout import ProcessRole
+from acquisition.ipc.loop_server import LoopServer
 from acquisition.ipc.rpc import ChannelClosedError
 from acquisition.ipc.shared_sensor import SharedSensor, publish
 from experiments.rig.backend import ARM_INFO, measure_exchange
 from experiments.rig.build import (
-    LoopParts,
+    LoopConfig,
     build_arm,
-    build_attendant,
+    build_loop_server,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -33,7 +33,7 @@ from experiments.rig.gravity import build_law_model
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import open_port
-from ft_sensor.serial_line.reconnect import SensorKeeper, stream_facts
+from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_facts
 from ft_sensor.serial_line.sensor import SerialSensor
 from wam.bus.link import CanLink, open_bus
 from wam.driver.arm import WamArm
@@ -45,16 +45,16 @@ READER_PRIORITY = 60
 READ_NS = 20_000_000  # the reader shows being alive this often
 
 
-def control(station: Station) -> None:
+def control(station: ChildContext) -> None:
     """Drive the arm: answer the console, then run the loop until it says so."""
     name_process("traction-control")
-    ControlStation(station).serve()
+    ControlWorker(station).serve()
 
 
-class ControlStation:
+class ControlWorker:
     """The process that has the arm; one thread."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: ChildContext) -> None:
         settings = station.settings
         self._station = station
         self._rig = RigSettings.model_validate(settings["rig"])
@@ -73,11 +73,11 @@ class ControlStation:
         self._constants = constants
         self._arm: WamArm | None = None
         self._link: CanLink | None = None
-        self._sensor: WrenchSensor = SharedSensor(station.board.wrenches)
-        self._attendant: Attendant | None = None
+        self._sensor: WrenchSensor = SharedSensor(station.shared.wrenches)
+        self._loop_server: LoopServer | None = None
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
-        wish = Wish(CONTROL_PRIORITY, settings.get("core"), is_locked=True)
+        wish = RealtimeRequest(CONTROL_PRIORITY, settings.get("core"), is_locked=True)
         self._grants = request(wish)
 
     def serve(self) -> None:
@@ -97,9 +97,9 @@ class ControlStation:
         try:
             while not self._is_orphaned:
                 self._station.channel.answer(handlers)
-                if self._attendant is not None:
-                    self._run(self._attendant)
-                    self._attendant = None
+                if self._loop_server is not None:
+                    self._run(self._loop_server)
+                    self._loop_server = None
         except ChannelClosedError:
             pass
         finally:
@@ -120,37 +120,37 @@ class ControlStation:
             link = self._link = CanLink(
                 open_bus(can["interface"], can["channel"], can["bitrate"])
             )
-            board = self._station.board
-            self._arm = build_arm(self._rig, self._constants, link, board, self._clock)
+            shared = self._station.shared
+            self._arm = build_arm(self._rig, self._constants, link, shared, self._clock)
         return self._arm
 
     def _prepare(self, arm: WamArm) -> None:
-        parts = LoopParts(
+        parts = LoopConfig(
             rig=self._rig,
             row=self._row,
             model=self._model,
             law_model=self._law_model,
             arm=arm,
             sensor=self._sensor,
-            board=self._station.board,
+            shared=self._station.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
             ring=self._ring_bell,
         )
-        self._attendant = build_attendant(parts)
+        self._loop_server = build_loop_server(parts)
 
-    def _run(self, attendant: Attendant) -> None:
+    def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, the arm is braked."""
-        self._station.board.memory.touch()
-        loop = Loop(attendant, self._clock)
-        attendant.stats = loop.stats
+        self._station.shared.memory.touch()
+        loop = Loop(loop_server, self._clock)
+        loop_server.stats = loop.stats
         try:
-            while not attendant.is_over:
-                attendant.is_orphaned = self._is_orphaned
+            while not loop_server.is_over:
+                loop_server.is_orphaned = self._is_orphaned
                 loop.step()
         finally:
             self._opened().idle()
-            attendant.leave()
+            loop_server.leave()
 
     def _ring_bell(self) -> None:
         """Ring the bell of the console's terminal, if it has one."""
@@ -166,21 +166,23 @@ class ControlStation:
         self._is_orphaned = True
 
 
-def reader(station: Station) -> None:
+def reader(station: ChildContext) -> None:
     """Read a serial wrist sensor and put every sample onto the board."""
     name_process("traction-reader")
-    ReaderStation(station).serve()
+    SensorWorker(station).serve()
 
 
-class ReaderStation:
+class SensorWorker:
     """The process that has the sensor's port."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: ChildContext) -> None:
         self._station = station
         self._clock = SystemClock()
-        self._keeper = SensorKeeper(self._connect, self._clock)
+        self._reconnecting = ReconnectingSensor(self._connect, self._clock)
         self._is_open = False
-        self._grants = request(Wish(READER_PRIORITY, station.settings.get("core")))
+        self._grants = request(
+            RealtimeRequest(READER_PRIORITY, station.settings.get("core"))
+        )
 
     def serve(self) -> None:
         """Answer the console and read what comes until it hangs up."""
@@ -197,10 +199,10 @@ class ReaderStation:
                 else:
                     self._read()
         except ChannelClosedError:
-            self._keeper.close()
+            self._reconnecting.close()
 
     def _open(self) -> dict[str, str]:
-        facts = self._keeper.open()
+        facts = self._reconnecting.open()
         self._is_open = True
         return facts
 
@@ -213,17 +215,17 @@ class ReaderStation:
 
     def _stream(self) -> dict[str, str]:
         """Return what became of the stream, as text."""
-        return stream_facts(self._keeper)
+        return stream_facts(self._reconnecting)
 
     def _read(self) -> None:
         """Publish what arrives within 20 ms; what is lost is looked for."""
-        clock, board = self._clock, self._station.board
+        clock, shared = self._clock, self._station.shared
         deadline_ns = clock.now_ns() + READ_NS
-        if self._keeper.sensor is None:
+        if self._reconnecting.sensor is None:
             clock.sleep_until(deadline_ns)
         else:
             # A port that has gone is readable, and says so when it is read.
             with contextlib.suppress(TractionError):
-                clock.wait(self._keeper.sensor, deadline_ns)
-        publish(self._keeper.poll(clock.now_ns()), board.wrenches)
-        board.beats.beat(Role.READER, clock.now_ns())
+                clock.wait(self._reconnecting.sensor, deadline_ns)
+        publish(self._reconnecting.poll(clock.now_ns()), shared.wrenches)
+        shared.heartbeats.beat(ProcessRole.READER, clock.now_ns())

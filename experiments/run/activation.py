@@ -5,43 +5,43 @@ from acquisition.devices import SafetyMode
 from acquisition.sample import MOTOR_FRESH_SHIFT
 from experiments.messages import preflight_error, pucks_have
 from experiments.operator.prompts import Prompt
-from experiments.run.console_loop import Stage
+from experiments.run.console_loop import ConsoleLoop
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques
 
 
-def activate(stage: Stage) -> None:
+def activate(console_loop: ConsoleLoop) -> None:
     """Get torques ready, then wait for the pendant and for [space].
 
     Raises:
         PreflightError: no torques can be made ready, or the arm was not activated
             within two minutes.
-        StopAskedError, FaultedError: as `Stage.tick`.
+        StopAskedError, FaultedError: as `ConsoleLoop.tick`.
     """
-    control, clock = stage.control, stage.rig.clock
+    control, clock = console_loop.control, console_loop.rig.clock
     control.request(ArmState.HOLD)
     control.advance(_READY_SECONDS)
-    _require_torques(stage)
-    stage.company.console.say(
+    _require_torques(console_loop)
+    console_loop.company.console.say(
         "Press Shift-activate on the pendant, support the arm, then [space]."
     )
     is_ready = False
     start_ns = clock.now_ns()
     while True:
-        is_ready = stage.tick(Prompt.SUPPORT) == " " or is_ready
+        is_ready = console_loop.tick(Prompt.SUPPORT) == " " or is_ready
         if is_ready and control.status.safety is SafetyMode.ACTIVE:
             return
         if (clock.now_ns() - start_ns) * 1e-9 > PATIENCE:
             raise preflight_error("not-active", seconds=PATIENCE)
 
 
-def _require_torques(stage: Stage) -> None:
+def _require_torques(console_loop: ConsoleLoop) -> None:
     """Refuse to ask for the pendant while the arm would be active and fall.
 
     Hold begins with a complete reading; without one no torque would be there.
     """
-    control = stage.control
+    control = console_loop.control
     loop = control.loop
     if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
         return  # ready, or the next tick tells why not

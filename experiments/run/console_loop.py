@@ -5,13 +5,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acquisition.control_loop.guard import Verdict
+from acquisition.control_loop.guard import GuardVerdict
 from acquisition.control_loop.states import ArmState
-from acquisition.ipc.loop_client import Desk
-from experiments.fault_injection.plan import Moment
-from experiments.operator.prompts import Asked, Prompt
+from acquisition.ipc.loop_client import LoopClient
+from experiments.fault_injection.plan import FaultTrigger
+from experiments.operator.prompts import Prompt, PromptState
 from experiments.rig.rig import Rig
-from experiments.run.participants import Company, FaultedError, StopAskedError
+from experiments.run.participants import ArmFaultError, Company, StopRequestedError
 from experiments.trial.header import TrialName
 
 TICK = 0.02  # the console looks this often [s]
@@ -23,7 +23,7 @@ _T = TypeVar("_T")
 
 
 @dataclass(slots=True)
-class Stage:
+class ConsoleLoop:
     """Rig, loop and company of a session, and the passing of time between them."""
 
     rig: Rig
@@ -36,9 +36,9 @@ class Stage:
     _known: str = ""  # reason of a fault that was told and goes on
 
     @property
-    def control(self) -> Desk:
+    def control(self) -> LoopClient:
         """The console's side of the loop."""
-        return self.rig.crew.desk
+        return self.rig.backend.loop_client
 
     def tick(
         self,
@@ -57,10 +57,10 @@ class Stage:
         """
         asked = self._pass(prompt, name, is_complete=is_complete)
         if self.company.stop.count and prompt is not Prompt.REVIEW:
-            raise StopAskedError
+            raise StopRequestedError
         key = self.company.keys.answer(asked)
         if key == "q" and prompt not in _OWN_QUIT:
-            raise StopAskedError
+            raise StopRequestedError
         return key
 
     def line(self, name: TrialName) -> str | None:
@@ -76,7 +76,7 @@ class Stage:
 
     def _pass(
         self, prompt: Prompt, name: TrialName | None, *, is_complete: bool = False
-    ) -> Asked:
+    ) -> PromptState:
         """Let 20 ms pass and return what is asked for, which the hand follows."""
         self.control.advance(TICK)
         self._show()
@@ -89,7 +89,7 @@ class Stage:
             self._asked = (prompt, number, attempt)
             self._asked_at = now
         since = (now - self._asked_at) * 1e-9
-        asked = Asked(prompt, number, attempt, is_complete, since)
+        asked = PromptState(prompt, number, attempt, is_complete, since)
         if self.company.hand is not None:
             self.company.hand.follow(asked)
         return asked
@@ -101,7 +101,7 @@ class Stage:
             self._known = ""
         if verdict is not None and verdict.reason != self._known:
             self._known = verdict.reason
-            raise FaultedError(verdict)
+            raise ArmFaultError(verdict)
 
     def look(self, view: Callable[[int], list[str]] | None) -> None:
         """Show what `view(width)` returns eight times a second, None for nothing."""
@@ -117,12 +117,12 @@ class Stage:
             self._shown_ns = now_ns
             console.panel(self.view(console.width))
 
-    def raise_faults(self, moment: Moment, number: int, seconds: float) -> None:
+    def raise_faults(self, moment: FaultTrigger, number: int, seconds: float) -> None:
         """Raise rehearsed faults whose moment in trial `number` has come."""
         if self.company.faults is not None:
             self.company.faults.raise_due(moment, number, seconds)
 
-    def worst(self, verdict: Verdict) -> Verdict:
+    def worst(self, verdict: GuardVerdict) -> GuardVerdict:
         """Return `verdict`, or what the guard has said since then if that is worse.
 
         A fault that goes on may have taken the arm away while a trial was put away.
@@ -132,10 +132,10 @@ class Stage:
         is_worse = newest is not None and newest.severity > verdict.severity
         return newest if newest is not None and is_worse else verdict
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """Let a rehearsed fault go, and the guard's verdict with it."""
-        if self.rig.rehearsal is not None:
-            self.rig.rehearsal.mend()
+        if self.rig.simulation is not None:
+            self.rig.simulation.clear_faults()
         self.control.request(ArmState.HOLD)
         self.control.advance(0.1)
 
@@ -168,10 +168,10 @@ class Stage:
         Raises:
             StopAskedError: always; the way out is the one of Ctrl-C.
         """
-        raise StopAskedError
+        raise StopRequestedError
 
     def make_safe(self) -> bool:
         """Idle the arm and let go of an open file; return whether it is confirmed."""
-        crew = self.rig.crew
-        crew.recorder.abandon()
-        return crew.idle()
+        backend = self.rig.backend
+        backend.recorder.abandon()
+        return backend.idle()

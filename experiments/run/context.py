@@ -3,17 +3,17 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from acquisition.control_loop.guard import Verdict
+from acquisition.control_loop.guard import GuardVerdict
 from acquisition.errors import TractionError
-from acquisition.ipc.loop_client import Desk
-from experiments.messages import Circumstances, fault_text
-from experiments.operator.cues import Cues
+from acquisition.ipc.loop_client import LoopClient
+from experiments.messages import FaultContext, fault_text
+from experiments.operator.feedback import OperatorFeedback
 from experiments.rig.rig import Rig
-from experiments.run.console_loop import Stage
-from experiments.run.participants import FaultedError
-from experiments.session.journal import Book
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.participants import ArmFaultError
+from experiments.session.journal import Journal
 from experiments.session.states import Event
-from experiments.trial.files import Archive
+from experiments.trial.files import TrialArchive
 from experiments.trial.header import SessionFacts, TrialName
 
 # Verdicts of the guard after which no trial can follow.
@@ -21,7 +21,7 @@ _ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 
 
 @dataclass(slots=True)
-class Sitting:
+class RunContext:
     """What the parts of the flow share.
 
     Attributes:
@@ -38,14 +38,14 @@ class Sitting:
         estimate: how long it looked like taking after the first kept trial [s].
     """
 
-    stage: Stage
+    console_loop: ConsoleLoop
     facts: SessionFacts
-    book: Book
-    archive: Archive
-    cues: Cues
+    journal: Journal
+    archive: TrialArchive
+    feedback: OperatorFeedback
     begun_ns: int
     kept_before: int
-    place: Circumstances
+    place: FaultContext
     page: tuple[str, ...] = ()
     is_last: bool = False
     estimate: float | None = None
@@ -53,12 +53,12 @@ class Sitting:
     @property
     def rig(self) -> Rig:
         """The rig it runs on."""
-        return self.stage.rig
+        return self.console_loop.rig
 
     @property
-    def control(self) -> Desk:
+    def control(self) -> LoopClient:
         """The console's side of the loop."""
-        return self.stage.control
+        return self.console_loop.control
 
     @property
     def elapsed(self) -> float:
@@ -68,13 +68,13 @@ class Sitting:
     @property
     def time_left(self) -> float | None:
         """How long the missing trials will take at this pace [s]; None = who knows."""
-        kept = len(self.book.state.kept) - self.kept_before
-        missing = self.book.state.wanted - len(self.book.state.kept)
+        kept = len(self.journal.state.kept) - self.kept_before
+        missing = self.journal.state.wanted - len(self.journal.state.kept)
         return self.elapsed / kept * missing if kept > 0 else None
 
     def say(self, text: str) -> None:
         """Say one line."""
-        self.stage.company.console.say(text)
+        self.console_loop.company.console.say(text)
 
     def say_page(self, lines: Iterable[str]) -> None:
         """Say lines that can be looked at again."""
@@ -84,32 +84,32 @@ class Sitting:
 
     def tell(self, error: TractionError) -> None:
         """Say what went wrong, and what is safe."""
-        self.stage.company.console.problem(f"{error} {self.book.saved()}")
+        self.console_loop.company.console.problem(f"{error} {self.journal.saved()}")
 
-    def tell_fault(self, verdict: Verdict) -> None:
+    def tell_fault(self, verdict: GuardVerdict) -> None:
         """Say why the guard stopped the arm, and what is safe."""
-        self.stage.company.console.problem(self.fault_text(verdict))
+        self.console_loop.company.console.problem(self.fault_text(verdict))
 
-    def fault_text(self, verdict: Verdict) -> str:
+    def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""
         found = replace(self.place, is_bus_down=self.control.loop.is_bus_down)
-        return fault_text(verdict, found, self.book.saved())
+        return fault_text(verdict, found, self.journal.saved())
 
-    def mend(self, fault: FaultedError) -> None:
+    def clear_faults(self, fault: ArmFaultError) -> None:
         """Say why the guard stopped the arm, which holds, and go on.
 
         Raises:
             FaultedError: no trial can follow: the arm has gone.
         """
-        verdict = self.stage.worst(fault.verdict)
+        verdict = self.console_loop.worst(fault.verdict)
         if verdict.reason in _ENDING:
-            raise FaultedError(verdict) from fault
+            raise ArmFaultError(verdict) from fault
         self.tell_fault(verdict)
-        self.stage.mend()
+        self.console_loop.clear_faults()
 
     def judge(self, event: Event, name: TrialName, why: str) -> None:
         """Write a verdict into the journal; the files of the trial follow it."""
-        self.book.note(
+        self.journal.note(
             event,
             trial=name.number,
             attempt=name.attempt,

@@ -6,26 +6,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from acquisition.clock import NS_PER_S, Clock, SystemClock
-from acquisition.control_loop.guard import Verdict
+from acquisition.control_loop.guard import GuardVerdict
 from experiments.fault_injection.plan import Faults
 from experiments.operator.console import Console
-from experiments.operator.prompts import Keys, RehearsedHand
+from experiments.operator.prompts import OperatorInput, SimulatedHand
 
 TWICE_NS = 3 * NS_PER_S  # two requests closer than this mean: now
 
 
-class StopAskedError(Exception):
+class StopRequestedError(Exception):
     """The person asked to stop: Ctrl-C, SIGTERM, or [q]uit."""
 
 
-class FaultedError(Exception):
+class ArmFaultError(Exception):
     """The guard stopped the arm.
 
     Attributes:
         verdict: its decision.
     """
 
-    def __init__(self, verdict: Verdict) -> None:
+    def __init__(self, verdict: GuardVerdict) -> None:
         super().__init__(verdict.reason)
         self.verdict = verdict
 
@@ -69,8 +69,8 @@ def signals_ask(stop: StopFlag) -> Generator[None]:
 class Company:
     """Who takes part beside the rig: keys, simulated hand, console, stop, faults."""
 
-    keys: Keys
+    keys: OperatorInput
     console: Console
     stop: StopFlag
-    hand: RehearsedHand | None = None
+    hand: SimulatedHand | None = None
     faults: Faults | None = None

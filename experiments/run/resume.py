@@ -14,12 +14,12 @@ from experiments.messages import CATALOGUE
 from experiments.operator.console import Console
 from experiments.operator.select import choose_keys
 from experiments.rig.rig import FakeOptions
-from experiments.run.session import Opening, Request, conduct
-from experiments.session.crash_recovery import settle
-from experiments.session.journal import Book, open_book
+from experiments.run.session import OpenMode, SessionRequest, run_session
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import Journal, open_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import refusal
-from experiments.session.states import Event, Phase
+from experiments.session.states import Event, SessionPhase
 from experiments.session.store import SessionFolder
 from experiments.settings.load import load_settings
 
@@ -28,7 +28,7 @@ _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
 
 @dataclass(frozen=True, slots=True)
-class Reopening:
+class ResumeRequest:
     """What the command line says about a session to be opened once more.
 
     Attributes:
@@ -56,7 +56,7 @@ class Reopening:
     faults: tuple[str, ...] = ()
 
 
-def resume(folder: SessionFolder, how: Reopening) -> int:
+def resume(folder: SessionFolder, how: ResumeRequest) -> int:
     """Continue a session that is not finished; return the exit code.
 
     Raises:
@@ -64,15 +64,15 @@ def resume(folder: SessionFolder, how: Reopening) -> int:
     """
     _check_kind(folder, how)
     with session_lock(folder):
-        book = _settled(folder, how.console)
-        if book.state.phase is Phase.CRASHED and book.state.is_complete:
-            book.note(Event.ENDED, reason="complete")
+        journal = _settled(folder, how.console)
+        if journal.state.phase is SessionPhase.CRASHED and journal.state.is_complete:
+            journal.note(Event.ENDED, reason="complete")
             how.console.say(CATALOGUE["complete"].text({"session": folder.id}))
             return 0
-        return _reopen(book, how, Event.RESUMED, {})
+        return _reopen(journal, how, Event.RESUMED, {})
 
 
-def redo(folder: SessionFolder, number: int, reason: str, how: Reopening) -> int:
+def redo(folder: SessionFolder, number: int, reason: str, how: ResumeRequest) -> int:
     """Record trial `number` once more; return the exit code.
 
     Raises:
@@ -80,8 +80,8 @@ def redo(folder: SessionFolder, number: int, reason: str, how: Reopening) -> int
     """
     _check_kind(folder, how)
     with session_lock(folder):
-        book = _settled(folder, how.console)
-        return _reopen(book, how, Event.REDO, {"trial": number, "reason": reason})
+        journal = _settled(folder, how.console)
+        return _reopen(journal, how, Event.REDO, {"trial": number, "reason": reason})
 
 
 def close(folder: SessionFolder, reason: str, console: Console) -> None:
@@ -91,24 +91,24 @@ def close(folder: SessionFolder, reason: str, console: Console) -> None:
         SessionError: it is open elsewhere.
     """
     with session_lock(folder):
-        book = _settled(folder, console)
-        if book.state.is_complete:
-            book.note(Event.ENDED, reason="complete")
+        journal = _settled(folder, console)
+        if journal.state.is_complete:
+            journal.note(Event.ENDED, reason="complete")
         else:
-            book.note(Event.GIVEN_UP, reason=reason)
-    console.say(f"{folder.id} is closed with {len(book.state.kept)} kept trials.")
+            journal.note(Event.GIVEN_UP, reason=reason)
+    console.say(f"{folder.id} is closed with {len(journal.state.kept)} kept trials.")
 
 
-def _settled(folder: SessionFolder, console: Console) -> Book:
-    book = open_book(folder, SystemClock())
-    said = settle(book)
+def _settled(folder: SessionFolder, console: Console) -> Journal:
+    journal = open_journal(folder, SystemClock())
+    said = recover_session(journal)
     if said:
         facts = {"session": folder.id, "redone": f" {said}"}
         console.say(CATALOGUE["put-away"].text(facts))
-    return book
+    return journal
 
 
-def _check_kind(folder: SessionFolder, how: Reopening) -> None:
+def _check_kind(folder: SessionFolder, how: ResumeRequest) -> None:
     if folder.is_simulated:
         return
     if how.is_fake:
@@ -124,19 +124,19 @@ def _check_kind(folder: SessionFolder, how: Reopening) -> None:
 
 
 def _reopen(
-    book: Book, how: Reopening, event: Event, asked: Mapping[str, object]
+    journal: Journal, how: ResumeRequest, event: Event, asked: Mapping[str, object]
 ) -> int:
-    folder, console = book.folder, how.console
-    reason = refusal(book.state, {"event": event, **asked})
+    folder, console = journal.folder, how.console
+    reason = refusal(journal.state, {"event": event, **asked})
     if reason:
         raise SessionError(
             f"{folder.id} cannot be opened: {reason}.", hint="Nothing was started."
         )
-    before = _last_asked(book)
+    before = _last_asked(journal)
     config = how.config or _config_of(before)
     settings = load_settings(config)
     fake = _fake_of(before, how) if folder.is_simulated else None
-    request = Request(
+    request = SessionRequest(
         data=how.data,
         settings=settings,
         config=config,
@@ -148,15 +148,15 @@ def _reopen(
         faults=how.faults,
         can_log=how.can_log,
     )
-    kept = len(book.state.kept)
-    console.say(f"session {folder.id}: {kept} of {book.state.wanted} kept")
-    return conduct(request, Opening(event, asked, book, how.is_forced))
+    kept = len(journal.state.kept)
+    console.say(f"session {folder.id}: {kept} of {journal.state.wanted} kept")
+    return run_session(request, OpenMode(event, asked, journal, how.is_forced))
 
 
-def _last_asked(book: Book) -> dict[str, Any]:
+def _last_asked(journal: Journal) -> dict[str, Any]:
     """Return what was asked for when the session was opened last."""
     found: dict[str, Any] = {}
-    for event in book.folder.events():
+    for event in journal.folder.events():
         if event.get("event") in _OPENINGS:
             found = event
     return found
@@ -167,7 +167,7 @@ def _config_of(asked: Mapping[str, Any]) -> Path | None:
     return Path(config) if isinstance(config, str) and config else None
 
 
-def _fake_of(asked: Mapping[str, Any], how: Reopening) -> FakeOptions:
+def _fake_of(asked: Mapping[str, Any], how: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, on stepped time if that is asked for."""
     try:
         before = _FAKE.validate_python(asked.get("fake"))

@@ -7,26 +7,35 @@ from acquisition.clock import SystemClock
 from acquisition.errors import SessionError
 from experiments.messages import CATALOGUE
 from experiments.operator.console import WARNING, Console
-from experiments.operator.prompts import Asked, Keys, Prompt
-from experiments.operator.terminal import TerminalKeys, keyboard
-from experiments.session.unfinished import Unfinished
+from experiments.operator.prompts import OperatorInput, Prompt, PromptState
+from experiments.operator.terminal import TerminalInput, keyboard
+from experiments.session.unfinished import UnfinishedSession
 
 _PAUSE_NS = 50_000_000  # between two looks at the keyboard
 
 
-class Choice(Enum):
+class ResumeChoice(Enum):
     """What the person wants."""
 
     RESUME = "resume"
     CLOSE = "close"
 
 
-_KEYS = {"1": Choice.RESUME, "r": Choice.RESUME, "2": Choice.CLOSE, "n": Choice.CLOSE}
+_KEYS = {
+    "1": ResumeChoice.RESUME,
+    "r": ResumeChoice.RESUME,
+    "2": ResumeChoice.CLOSE,
+    "n": ResumeChoice.CLOSE,
+}
 
 
 def choose(
-    found: Sequence[Unfinished], terrain: str, data: str, keys: Keys, console: Console
-) -> Choice:
+    found: Sequence[UnfinishedSession],
+    terrain: str,
+    data: str,
+    keys: OperatorInput,
+    console: Console,
+) -> ResumeChoice:
     """Ask what becomes of the newest unfinished session.
 
     Args:
@@ -41,7 +50,7 @@ def choose(
     """
     newest = found[-1]
     text = _question(newest, terrain)
-    if not isinstance(keys, TerminalKeys):
+    if not isinstance(keys, TerminalInput):
         raise SessionError(
             " ".join([text, *(other.text() for other in found[:-1])]),
             hint=f"To go on: traction resume {newest.folder.id}{data}   To close what "
@@ -57,18 +66,18 @@ def choose(
     return _KEYS[key]
 
 
-def ask(keys: Keys, prompt: Prompt, wanted: Collection[str]) -> str:
+def ask(keys: OperatorInput, prompt: Prompt, wanted: Collection[str]) -> str:
     """Wait until one of the `wanted` keys is pressed while no loop runs; return it."""
     clock = SystemClock()
     with keyboard(keys):
         while True:
-            key = keys.answer(Asked(prompt, 0, 0, is_complete=False, since=0.0))
+            key = keys.answer(PromptState(prompt, 0, 0, is_complete=False, since=0.0))
             if key in wanted:
                 return key
             clock.sleep_until(clock.now_ns() + _PAUSE_NS)
 
 
-def _question(newest: Unfinished, terrain: str) -> str:
+def _question(newest: UnfinishedSession, terrain: str) -> str:
     """Return what was found, with the terrains where they differ."""
     if newest.folder.terrain == terrain:
         return newest.text()

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 from experiments.arguments import data_option
-from experiments.fault_injection.host_faults import Computer
+from experiments.fault_injection.host_faults import HostFaults
 from experiments.fault_injection.plan import plan_faults
 from experiments.operator.console import Console
-from experiments.operator.prompts import Keys, RehearsedHand
+from experiments.operator.prompts import OperatorInput, SimulatedHand
 from experiments.operator.terminal import keyboard
 from experiments.preflight.conditions import (
     check_conditions,
@@ -21,10 +21,10 @@ from experiments.preflight.foot_check import confirm_foot, foot_before
 from experiments.preflight.preflight import Preflight, connect_rig, run_preflight
 from experiments.rig.bus_log import logging_bus
 from experiments.rig.rig import FakeOptions, Rig
-from experiments.run.console_loop import Stage
+from experiments.run.console_loop import ConsoleLoop
 from experiments.run.participants import Company, StopFlag, signals_ask
 from experiments.run.runner import SessionRunner
-from experiments.session.journal import Book
+from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
 from experiments.session.matrix_board import next_steps
 from experiments.session.states import Event
@@ -40,7 +40,7 @@ from experiments.trial.header import SessionFacts, collect_facts
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class SessionRequest:
     """What a person asked for: where, with which rig, and who takes part.
 
     Attributes:
@@ -62,7 +62,7 @@ class Request:
     row: TerrainRow
     fake: FakeOptions | None
     operator: str
-    keys: Keys
+    keys: OperatorInput
     console: Console
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
@@ -74,7 +74,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class Opening:
+class OpenMode:
     """How a session is opened.
 
     Attributes:
@@ -86,11 +86,11 @@ class Opening:
 
     event: Event
     asked: Mapping[str, object] = field(default_factory=dict[str, object])
-    book: Book | None = None
+    journal: Journal | None = None
     is_forced: bool = False
 
 
-def conduct(request: Request, opening: Opening) -> int:
+def run_session(request: SessionRequest, opening: OpenMode) -> int:
     """Connect, check, record; return the exit code.
 
     Raises:
@@ -100,8 +100,8 @@ def conduct(request: Request, opening: Opening) -> int:
     console, stop = request.console, StopFlag()
     rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
-        computer = Computer(rig)
-        faults = plan_faults(request.faults, rig.rehearsal, computer)
+        host_faults = HostFaults(rig)
+        faults = plan_faults(request.faults, rig.simulation, host_faults)
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {request.row.name}        {kind}")
         found = _check_before(rig, opening, console)
@@ -110,38 +110,44 @@ def conduct(request: Request, opening: Opening) -> int:
         console.check(foot.mark, foot.name, foot.text)
         page = run_preflight(rig, request.data, console).after(foot)
         found += _check_sensor(page, opening, console)
-        hand = RehearsedHand(rig.rehearsal) if rig.rehearsal else None
+        hand = SimulatedHand(rig.simulation) if rig.simulation else None
         company = Company(request.keys, console, stop, hand, faults)
         with signals_ask(stop), keyboard(request.keys), ExitStack() as stack:
-            stack.callback(computer.undo)
-            book = opening.book or _new_book(request, rig, page, stack, computer)
-            computer.folder = book.folder
-            facts = _write_facts(request, rig, page, book)
-            runner = SessionRunner(Stage(rig, company), facts, book)
+            stack.callback(host_faults.undo)
+            journal = opening.journal or _new_book(
+                request, rig, page, stack, host_faults
+            )
+            host_faults.folder = journal.folder
+            facts = _write_facts(request, rig, page, journal)
+            runner = SessionRunner(ConsoleLoop(rig, company), facts, journal)
             code = runner.run(opening.event, **_asked(request, opening, found))
     for plan in faults.plans if faults is not None else ():
         console.say(f"▲ The fault {plan.text()} was planned, and its time never came.")
-    _say_next(request, book, code)
+    _say_next(request, journal, code)
     return code
 
 
-def _check_before(rig: Rig, opening: Opening, console: Console) -> list[str]:
-    if opening.book is None:
+def _check_before(rig: Rig, opening: OpenMode, console: Console) -> list[str]:
+    if opening.journal is None:
         return []
     now, is_forced = conditions_of(rig), opening.is_forced
-    return check_conditions(opening.book.folder, now, console, is_forced=is_forced)
+    return check_conditions(opening.journal.folder, now, console, is_forced=is_forced)
 
 
-def _check_sensor(page: Preflight, opening: Opening, console: Console) -> list[str]:
-    if opening.book is None:
+def _check_sensor(page: Preflight, opening: OpenMode, console: Console) -> list[str]:
+    if opening.journal is None:
         return []
     now, is_forced = sensor_conditions(page.devices), opening.is_forced
-    return check_conditions(opening.book.folder, now, console, is_forced=is_forced)
+    return check_conditions(opening.journal.folder, now, console, is_forced=is_forced)
 
 
 def _new_book(
-    request: Request, rig: Rig, page: Preflight, stack: ExitStack, computer: Computer
-) -> Book:
+    request: SessionRequest,
+    rig: Rig,
+    page: Preflight,
+    stack: ExitStack,
+    host_faults: HostFaults,
+) -> Journal:
     """Create the session's folder, take its lock, keep settings and conditions."""
     folder = create_session(
         request.data,
@@ -149,32 +155,34 @@ def _new_book(
         is_simulated=rig.is_simulated,
         utc_ns=session_utc_ns(),
     )
-    computer.occupy(folder)
+    host_faults.hold_lock(folder)
     stack.enter_context(session_lock(folder))
     request.console.say(f"session {folder.id}: {folder.path}")
     write_text(folder.path / "config.toml", rig.settings.rig_text)
     write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
     write_conditions(folder, {**conditions_of(rig), **sensor_conditions(page.devices)})
-    return Book(folder, rig.clock)
+    return Journal(folder, rig.clock)
 
 
 def _write_facts(
-    request: Request, rig: Rig, page: Preflight, book: Book
+    request: SessionRequest, rig: Rig, page: Preflight, journal: Journal
 ) -> SessionFacts:
     """Write what is known at this opening; later ones get a number of their own."""
     seed = request.fake.seed if request.fake is not None else None
-    facts = collect_facts(book.folder, request.who, seed, page.devices)
-    book.clock = rig.clock
-    number = book.state.openings + 1
+    facts = collect_facts(journal.folder, request.who, seed, page.devices)
+    journal.clock = rig.clock
+    number = journal.state.openings + 1
     suffix = f"-{number}" if number > 1 else ""
-    path = book.folder.path
+    path = journal.folder.path
     write_json(path / f"preflight{suffix}.json", page.as_dict())
     write_json(path / f"provenance{suffix}.json", facts.provenance)
     write_text(path / f"diff{suffix}.patch", facts.diff)
     return facts
 
 
-def _asked(request: Request, opening: Opening, found: list[str]) -> dict[str, object]:
+def _asked(
+    request: SessionRequest, opening: OpenMode, found: list[str]
+) -> dict[str, object]:
     """Return what the journal keeps of this opening, for whoever resumes it."""
     asked = {
         **opening.asked,
@@ -185,16 +193,16 @@ def _asked(request: Request, opening: Opening, found: list[str]) -> dict[str, ob
     return {**asked, "differences": found} if found else asked
 
 
-def _say_next(request: Request, book: Book, code: int) -> None:
+def _say_next(request: SessionRequest, journal: Journal, code: int) -> None:
     """Say what comes next: the report, and the terrain that time asks for."""
-    name, data = book.folder.id, data_option(request.data)
-    if not book.state.is_complete:
+    name, data = journal.folder.id, data_option(request.data)
+    if not journal.state.is_complete:
         request.console.say(f"To go on: traction resume {name}{data}")
-    if code or not book.state.is_complete:
+    if code or not journal.state.is_complete:
         return
     request.console.say(f"Complete. Next: traction report {name}{data}")
-    request.console.say(f"It writes {book.folder.path / 'report' / 'index.html'}")
-    is_simulated = book.folder.is_simulated
+    request.console.say(f"It writes {journal.folder.path / 'report' / 'index.html'}")
+    is_simulated = journal.folder.is_simulated
     matrix = request.settings.matrix
     for step in next_steps(request.data, matrix, is_simulated=is_simulated):
         request.console.say(step)

@@ -6,13 +6,13 @@ import numpy as np
 
 from acquisition.errors import PreflightError, TractionError
 from acquisition.ipc.layout import unpack_wrenches
-from experiments.fault_injection.plan import Moment
+from experiments.fault_injection.plan import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
 from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
-from experiments.run.context import Sitting
-from experiments.run.participants import FaultedError, StopAskedError
+from experiments.run.context import RunContext
+from experiments.run.participants import ArmFaultError, StopRequestedError
 from experiments.session.states import Event
 from experiments.trial.header import TrialName
 from ft_sensor.calibration.sensor_file import sensor_from_toml
@@ -28,43 +28,43 @@ MOST_TARES = 5  # refused in a row: something is wrong that patience cannot mend
 _CALIBRATION = "calibration:"  # before the name of a file in the settings
 
 
-def take_tare(sitting: Sitting, name: TrialName) -> None:
+def take_tare(context: RunContext, name: TrialName) -> None:
     """Wait until the foot is lifted and still, tare, and try again if it moved.
 
     Raises:
         PreflightError: five tares in a row were refused.
-        FaultedError, StopAskedError: as `Stage.tick`.
+        FaultedError, StopAskedError: as `ConsoleLoop.tick`.
     """
-    sitting.say("Lift the foot clear of everything and keep it still.")
+    context.say("Lift the foot clear of everything and keep it still.")
     for left in reversed(range(MOST_TARES)):
-        sitting.stage.raise_faults(Moment.TARE, name.number, 0.0)
+        context.console_loop.raise_faults(FaultTrigger.TARE, name.number, 0.0)
         try:
-            _accept(sitting, name, _measure(sitting, name))
+            _accept(context, name, _measure(context, name))
         except PreflightError as error:
             if not left:
                 raise
-            sitting.tell(error)
-            sitting.stage.mend()
+            context.tell(error)
+            context.console_loop.clear_faults()
         else:
             return
 
 
-def take_end_tare(sitting: Sitting) -> None:
+def take_end_tare(context: RunContext) -> None:
     """Tare once more, so that two tares bracket the drift of the session.
 
     Everything is kept already: whatever goes wrong costs the bracket only.
     """
     try:
-        take_tare(sitting, TrialName(0, 1))
-    except StopAskedError:
+        take_tare(context, TrialName(0, 1))
+    except StopRequestedError:
         detail = "left out as asked."
-    except FaultedError as fault:
-        detail = sitting.fault_text(fault.verdict)
+    except ArmFaultError as fault:
+        detail = context.fault_text(fault.verdict)
     except TractionError as error:
         detail = error.message
     else:
         return
-    sitting.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
+    context.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
 
 
 def residual_force(payload: Payload, known: Array) -> float:
@@ -93,18 +93,18 @@ def known_bias(
     return np.zeros(6) if is_simulated else None
 
 
-def _measure(sitting: Sitting, name: TrialName) -> TareResult:
+def _measure(context: RunContext, name: TrialName) -> TareResult:
     """Return the tare of one second.
 
     Raises:
         PreflightError: the force varied, or samples were lost or flagged.
     """
-    _wait_still(sitting, name)
-    stage, rig = sitting.stage, sitting.rig
-    reader = sitting.control.wrenches()
+    _wait_still(context, name)
+    console_loop, rig = context.console_loop, context.rig
+    reader = context.control.wrenches()
     for tick in range(round(TARE_SECONDS / TICK) + 1):
-        stage.tick(Prompt.LIFT, name)
-        stage.raise_faults(Moment.TARE, name.number, tick * TICK)
+        console_loop.tick(Prompt.LIFT, name)
+        console_loop.raise_faults(FaultTrigger.TARE, name.number, tick * TICK)
     limit = rig.settings.rig.limits.tare_spread
     try:
         return tare(unpack_wrenches(reader.read()), limit)
@@ -115,21 +115,21 @@ def _measure(sitting: Sitting, name: TrialName) -> TareResult:
         raise preflight_error("tare-moved", **facts) from error
 
 
-def _accept(sitting: Sitting, name: TrialName, result: TareResult) -> None:
+def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     """Use the tare from here on.
 
     Raises:
         PreflightError: it hides a force that the sensor does not have by itself.
     """
-    rig = sitting.rig
-    position = sitting.control.latest()["position"][0]
+    rig = context.rig
+    position = context.control.latest()["position"][0]
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
     _check_residual(rig, tared)
     rig.tared = tared
     bias = tared.bias.tolist()
-    sitting.control.set_bias(bias)
-    sitting.book.note(
+    context.control.set_bias(bias)
+    context.journal.note(
         Event.TARED,
         trial_number=name.number,
         bias=[round(v, 4) for v in bias],
@@ -147,12 +147,12 @@ def _check_residual(rig: Rig, tared: Payload) -> None:
         raise preflight_error("residual", residual=residual, limit=limit, **facts)
 
 
-def _wait_still(sitting: Sitting, name: TrialName) -> None:
+def _wait_still(context: RunContext, name: TrialName) -> None:
     still = 0.0
     while still < STILL_SECONDS:
-        sitting.stage.tick(Prompt.LIFT, name)
-        record = sitting.control.latest()[0]
-        height = float(sitting.rig.frame.height(record["foot_position"]))
+        context.console_loop.tick(Prompt.LIFT, name)
+        record = context.control.latest()[0]
+        height = float(context.rig.frame.height(record["foot_position"]))
         speed = float(abs(record["foot_velocity"][:3]).max())
         is_still = height > LIFTED and speed < STILL_SPEED
         still = still + TICK if is_still else 0.0

@@ -1,61 +1,61 @@
 """The verdict on a trial, which is always a person's and always deliberate."""
 
-from experiments.messages import Circumstances
+from experiments.messages import FaultContext
+from experiments.operator.double_tap import FootKeys
 from experiments.operator.prompts import REJECT_REASONS, Prompt
 from experiments.operator.screens import review_keys
-from experiments.run.context import Sitting
-from experiments.run.foot_keys import FootKeys
-from experiments.run.participants import FaultedError, StopAskedError
+from experiments.run.context import RunContext
+from experiments.run.participants import ArmFaultError, StopRequestedError
 from experiments.run.ready import take_note
 from experiments.session.states import Event
-from experiments.trial.files import ENOUGH, Outcome
+from experiments.trial.files import ENOUGH, TrialOutcome
 from experiments.trial.header import TrialName
 
 _ENDED = "session ended at the review"
 
 
-def ask_verdict(sitting: Sitting, name: TrialName, outcome: Outcome) -> None:
+def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
     """Ask until a trial is kept or rejected.
 
     Raises:
         FaultedError: the arm has gone; the trial is rejected.
         StopAskedError: the session is to end; the trial is rejected.
     """
-    sitting.say(review_keys())
-    sitting.place = Circumstances(name.kept)
-    is_whole = outcome.displacement >= ENOUGH * sitting.rig.frame.travel
-    feet = FootKeys(sitting.rig)
+    context.say(review_keys())
+    context.place = FaultContext(name.kept)
+    is_whole = outcome.displacement >= ENOUGH * context.rig.frame.travel
+    feet = FootKeys(context.rig)
     while True:
         try:
-            key = sitting.stage.tick(Prompt.REVIEW, name, is_complete=is_whole)
+            key = context.console_loop.tick(Prompt.REVIEW, name, is_complete=is_whole)
             if key == "n":
-                take_note(sitting, name, is_on_trial=True)
-                sitting.say(review_keys())
-        except FaultedError as fault:
+                take_note(context, name, is_on_trial=True)
+                context.say(review_keys())
+        except ArmFaultError as fault:
             try:
-                sitting.mend(fault)
-            except FaultedError:
+                context.clear_faults(fault)
+            except ArmFaultError:
                 # The trial is whole: only the end of the session takes it away.
-                sitting.reject(name, _ENDED)
+                context.reject(name, _ENDED)
                 raise
             continue
-        if _obey(sitting, name, key or feet.key("k")):
+        if _obey(context, name, key or feet.key("k")):
             return
 
 
-def _obey(sitting: Sitting, name: TrialName, key: str) -> bool:
+def _obey(context: RunContext, name: TrialName, key: str) -> bool:
     """Return whether `key` was a verdict.
 
     Raises:
         StopAskedError: it, or Ctrl-C, ends the session.
     """
     if key == "k":
-        sitting.judge(Event.TRIAL_KEPT, name, "")
+        context.judge(Event.TRIAL_KEPT, name, "")
         return True
     if key[:1] == "r" and key[1:] in REJECT_REASONS:
-        sitting.reject(name, REJECT_REASONS[key[1:]])
+        context.reject(name, REJECT_REASONS[key[1:]])
         return True
-    if key == "q" or sitting.stage.company.stop.count:
-        sitting.reject(name, _ENDED)
-        raise StopAskedError
+    if key == "q" or context.console_loop.company.stop.count:
+        context.reject(name, _ENDED)
+        raise StopRequestedError
     return False

@@ -8,8 +8,8 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.errors import SessionError
 from experiments.operator.console import WARNING
-from experiments.session.crash_recovery import settle
-from experiments.session.journal import Book, open_book
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import Journal, open_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import KEEP, refusal
 from experiments.session.states import Event
@@ -78,12 +78,12 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
     """
     text, who = clean_text(text), author(who)
     with session_lock(folder):
-        book = _book(folder)
+        journal = _journal(folder)
         if not trial:
-            book.note(Event.NOTED, text=text, who=who)
+            journal.note(Event.NOTED, text=text, who=who)
             return f"Noted on {folder.id}."
-        name = _find_attempt(book, trial)
-        book.note(
+        name = _find_attempt(journal, trial)
+        journal.note(
             Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
         )
         return f"Noted on {folder.id} {add_remark(folder, name, text, who)}."
@@ -100,8 +100,8 @@ def change_verdict(
     """
     reason, who = clean_text(reason), author(who)
     with session_lock(folder):
-        book = _book(folder)
-        name = _find_attempt(book, trial)
+        journal = _journal(folder)
+        name = _find_attempt(journal, trial)
         facts: dict[str, object] = {
             "trial": name.number,
             "attempt": name.attempt,
@@ -109,18 +109,18 @@ def change_verdict(
             "reason": reason,
             "who": who,
         }
-        refused = refusal(book.state, {"event": Event.VERDICT, **facts})
+        refused = refusal(journal.state, {"event": Event.VERDICT, **facts})
         if refused:
             raise SessionError(
                 f"{trial} of {folder.id} cannot get this verdict: {refused}.",
                 hint="Nothing was changed.",
             )
-        said = _check_file(book, name) if verdict == KEEP else []
-        book.note(Event.VERDICT, **facts)
+        said = _check_file(journal, name) if verdict == KEEP else []
+        journal.note(Event.VERDICT, **facts)
         place = f"trials/{name.kept}"
         if verdict != KEEP:
             place = f"rejected/{name.rejected}"
-        kept, wanted = len(book.state.kept), book.state.wanted
+        kept, wanted = len(journal.state.kept), journal.state.wanted
         return [*said, f"{place}: {verdict}. {folder.id} has {kept} of {wanted} kept."]
 
 
@@ -145,21 +145,21 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
     return path
 
 
-def _book(folder: SessionFolder) -> Book:
-    book = open_book(folder, SystemClock())
-    settle(book)
-    return book
+def _journal(folder: SessionFolder) -> Journal:
+    journal = open_journal(folder, SystemClock())
+    recover_session(journal)
+    return journal
 
 
-def _find_attempt(book: Book, trial: str) -> TrialName:
+def _find_attempt(journal: Journal, trial: str) -> TrialName:
     """Return the attempt that `trial` means: T04a itself, T04 the kept or only one.
 
     Raises:
         SessionError: there is none, or more than one.
     """
     number, attempt = parse_trial(trial)
-    last = book.state.attempt(number)
-    kept = book.state.kept_attempt(number)
+    last = journal.state.attempt(number)
+    kept = journal.state.kept_attempt(number)
     if not attempt and not kept and last > 1:
         names = [TrialName(number, i).rejected for i in range(1, last + 1)]
         raise SessionError(
@@ -168,24 +168,24 @@ def _find_attempt(book: Book, trial: str) -> TrialName:
         )
     attempt = attempt or kept or 1
     if attempt > last:
-        known = " ".join(f"T{n:02d}" for n, _ in book.state.attempts) or "none yet"
+        known = " ".join(f"T{n:02d}" for n, _ in journal.state.attempts) or "none yet"
         raise SessionError(
-            f"There is no {trial} in {book.folder.id}.", hint=f"Trials: {known}."
+            f"There is no {trial} in {journal.folder.id}.", hint=f"Trials: {known}."
         )
     return TrialName(number, attempt)
 
 
-def _check_file(book: Book, name: TrialName) -> list[str]:
+def _check_file(journal: Journal, name: TrialName) -> list[str]:
     """Return what to say of a trial that is to be kept.
 
     Raises:
         SessionError: there is no file of it, or another than was recorded.
     """
-    sidecar = find_sidecar(book.folder, name)
-    is_kept = book.state.kept_attempt(name.number) == name.attempt
-    path = book.folder.rejected / f"{name.rejected}.mcap"
+    sidecar = find_sidecar(journal.folder, name)
+    is_kept = journal.state.kept_attempt(name.number) == name.attempt
+    path = journal.folder.rejected / f"{name.rejected}.mcap"
     if is_kept:
-        path = book.folder.trials / f"{name.kept}.mcap"
+        path = journal.folder.trials / f"{name.kept}.mcap"
     if not path.is_file() or sha256_of(path) != sidecar.get("sha256"):
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",

@@ -4,19 +4,23 @@ from pathlib import Path
 
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.recover import recover, recovered_path
-from acquisition.trial_file.verify import Verified, verify
-from experiments.session.journal import Book
-from experiments.session.states import OPEN, Event, Phase
+from acquisition.trial_file.verify import VerifiedFile, verify
+from experiments.session.journal import Journal
+from experiments.session.states import OPEN, Event, SessionPhase
 from experiments.session.store import SessionFolder, move_file, read_json, write_json
-from experiments.session.trial_files import find_sidecar, last_decisions, shelve
-from experiments.trial.files import Outcome, sidecar_of
+from experiments.session.trial_files import (
+    find_sidecar,
+    last_decisions,
+    move_trial_files,
+)
+from experiments.trial.files import TrialOutcome, sidecar_of
 from experiments.trial.header import TrialName
 
 WHO = "traction"  # a verdict that nobody gave
 REASON = "the session ended without closing"
 
 
-def settle(book: Book) -> str:
+def recover_session(journal: Journal) -> str:
     """Bring a session into order whose lock is held; return what was put away.
 
     Nothing that was kept is touched. The trial that ran is recovered and rejected, so
@@ -25,19 +29,19 @@ def settle(book: Book) -> str:
     Raises:
         TrialFileError: the disk is full or gone.
     """
-    folder = book.folder
+    folder = journal.folder
     _sweep(folder)
-    if book.state.phase in OPEN:
-        book.note(Event.CRASH_FOUND)
+    if journal.state.phase in OPEN:
+        journal.note(Event.CRASH_FOUND)
     for decision in last_decisions(folder.events()):
         if find_sidecar(folder, decision.name):
-            shelve(folder, decision)
-    number = book.state.running
-    if book.state.phase is not Phase.CRASHED or number is None:
+            move_trial_files(folder, decision)
+    number = journal.state.running
+    if journal.state.phase is not SessionPhase.CRASHED or number is None:
         return ""
-    name = TrialName(number, book.state.attempt(number))
+    name = TrialName(number, journal.state.attempt(number))
     _gather(folder, name)
-    book.note(
+    journal.note(
         Event.TRIAL_REJECTED,
         trial=number,
         attempt=name.attempt,
@@ -59,7 +63,7 @@ def _gather(folder: SessionFolder, name: TrialName) -> None:
     for source, kind in ((partial, ".partial"), (_truth(partial), ".truth.partial")):
         if source.exists():
             move_file(source, folder.rejected / f"{name.rejected}{kind}")
-    write_json(sidecar, sidecar_of(name, _verified(path), Outcome("crash")))
+    write_json(sidecar, sidecar_of(name, _verified(path), TrialOutcome("crash")))
 
 
 def _recover(partial: Path, path: Path) -> None:
@@ -72,7 +76,7 @@ def _recover(partial: Path, path: Path) -> None:
     path.chmod(0o444)
 
 
-def _verified(path: Path) -> Verified | None:
+def _verified(path: Path) -> VerifiedFile | None:
     """Return what `path` holds, None where it cannot be read."""
     try:
         return verify(path)

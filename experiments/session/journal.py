@@ -7,7 +7,7 @@ from acquisition.clock import Clock
 from acquisition.errors import SessionError
 from experiments.session.reducer import SessionState, apply, refusal, replay
 from experiments.session.store import SessionFolder, iso_utc, read_json, write_json
-from experiments.session.trial_files import decision_of, shelve
+from experiments.session.trial_files import decision_of, move_trial_files
 
 
 def at_once(work: Callable[[], None]) -> None:
@@ -16,7 +16,7 @@ def at_once(work: Callable[[], None]) -> None:
 
 
 @dataclass(slots=True)
-class Book:
+class Journal:
     """Writes every event to the journal first; state and files follow from it.
 
     Attributes:
@@ -53,7 +53,7 @@ class Book:
         self.state = apply(self.state, entry)
         decision = decision_of(entry)
         if decision is not None:
-            shelve(self.folder, decision)
+            move_trial_files(self.folder, decision)
         self._write_summary(facts)
 
     def saved(self) -> str:
@@ -80,6 +80,6 @@ class Book:
         write_json(path, summary)
 
 
-def open_book(folder: SessionFolder, clock: Clock) -> Book:
+def open_journal(folder: SessionFolder, clock: Clock) -> Journal:
     """Return the book of a session that is on the disk already."""
-    return Book(folder, clock, replay(folder.events()))
+    return Journal(folder, clock, replay(folder.events()))

@@ -19,7 +19,7 @@ _PAUSE_NS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Owner:
+class LockOwner:
     """The living process that has a session open.
 
     Attributes:
@@ -54,7 +54,7 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
         os.close(descriptor)
 
 
-def owner_of(folder: SessionFolder) -> Owner | None:
+def owner_of(folder: SessionFolder) -> LockOwner | None:
     """Return the living process that has the session open, None for none."""
     path = folder.path / LOCK_FILE
     if not path.is_file():
@@ -101,7 +101,7 @@ def sign(descriptor: int) -> None:
     os.pwrite(descriptor, text, 0)
 
 
-def _signature(path: Path) -> Owner:
+def _signature(path: Path) -> LockOwner:
     facts = read_json(path)
     pid, since = facts.get("pid"), str(facts.get("since", ""))
-    return Owner(pid if type(pid) is int else 0, since[11:16])
+    return LockOwner(pid if type(pid) is int else 0, since[11:16])

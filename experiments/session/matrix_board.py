@@ -1,6 +1,8 @@
 """The matrix board: kept trials per terrain, counted from verified files only."""
 
+import math
 import os
+import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -8,7 +10,6 @@ from pathlib import Path
 from acquisition.errors import SettingsError
 from experiments.arguments import data_option
 from experiments.session.lock import owner_of
-from experiments.session.order import suggest_order
 from experiments.session.store import SessionFolder, list_sessions, read_json, sha256_of
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.matrix import MatrixSettings, TerrainRow
@@ -18,7 +19,7 @@ _Digest = Callable[[Path], str]
 
 
 @dataclass(frozen=True, slots=True)
-class BoardLine:
+class MatrixRow:
     """One terrain, live or simulated: what is kept of what is wanted.
 
     Attributes:
@@ -49,7 +50,7 @@ class BoardLine:
         return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
 
 
-class KnownDigests:
+class DigestCache:
     """Checksums, computed once as long as a file does not change."""
 
     def __init__(self) -> None:
@@ -69,7 +70,7 @@ def count_board(
     matrix: MatrixSettings,
     where: Mapping[str, str] | None = None,
     digest: _Digest = sha256_of,
-) -> list[BoardLine]:
+) -> list[MatrixRow]:
     """Return a line per terrain of the matrix, live first, simulated where there is.
 
     Args:
@@ -80,7 +81,7 @@ def count_board(
     """
     where = where or {}
     sessions = [s for s in list_sessions(data) if _matches(_of_session(s), where)]
-    lines: list[BoardLine] = []
+    lines: list[MatrixRow] = []
     for row in matrix.terrains:
         if not _matches(_of_row(row), where):
             continue
@@ -167,10 +168,10 @@ def _line(
     digest: _Digest,
     *,
     is_simulated: bool,
-) -> BoardLine:
+) -> MatrixRow:
     kept = [path.stem for s in sessions for path in s.kept_trials(digest)]
     names = [f"T{number:02d}" for number in range(1, row.trials + 1)]
-    return BoardLine(
+    return MatrixRow(
         terrain=row.name,
         is_simulated=is_simulated,
         kept=len(kept),
@@ -179,3 +180,51 @@ def _line(
         sessions=tuple(session.id for session in sessions),
         trials=tuple(kept.count(name) for name in names),
     )
+
+
+_DRAWS = 400
+_SEED = 1  # the same data give the same advice
+
+
+def suggest_order(rows: Sequence[TerrainRow], done: Sequence[str]) -> list[str]:
+    """Return the terrains still to be recorded in a good order.
+
+    A foot that wears, a sensor that drifts and a person who learns change with time.
+    If the inclines came in rising order, nobody could tell these from the incline. So
+    of many random orders that one is taken in which inclination, size of the stones
+    and tread go least with the place in the whole sequence.
+
+    Args:
+        rows: the matrix.
+        done: names of the terrains recorded so far, oldest first.
+    """
+    factors = {row.name: _factors(row) for row in rows}
+    begun = [name for name in done if name in factors]
+    rest = [row.name for row in rows if row.name not in begun]
+    dice = random.Random(_SEED)
+    orders = [dice.sample(rest, len(rest)) for _ in range(_DRAWS)]
+    return min(orders, key=lambda order: confounding([*begun, *order], factors))
+
+
+def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
+    """Return the largest |correlation| of a factor with the place in `order`."""
+    columns = zip(*(factors[name] for name in order), strict=True)
+    places = [float(place) for place in range(len(order))]
+    return max((abs(_correlation(places, list(c))) for c in columns), default=0.0)
+
+
+def _factors(row: TerrainRow) -> tuple[float, ...]:
+    """Return inclination and, as 0 or 1: big stones, a plate, a bare foot."""
+    signs = (row.stones == "big", row.stones == "none", row.foot == "bare")
+    return (row.incline_deg, *map(float, signs))
+
+
+def _correlation(x: Sequence[float], y: Sequence[float]) -> float:
+    """Return Pearson's correlation, 0 where one of them does not vary."""
+    mean_x, mean_y = math.fsum(x) / len(x), math.fsum(y) / len(y)
+    products = [(a - mean_x) * (b - mean_y) for a, b in zip(x, y, strict=True)]
+    squares_x = math.fsum((a - mean_x) ** 2 for a in x)
+    squares_y = math.fsum((b - mean_y) ** 2 for b in y)
+    if squares_x <= 0.0 or squares_y <= 0.0:
+        return 0.0
+    return math.fsum(products) / math.sqrt(squares_x * squares_y)

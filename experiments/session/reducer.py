@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, cast
 
-from experiments.session.states import TABLE, Event, Phase, Step
+from experiments.session.states import TABLE, Event, SessionPhase, Step
 
 KEEP, REJECT = "keep", "reject"
 _EVENTS = {str(event): event for event in Event}
@@ -34,7 +34,7 @@ class SessionState:
             first and in the last of them [N, N m]; empty before.
     """
 
-    phase: Phase = Phase.PLANNED
+    phase: SessionPhase = SessionPhase.PLANNED
     terrain: str = ""
     wanted: int = 0
     kept_attempts: tuple[tuple[int, int], ...] = ()
@@ -122,12 +122,12 @@ def replay(events: Iterable[_Facts]) -> SessionState:
     return state
 
 
-def _next_phase(step: Step, state: SessionState) -> Phase:
+def _next_phase(step: Step, state: SessionState) -> SessionPhase:
     """Return where the step leads; of two ways the kept trials decide."""
     if len(step.to) == 1:
         return step.to[0]
-    (other,) = (phase for phase in step.to if phase is not Phase.COMPLETE)
-    return Phase.COMPLETE if state.is_complete else other
+    (other,) = (phase for phase in step.to if phase is not SessionPhase.COMPLETE)
+    return SessionPhase.COMPLETE if state.is_complete else other
 
 
 def _whole(event: _Facts, key: str) -> int:
@@ -196,7 +196,7 @@ def _check_verdict(state: SessionState, event: _Facts) -> str:
 def _judged(state: SessionState, event: _Facts) -> str:
     """Return a refusal while a crashed trial has not been put away."""
     del event
-    if state.running is None or state.phase is not Phase.CRASHED:
+    if state.running is None or state.phase is not SessionPhase.CRASHED:
         return ""
     return f"T{state.running:02d} has no verdict yet"
 

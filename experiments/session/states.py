@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 
-class Phase(StrEnum):
+class SessionPhase(StrEnum):
     """Where a session stands."""
 
     PLANNED = "planned"
@@ -51,88 +51,104 @@ class Step:
         refused: why it cannot happen; empty where it can.
     """
 
-    to: tuple[Phase, ...] = ()
+    to: tuple[SessionPhase, ...] = ()
     refused: str = ""
 
 
 OPEN = frozenset(
-    {Phase.PREFLIGHT, Phase.READY, Phase.RECORDING, Phase.REVIEW, Phase.PAUSED}
+    {
+        SessionPhase.PREFLIGHT,
+        SessionPhase.READY,
+        SessionPhase.RECORDING,
+        SessionPhase.REVIEW,
+        SessionPhase.PAUSED,
+    }
 )
-RESUMABLE = frozenset({Phase.UNFINISHED, Phase.CRASHED})
-_AT_REST = (Phase.UNFINISHED, Phase.COMPLETE)
-_Ways = Mapping[Phase, tuple[Phase, ...]]
+RESUMABLE = frozenset({SessionPhase.UNFINISHED, SessionPhase.CRASHED})
+_AT_REST = (SessionPhase.UNFINISHED, SessionPhase.COMPLETE)
+_Ways = Mapping[SessionPhase, tuple[SessionPhase, ...]]
 
 
-def _stay(*phases: Phase) -> _Ways:
+def _stay(*phases: SessionPhase) -> _Ways:
     return {phase: (phase,) for phase in phases}
 
 
-def _lead(to: Phase, *phases: Phase) -> _Ways:
+def _lead(to: SessionPhase, *phases: SessionPhase) -> _Ways:
     return dict.fromkeys(phases, (to,))
 
 
 _WAYS: Mapping[Event, _Ways] = {
-    Event.STARTED: _lead(Phase.PREFLIGHT, Phase.PLANNED),
-    Event.RESUMED: _lead(Phase.PREFLIGHT, *RESUMABLE, Phase.CLOSED),
-    Event.REDO: _lead(Phase.PREFLIGHT, *RESUMABLE, Phase.CLOSED, Phase.COMPLETE),
-    Event.ACTIVATED: _lead(Phase.READY, Phase.PREFLIGHT),
-    Event.TARED: _stay(Phase.READY),
-    Event.PAUSED: _lead(Phase.PAUSED, Phase.READY),
-    Event.CONTINUED: _lead(Phase.READY, Phase.PAUSED),
-    Event.SET_ASIDE: _stay(Phase.READY),
-    Event.TRIAL_STARTED: _lead(Phase.RECORDING, Phase.READY),
-    Event.TRIAL_RECORDED: _lead(Phase.REVIEW, Phase.RECORDING),
-    Event.TRIAL_KEPT: _lead(Phase.READY, Phase.REVIEW),
+    Event.STARTED: _lead(SessionPhase.PREFLIGHT, SessionPhase.PLANNED),
+    Event.RESUMED: _lead(SessionPhase.PREFLIGHT, *RESUMABLE, SessionPhase.CLOSED),
+    Event.REDO: _lead(
+        SessionPhase.PREFLIGHT, *RESUMABLE, SessionPhase.CLOSED, SessionPhase.COMPLETE
+    ),
+    Event.ACTIVATED: _lead(SessionPhase.READY, SessionPhase.PREFLIGHT),
+    Event.TARED: _stay(SessionPhase.READY),
+    Event.PAUSED: _lead(SessionPhase.PAUSED, SessionPhase.READY),
+    Event.CONTINUED: _lead(SessionPhase.READY, SessionPhase.PAUSED),
+    Event.SET_ASIDE: _stay(SessionPhase.READY),
+    Event.TRIAL_STARTED: _lead(SessionPhase.RECORDING, SessionPhase.READY),
+    Event.TRIAL_RECORDED: _lead(SessionPhase.REVIEW, SessionPhase.RECORDING),
+    Event.TRIAL_KEPT: _lead(SessionPhase.READY, SessionPhase.REVIEW),
     Event.TRIAL_REJECTED: {
-        **_lead(Phase.READY, Phase.RECORDING, Phase.REVIEW),
-        **_stay(Phase.CRASHED),
+        **_lead(SessionPhase.READY, SessionPhase.RECORDING, SessionPhase.REVIEW),
+        **_stay(SessionPhase.CRASHED),
     },
     Event.VERDICT: {
-        Phase.UNFINISHED: _AT_REST,
-        Phase.COMPLETE: _AT_REST,
-        Phase.CLOSED: (Phase.CLOSED, Phase.COMPLETE),
-        Phase.CRASHED: (Phase.CRASHED,),
+        SessionPhase.UNFINISHED: _AT_REST,
+        SessionPhase.COMPLETE: _AT_REST,
+        SessionPhase.CLOSED: (SessionPhase.CLOSED, SessionPhase.COMPLETE),
+        SessionPhase.CRASHED: (SessionPhase.CRASHED,),
     },
-    Event.NOTED: _stay(*(phase for phase in Phase if phase is not Phase.PLANNED)),
+    Event.NOTED: _stay(
+        *(phase for phase in SessionPhase if phase is not SessionPhase.PLANNED)
+    ),
     Event.ENDED: {
         **dict.fromkeys(
-            (Phase.PREFLIGHT, Phase.READY, Phase.PAUSED, Phase.CRASHED), _AT_REST
+            (
+                SessionPhase.PREFLIGHT,
+                SessionPhase.READY,
+                SessionPhase.PAUSED,
+                SessionPhase.CRASHED,
+            ),
+            _AT_REST,
         ),
         # A trial that was left without a verdict is what a crash leaves.
-        **_lead(Phase.CRASHED, Phase.RECORDING, Phase.REVIEW),
+        **_lead(SessionPhase.CRASHED, SessionPhase.RECORDING, SessionPhase.REVIEW),
     },
-    Event.GIVEN_UP: _lead(Phase.CLOSED, *RESUMABLE),
-    Event.CRASH_FOUND: _lead(Phase.CRASHED, *OPEN),
+    Event.GIVEN_UP: _lead(SessionPhase.CLOSED, *RESUMABLE),
+    Event.CRASH_FOUND: _lead(SessionPhase.CRASHED, *OPEN),
 }
 
-_WHY: Mapping[Phase, str] = {
-    Phase.PLANNED: "the session has not been started",
-    Phase.PREFLIGHT: "the arm is not active yet",
-    Phase.READY: "no trial is running",
-    Phase.RECORDING: "a trial is being recorded",
-    Phase.REVIEW: "a trial waits for its verdict",
-    Phase.PAUSED: "the session is paused",
-    Phase.UNFINISHED: "the session is not open: traction resume",
-    Phase.COMPLETE: "the session is complete",
-    Phase.CLOSED: "the session was closed",
-    Phase.CRASHED: "the session ended without closing: traction resume",
+_WHY: Mapping[SessionPhase, str] = {
+    SessionPhase.PLANNED: "the session has not been started",
+    SessionPhase.PREFLIGHT: "the arm is not active yet",
+    SessionPhase.READY: "no trial is running",
+    SessionPhase.RECORDING: "a trial is being recorded",
+    SessionPhase.REVIEW: "a trial waits for its verdict",
+    SessionPhase.PAUSED: "the session is paused",
+    SessionPhase.UNFINISHED: "the session is not open: traction resume",
+    SessionPhase.COMPLETE: "the session is complete",
+    SessionPhase.CLOSED: "the session was closed",
+    SessionPhase.CRASHED: "the session ended without closing: traction resume",
 }
 _OPENING = frozenset({Event.STARTED, Event.RESUMED, Event.REDO, Event.GIVEN_UP})
 
 
-def _step(phase: Phase, event: Event) -> Step:
+def _step(phase: SessionPhase, event: Event) -> Step:
     to = _WAYS[event].get(phase, ())
     if to:
         return Step(to)
-    if event is Event.STARTED and phase is not Phase.PLANNED:
+    if event is Event.STARTED and phase is not SessionPhase.PLANNED:
         return Step(refused="the session was started before")
     if phase in OPEN and event in _OPENING | {Event.VERDICT}:
         return Step(refused="the session is open")
     return Step(refused=_WHY[phase])
 
 
-TABLE: Mapping[tuple[Phase, Event], Step] = {
-    (phase, event): _step(phase, event) for phase in Phase for event in Event
+TABLE: Mapping[tuple[SessionPhase, Event], Step] = {
+    (phase, event): _step(phase, event) for phase in SessionPhase for event in Event
 }
 
 

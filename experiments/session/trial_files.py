@@ -20,7 +20,7 @@ _Facts = Mapping[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
+class Verdict:
     """A verdict on one attempt, as the journal has it.
 
     Attributes:
@@ -38,7 +38,7 @@ class Decision:
     when: str
 
 
-def decision_of(event: _Facts) -> Decision | None:
+def decision_of(event: _Facts) -> Verdict | None:
     """Return the verdict in `event` of the journal, None where there is none."""
     kind = str(event.get("event"))
     verdict = _VERDICTS.get(kind)
@@ -48,12 +48,12 @@ def decision_of(event: _Facts) -> Decision | None:
     if verdict is None or type(number) is not int or type(attempt) is not int:
         return None
     texts = (str(event.get(key) or "") for key in ("reason", "who", "utc"))
-    return Decision(TrialName(number, attempt), verdict, *texts)
+    return Verdict(TrialName(number, attempt), verdict, *texts)
 
 
-def last_decisions(events: Iterable[_Facts]) -> list[Decision]:
+def last_decisions(events: Iterable[_Facts]) -> list[Verdict]:
     """Return the newest verdict on every attempt, in the order they were given."""
-    found: dict[TrialName, Decision] = {}
+    found: dict[TrialName, Verdict] = {}
     for event in events:
         decision = decision_of(event)
         if decision is not None:
@@ -70,7 +70,7 @@ def find_sidecar(folder: SessionFolder, name: TrialName) -> dict[str, Any]:
     return read_json(folder.rejected / f"{name.rejected}.json")
 
 
-def shelve(folder: SessionFolder, decision: Decision) -> None:
+def move_trial_files(folder: SessionFolder, decision: Verdict) -> None:
     """Let the files of an attempt follow the verdict on it.
 
     The sidecar moves last, so a call that was cut short can be repeated; a second call
@@ -120,7 +120,7 @@ def _is_of(sidecar: Path, name: TrialName) -> bool:
     return read_json(sidecar).get("attempt") == name.attempt
 
 
-def _with_verdict(sidecar: _Facts, decision: Decision) -> dict[str, object]:
+def _with_verdict(sidecar: _Facts, decision: Verdict) -> dict[str, object]:
     """Return the sidecar with the verdict, the one before it in its history."""
     given = {
         "verdict": decision.verdict,

@@ -10,13 +10,13 @@ from acquisition.trial_file.salvage import recorded_seconds
 from experiments.messages import CATALOGUE
 from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay
-from experiments.session.states import OPEN, RESUMABLE, Phase
+from experiments.session.states import OPEN, RESUMABLE, SessionPhase
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.trial.header import TrialName
 
 
 @dataclass(frozen=True, slots=True)
-class Unfinished:
+class UnfinishedSession:
     """A session that can be resumed.
 
     Attributes:
@@ -35,7 +35,7 @@ class Unfinished:
     @property
     def is_crashed(self) -> bool:
         """Whether it ended without closing."""
-        return self.state.phase in OPEN | {Phase.CRASHED}
+        return self.state.phase in OPEN | {SessionPhase.CRASHED}
 
     @property
     def running(self) -> str:
@@ -66,28 +66,28 @@ class Unfinished:
         return CATALOGUE[name].what.format_map(self.facts())
 
 
-def find_unfinished(data: Path) -> list[Unfinished]:
+def find_unfinished(data: Path) -> list[UnfinishedSession]:
     """Return the sessions below `data` that can be resumed and are not open now.
 
     Folders that cannot be read are left out: a look at old sessions stops no new one.
     """
-    found: list[Unfinished] = []
+    found: list[UnfinishedSession] = []
     with suppress(OSError):
         for folder in list_sessions(data):
             with suppress(OSError):
-                unfinished = look_at(folder)
+                unfinished = inspect_session(folder)
                 found += [unfinished] if unfinished is not None else []
     return found
 
 
-def look_at(folder: SessionFolder) -> Unfinished | None:
+def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
     """Return the session as one to be resumed, None where it is not."""
     events = folder.events()
     state = replay(events)
     if state.phase not in OPEN | RESUMABLE or owner_of(folder) is not None:
         return None
     partial = folder.trials / f"T{state.running or 0:02d}.mcap.partial"
-    return Unfinished(
+    return UnfinishedSession(
         folder, state, _seconds(partial), str(events[-1].get("utc") or "")
     )
 

@@ -15,7 +15,7 @@ Six = tuple[Number, Number, Number, Number, Number, Number]
 File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 
 
-class Section(BaseModel):
+class SettingsSection(BaseModel):
     """A table of a settings file: unknown keys and infinite numbers are mistakes."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)

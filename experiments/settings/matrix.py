@@ -4,13 +4,20 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.settings.base import File, Near, Number, Section, Vector3, Whole
+from experiments.settings.base import (
+    File,
+    Near,
+    Number,
+    SettingsSection,
+    Vector3,
+    Whole,
+)
 
 _Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
 
 
-class TerrainRow(Section):
+class TerrainRow(SettingsSection):
     """One row of the matrix.
 
     `reset`: what a person does to the terrain before every trial.
@@ -34,7 +41,7 @@ class TerrainRow(Section):
     calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
 
 
-class MatrixSettings(Section):
+class MatrixSettings(SettingsSection):
     """Everything in matrix.toml."""
 
     terrains: tuple[TerrainRow, ...] = Field(min_length=1)

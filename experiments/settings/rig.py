@@ -9,17 +9,19 @@ from experiments.settings.base import (
     Mass,
     Number,
     Positive,
-    Section,
+    SettingsSection,
     Vector3,
     Whole,
 )
 from experiments.settings.sensor import SensorSection
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
-_Limits = tuple[Positive, Positive, Positive, Positive, Positive, Positive, Positive]
+LimitsSection = tuple[
+    Positive, Positive, Positive, Positive, Positive, Positive, Positive
+]
 
 
-class CanSettings(Section):
+class CanSettings(SettingsSection):
     """The CAN interface, in python-can's words."""
 
     interface: str = Field(examples=["socketcan"])
@@ -27,7 +29,7 @@ class CanSettings(Section):
     bitrate: Whole = Field(gt=0, examples=[1000000])
 
 
-class ArmSection(Section):
+class ArmSection(SettingsSection):
     """This arm.
 
     Attributes:
@@ -40,7 +42,7 @@ class ArmSection(Section):
     )
 
 
-class FootSection(Section):
+class FootSection(SettingsSection):
     """A foot with its adapter, in frame 7."""
 
     mass: Mass = Field(examples=[0.45])
@@ -52,14 +54,14 @@ class FootSection(Section):
     calibration: File | None = Field(default=None, examples=["foot_tread.toml"])
 
 
-class Feet(Section):
+class Feet(SettingsSection):
     """The two feet of the experiment."""
 
     tread: FootSection
     bare: FootSection
 
 
-class ControlSection(Section):
+class ControlSection(SettingsSection):
     """The control law's numbers."""
 
     virtual_mass: Number = Field(ge=0, le=2, examples=[0.30])
@@ -67,7 +69,7 @@ class ControlSection(Section):
     lock_kd: Number = Field(ge=0, le=0.25, examples=[0.2])
 
 
-class GravitySection(Section):
+class GravitySection(SettingsSection):
     """Which model of gravity floats the arm.
 
     "cad": masses of the drawings; "shipped": first moments of another arm;
@@ -78,11 +80,11 @@ class GravitySection(Section):
     file: File = Field(default="gravity.toml", examples=["gravity.toml"])
 
 
-class LimitSection(Section):
+class LimitSection(SettingsSection):
     """Where the guard steps in."""
 
-    speed: _Limits = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
-    torque: _Limits = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    speed: LimitsSection = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: LimitsSection = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
     foot_speed: Positive = Field(examples=[0.8])
     joint7_mrad: Positive = Field(examples=[50.0])
     ft_stale_ms: Positive = Field(examples=[6.0])
@@ -93,7 +95,7 @@ class LimitSection(Section):
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
 
 
-class SafetySection(Section):
+class SafetySection(SettingsSection):
     """What the safety module tolerates; a warning left out is 0.9 of its fault."""
 
     speed_warning: Annotated[Number, Field(gt=0, le=2)] | None = Field(
@@ -115,7 +117,7 @@ _POWER_UP = SafetySection(
 )
 
 
-class LoopSection(Section):
+class LoopSection(SettingsSection):
     """How the loop keeps time.
 
     Attributes:
@@ -126,7 +128,7 @@ class LoopSection(Section):
     spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
 
 
-class OperatorSection(Section):
+class OperatorSection(SettingsSection):
     """How the program and the person at the arm tell each other something.
 
     Attributes:
@@ -140,7 +142,7 @@ class OperatorSection(Section):
     double_tap: bool = Field(default=False, strict=True, examples=[False])
 
 
-class RigSettings(Section):
+class RigSettings(SettingsSection):
     """Everything in rig.toml."""
 
     can: CanSettings

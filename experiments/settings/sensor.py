@@ -5,8 +5,16 @@ from typing import Literal, cast
 from pydantic import Field, model_validator
 
 from acquisition.errors import SettingsError
-from experiments.settings.base import File, Mass, Number, Positive, Section, Six, Whole
-from ft_sensor.serial_line.port_settings import Line
+from experiments.settings.base import (
+    File,
+    Mass,
+    Number,
+    Positive,
+    SettingsSection,
+    Six,
+    Whole,
+)
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.sensor import SerialDevice
 from ft_sensor.vendors import bota_device, optoforce_device, robotous_device
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
@@ -22,7 +30,7 @@ _BAUDRATES = {
 _SIMULATED_CHECK = 0.5  # s; a simulated rate is what it says
 
 
-class SensorSection(Section):
+class SensorSection(SettingsSection):
     """The wrist sensor and how it is mounted.
 
     A "barrett" is on the arm's bus, the others have a serial line. What a kind does not
@@ -81,7 +89,7 @@ def build_device(
     port, check = section.port, 2.0
     if is_simulated:
         port, check = "simulated", _SIMULATED_CHECK
-    line = Line(port, section.baudrate, check)
+    line = PortSettings(port, section.baudrate, check)
     try:
         if section.kind == "bota":
             return _bota(line, section)
@@ -96,12 +104,12 @@ def build_device(
         ) from error
 
 
-def _bota(line: Line, section: SensorSection) -> BotaDevice:
+def _bota(line: PortSettings, section: SensorSection) -> BotaDevice:
     ranges = section.ranges or bota_device.RANGES
     return BotaDevice(line, BotaSettings(section.sinc, ranges=ranges))
 
 
-def _optoforce(line: Line, section: SensorSection) -> OptoForceDevice:
+def _optoforce(line: PortSettings, section: SensorSection) -> OptoForceDevice:
     if section.sensitivity is None or section.serial_number is None:
         raise SettingsError(
             "an optoforce needs sensitivity and serial_number, e.g. sensitivity = "

@@ -16,7 +16,7 @@ from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
-from analysis.validation.bands import Band, Finding, hold_against_bands
+from analysis.validation.bands import Band, BandResult, hold_against_bands
 from analysis.validation.model_measures import model_measures
 from analysis.validation.slip_measures import GroundTrials, slip_measures
 from experiments.report.truth_errors import truth_errors
@@ -35,7 +35,7 @@ TRUTH_BANDS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class AcceptancePlan:
     """What is rehearsed.
 
     Attributes:
@@ -60,7 +60,7 @@ class Plan:
 
 
 def record_study(
-    plan: Plan, data: Path, say: Callable[[str], None] = lambda _: None
+    plan: AcceptancePlan, data: Path, say: Callable[[str], None] = lambda _: None
 ) -> None:
     """Record a session on every terrain into `data`, terrains side by side.
 
@@ -87,7 +87,7 @@ def record_study(
             say(f"{terrain} recorded")
 
 
-def analyse(plan: Plan, data: Path) -> list[Finding]:
+def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
     """Analyse the study in `data` and hold it against its bands.
 
     With fewer than ten trials only the bands on slips, samples and truth are returned.
@@ -113,7 +113,7 @@ def analyse(plan: Plan, data: Path) -> list[Finding]:
     return [f for f in found if f.band.id[0] in _OF_FEW and f.band.id != "E7"]
 
 
-def as_plain(plan: Plan, found: Sequence[Finding]) -> dict[str, object]:
+def as_plain(plan: AcceptancePlan, found: Sequence[BandResult]) -> dict[str, object]:
     """Return plan and findings as values for JSON."""
     return {
         "plan": {**asdict(plan), "config": str(plan.config or "shipped default")},
@@ -133,7 +133,7 @@ def _record(arguments: list[str], place: Path) -> int:
         ).returncode
 
 
-def _arguments(plan: Plan, terrain: str, data: Path) -> list[str]:
+def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
     config = [] if plan.config is None else ["--config", str(plan.config)]
     return [
         *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
@@ -162,7 +162,7 @@ def _single_threaded() -> Generator[None]:
                 os.environ[name] = value
 
 
-def _load(plan: Plan, data: Path) -> dict[str, list[RecordedTrial]]:
+def _load(plan: AcceptancePlan, data: Path) -> dict[str, list[RecordedTrial]]:
     trials: dict[str, list[RecordedTrial]] = {name: [] for name in plan.terrains}
     for session in list_sessions(data):
         trials[session.terrain] += [load_trial(path) for path in session.kept_trials()]
@@ -183,17 +183,17 @@ def _grounds(
     }
 
 
-def _truth(trials: dict[str, list[RecordedTrial]]) -> list[Finding]:
+def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
     errors = {
         name: [e for trial in of if (e := truth_errors(trial)) is not None]
         for name, of in trials.items()
     }
     every = [error for of in errors.values() for error in of]
     if not every:
-        return [Finding(band, ()) for band in TRUTH_BANDS]
+        return [BandResult(band, ()) for band in TRUTH_BANDS]
     values = (
         tuple(1e3 * max(e.v_t for e in of) for of in errors.values() if of),
         (float(np.mean([e.F_t for e in every])),),
         (float(np.mean([e.F_n for e in every])),),
     )
-    return [Finding(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]
+    return [BandResult(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]

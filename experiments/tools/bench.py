@@ -88,9 +88,9 @@ def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchRepor
         PreflightError: no cycle ran.
         TractionError: a process or device failed.
     """
-    desk = rig.crew.desk
+    loop_client = rig.backend.loop_client
     is_powered = _power_up(rig)
-    desk.advance(SETTLE)
+    loop_client.advance(SETTLE)
     collected = _Collector(rig, seconds)
     with tempfile.TemporaryDirectory() as folder:
         trials = _Trials(rig, Path(folder))
@@ -133,10 +133,10 @@ class _Trials:
 
     def record(self, seconds: float) -> None:
         """Let the loop run for `seconds` with the recorder on."""
-        recorder = self._rig.crew.recorder
+        recorder = self._rig.backend.recorder
         while seconds > 0.0:
             recorder.start(self._path, _header())
-            self._rig.crew.desk.advance(min(seconds, TIME_LIMIT))
+            self._rig.backend.loop_client.advance(min(seconds, TIME_LIMIT))
             seconds -= TIME_LIMIT
             self.largest_backlog = max(self.largest_backlog, recorder.largest_backlog)
             recorder.finish("bench")
@@ -150,13 +150,13 @@ class _Collector:
     """Reads the ring of timings as it fills; it holds a minute only."""
 
     def __init__(self, rig: Rig, seconds: float) -> None:
-        self._timings = rig.crew.desk.timings()
+        self._timings = rig.backend.loop_client.timings()
         self._rig = rig
         self._count = 0
         # Taken now, page by page: the console's memory is measured too.
         self._records = np.zeros(int(seconds * 510) + 2000, TIMING_DTYPE)
         self._records["number"] = 1
-        rig.crew.desk.on_pass.append(self._look)
+        rig.backend.loop_client.on_tick.append(self._look)
 
     def _look(self) -> None:
         new = self._timings.read()
@@ -166,20 +166,20 @@ class _Collector:
 
     def take(self) -> Record:
         """Return every record since the start."""
-        self._rig.crew.desk.on_pass.remove(self._look)
+        self._rig.backend.loop_client.on_tick.remove(self._look)
         return self._records[: self._count]
 
 
 def _power_up(rig: Rig) -> bool:
-    if rig.rehearsal is None:
+    if rig.simulation is None:
         return False
-    desk = rig.crew.desk
-    desk.request(ArmState.HOLD)
-    desk.advance(0.1)
-    rig.rehearsal.lift()
-    rig.rehearsal.pendant("activate")
-    desk.advance(0.5)
-    return desk.status.safety is SafetyMode.ACTIVE
+    loop_client = rig.backend.loop_client
+    loop_client.request(ArmState.HOLD)
+    loop_client.advance(0.1)
+    rig.simulation.lift()
+    rig.simulation.pendant("activate")
+    loop_client.advance(0.5)
+    return loop_client.status.safety is SafetyMode.ACTIVE
 
 
 def _header() -> TrialHeader:

@@ -13,7 +13,7 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import SettingsError
 
 Press = Literal["activate", "idle", "estop", "quit"]
-Button = Literal["activate", "idle", "estop"]
+PendantButton = Literal["activate", "idle", "estop"]
 PRESSES: tuple[Press, ...] = ("activate", "idle", "estop", "quit")
 _LONGEST_LINE = 256  # bytes; what is longer is no button
 _LATEST_S = 1e6
@@ -22,7 +22,7 @@ _LATEST_S = 1e6
 class Pressable(Protocol):
     """A pendant's other end."""
 
-    def press(self, action: Button) -> None:
+    def press(self, action: PendantButton) -> None:
         """Press a button now."""
         ...
 

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.verify import Verified
+from acquisition.trial_file.verify import VerifiedFile
 from acquisition.trial_file.writer import TrialHeader
-from analysis.data.quality import Coverage, suggest
+from analysis.data.quality import CoverageGrid, suggest
 from experiments.rig.rig import Rig
 from experiments.session.reducer import KEEP
 from experiments.session.store import read_json, write_json
@@ -23,7 +23,7 @@ ENOUGH = 0.9  # share of the container a trial has to cross
 
 
 @dataclass(slots=True)
-class Outcome:
+class TrialOutcome:
     """How a recording ended.
 
     Attributes:
@@ -43,7 +43,7 @@ class Outcome:
 
 
 def sidecar_of(
-    name: TrialName, verified: Verified | None, outcome: Outcome
+    name: TrialName, verified: VerifiedFile | None, outcome: TrialOutcome
 ) -> dict[str, object]:
     """Return the sidecar of an attempt without a verdict; no file where None."""
     return {
@@ -66,19 +66,19 @@ def sidecar_of(
 
 
 @dataclass(frozen=True, slots=True)
-class Archive:
+class TrialArchive:
     """The files of one session's trials."""
 
     rig: Rig
     facts: SessionFacts
 
-    def seal(self, header: TrialHeader, name: TrialName, reason: str) -> Verified:
+    def seal(self, header: TrialHeader, name: TrialName, reason: str) -> VerifiedFile:
         """End and verify the trial file, and the truth beside it when simulated.
 
         Raises:
             TrialFileError: a file could not be written or verified.
         """
-        verified = self.rig.crew.recorder.finish(reason)
+        verified = self.rig.backend.recorder.finish(reason)
         truth = self.facts.folder.trials / f"{name.kept}.truth.mcap"
         write_truth(self.rig, header, truth)
         return verified
@@ -95,8 +95,8 @@ class Archive:
     def write_sidecar(
         self,
         name: TrialName,
-        verified: Verified,
-        outcome: Outcome,
+        verified: VerifiedFile,
+        outcome: TrialOutcome,
         review: Review | None = None,
     ) -> None:
         """Write what is known of a sealed trial beside it, without a verdict.
@@ -125,7 +125,7 @@ class Archive:
         counts = np.zeros(CELLS, np.int64)
         for sidecar in self._kept_sidecars():
             counts += cells_of(sidecar.get("coverage"))
-        return suggest(Coverage(counts))
+        return suggest(CoverageGrid(counts))
 
     def _kept_sidecars(self) -> list[dict[str, Any]]:
         paths = sorted(self.facts.folder.trials.glob("T*.json"))

@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition.clock import utc_offset_ns
 from acquisition.ipc.frame_tape import last_frames
 from acquisition.recording.recorder import seal
-from acquisition.trial_file.verify import Verified
+from acquisition.trial_file.verify import VerifiedFile
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
     TRUTH_TOPICS,
@@ -109,14 +109,14 @@ def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
         trial=trial,
         utc_offset_ns=offset,
         offset_uncertainty_ns=uncertainty,
-        provenance={**facts.provenance, **rig.crew.desk.device_facts()},
+        provenance={**facts.provenance, **rig.backend.loop_client.device_facts()},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
     )
 
 
 @dataclass(slots=True)
-class EndWatch:
+class EndDetector:
     """Decides when a running trial is over, from time and travel.
 
     Attributes:
@@ -137,7 +137,7 @@ class EndWatch:
 
 
 @dataclass(slots=True)
-class PaceWatch:
+class PaceMonitor:
     """Notices a foot that is pushed too fast, not one that slips.
 
     A slip is over after centimetres; a second at 0.2 m/s is a push that leaves no time
@@ -165,14 +165,14 @@ class PaceWatch:
         return False
 
 
-def write_truth(rig: Rig, header: TrialHeader, path: Path) -> Verified | None:
+def write_truth(rig: Rig, header: TrialHeader, path: Path) -> VerifiedFile | None:
     """Write what the simulation knows beside a trial; None on the real rig."""
-    if rig.rehearsal is None:
+    if rig.simulation is None:
         return None
-    records = rig.rehearsal.take_truth()
+    records = rig.simulation.take_truth()
     if len(records) < 2:
         return None
-    parameters = {f"true:{k}": v for k, v in rig.rehearsal.parameters().items()}
+    parameters = {f"true:{k}": v for k, v in rig.simulation.parameters().items()}
     truth_header = TrialHeader(
         trial={**header.trial, **parameters},
         utc_offset_ns=header.utc_offset_ns,
@@ -189,7 +189,7 @@ def write_truth(rig: Rig, header: TrialHeader, path: Path) -> Verified | None:
 def write_flight(rig: Rig, header: TrialHeader, path: Path, reason: str) -> None:
     """Write the last two seconds with raw frames after a fault."""
     writer = TrialWriter(path, header, FLIGHT_TOPICS)
-    writer.write_cycles(rig.crew.desk.last(FLIGHT_SECONDS))
-    writer.write_can(last_frames(rig.board.frames, FLIGHT_SECONDS))
+    writer.write_cycles(rig.backend.loop_client.last(FLIGHT_SECONDS))
+    writer.write_can(last_frames(rig.shared.frames, FLIGHT_SECONDS))
     writer.write_event(rig.clock.now_ns(), 40, "fault", reason)
     seal(writer, reason)

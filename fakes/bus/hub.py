@@ -33,10 +33,10 @@ class SocketHub:
         self.lost = 0
         self._path = path
         self._clients: dict[int, socket.socket] = {}
-        self._listener = _listen(path)
+        self._dialog = _listen(path)
         self._inode = path.stat().st_ino
         self._poll = select.epoll()
-        self._poll.register(self._listener, select.EPOLLIN)
+        self._poll.register(self._dialog, select.EPOLLIN)
 
     @property
     def name(self) -> str:
@@ -60,7 +60,7 @@ class SocketHub:
         """Return the clients' frames that have arrived; others get them at once."""
         frames: list[Frame] = []
         for descriptor, _ in self._poll.poll(0):
-            if descriptor == self._listener.fileno():
+            if descriptor == self._dialog.fileno():
                 self._accept()
             elif descriptor in self._clients:
                 frames += self._drain(descriptor)
@@ -77,13 +77,13 @@ class SocketHub:
         for descriptor in list(self._clients):
             self._forget(descriptor)
         self._poll.close()
-        self._listener.close()
+        self._dialog.close()
         if self._path.exists() and self._path.stat().st_ino == self._inode:
             self._path.unlink()
 
     def _accept(self) -> None:
         try:
-            client, _ = self._listener.accept()
+            client, _ = self._dialog.accept()
         except OSError:
             return  # it has gone away again
         if len(self._clients) >= CLIENTS:
@@ -137,19 +137,19 @@ def _listen(path: Path) -> socket.socket:
             hint="Choose a shorter one, e.g. traction-fake:/tmp/wam.sock.",
         )
     _remove_stale(path)
-    listener = open_socket()
+    dialog = open_socket()
     try:
-        listener.bind(str(path))
+        dialog.bind(str(path))
         path.chmod(0o600)  # only its owner may connect
-        listener.listen(CLIENTS)
-        listener.setblocking(False)
+        dialog.listen(CLIENTS)
+        dialog.setblocking(False)
     except OSError as error:
-        listener.close()
+        dialog.close()
         raise SettingsError(
             f"No bus can be served at {path}: {error.strerror or error}.",
             hint="Name a new file in an existing folder you may write to.",
         ) from error
-    return listener
+    return dialog
 
 
 def _remove_stale(path: Path) -> None:

@@ -41,7 +41,7 @@ class Container:
             return contact
         depth = abs(y) - FREE
         side = math.copysign(1.0, y)
-        board = max(0.0, _K * depth + _B * side * vy)
-        rubbing = _MU * board * math.tanh(vx / 0.01)
+        shared = max(0.0, _K * depth + _B * side * vy)
+        rubbing = _MU * shared * math.tanh(vx / 0.01)
         F_t, F_y, F_n, M_x, M_y, M_z = contact
-        return F_t + rubbing, F_y - side * board, F_n, M_x, M_y, M_z
+        return F_t + rubbing, F_y - side * shared, F_n, M_x, M_y, M_z

@@ -31,7 +31,7 @@ class _Stone:
     anchor: float | None = None
 
 
-class Jams:
+class JamSequence:
     """One locked configuration of stones after another.
 
     Attributes:

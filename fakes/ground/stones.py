@@ -6,7 +6,7 @@ import numpy as np
 
 from fakes.ground.contact import DAMPING_MASS, NO_CONTACT, Contact, Motion
 from fakes.ground.footing import Footing
-from fakes.ground.jam import Jams
+from fakes.ground.jam import JamSequence
 from fakes.ground.profile import GRID, locate, smooth_profile, value_at
 from fakes.ground.stone_sizes import StoneParameters, slope_factor
 
@@ -41,7 +41,7 @@ class StoneBed:
         self._sink = 0.0
         self._sink_limit = p.s_inf * p.d50
         self._footing = Footing(p.K_t, p.cop, 0.5 * p.d50, rng)
-        self._jams = Jams(p, p.J0 * slope_factor(incline) * self._bed, rng)
+        self._jams = JamSequence(p, p.J0 * slope_factor(incline) * self._bed, rng)
 
     @property
     def stiffness(self) -> float:

@@ -14,7 +14,7 @@ Wrench = tuple[float, float, float, float, float, float]
 _FELT = Struct("15d")  # ground's wrench, change of the foot's rates, its turning rate
 
 
-class Wrist:
+class WristGauges:
     """The load on the sensor between arm and foot, cycle by cycle.
 
     f = F_c + m (g_w - a)

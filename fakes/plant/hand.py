@@ -26,7 +26,7 @@ _CARRY_K, _CARRY_B = 800.0, 100.0  # N/m, N s/m
 _REST_B = 18.0  # of a hand that lies on the arm, along z [N s/m]
 
 
-class Phase(Enum):
+class HandPhase(Enum):
     """What the hand is doing."""
 
     CARRY = auto()
@@ -36,7 +36,12 @@ class Phase(Enum):
 
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
-_CARRY, _REST, _PUSH, _AWAY = Phase.CARRY, Phase.REST, Phase.PUSH, Phase.AWAY
+_CARRY, _REST, _PUSH, _AWAY = (
+    HandPhase.CARRY,
+    HandPhase.REST,
+    HandPhase.PUSH,
+    HandPhase.AWAY,
+)
 
 
 class Hand:
@@ -44,7 +49,7 @@ class Hand:
 
     def __init__(self, dt: float) -> None:
         self._dt = dt
-        self.phase = Phase.CARRY
+        self.phase = HandPhase.CARRY
         self._start: Vector3 | None = None
         self._path: list[Vector3] = []
         self._moved = 0.0
@@ -57,7 +62,7 @@ class Hand:
     @property
     def is_done(self) -> bool:
         """Whether the last carrying has come to its end."""
-        return self.phase is not Phase.CARRY or not self._path
+        return self.phase is not HandPhase.CARRY or not self._path
 
     @property
     def is_holding(self) -> bool:
@@ -66,7 +71,7 @@ class Hand:
 
     def carry(self, *points: Vector3) -> None:
         """Carry the sole through `points` (terrain frame) and hold it there."""
-        self.phase = Phase.CARRY
+        self.phase = HandPhase.CARRY
         self._speed = SPEED
         self._path = list(points)
         self._start = None
@@ -98,7 +103,7 @@ class Hand:
 
     def let_go(self) -> None:
         """Take the hand away."""
-        self.phase = Phase.AWAY
+        self.phase = HandPhase.AWAY
 
     def step(self, view: HandView) -> Vector3:
         """Return the force on the hand point along x, y, z of the terrain frame."""
@@ -126,7 +131,7 @@ class Hand:
             self._moved = 0.0
         if self._rests_then and not self._path:
             self._anchor = view.hand[0]
-            self.phase = Phase.REST
+            self.phase = HandPhase.REST
             return self._rest_force(view)
         target, velocity = self._target()
         return (

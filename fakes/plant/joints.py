@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Sequence
+from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
 
 from wam.model.arm_model import drive_inertia_matrix
-from wam.model.constants import ArmConstants
+from wam.model.constants import ArmConstants, Array
 
 _STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 _EPSILON = 0.01  # rad/s, where Coulomb friction saturates
@@ -81,3 +82,76 @@ class JointResistance:
             dampings.append(damping)
             inertias.append(drive + self._dt * damping)
         return Resistance(inertias, dampings, springs, is_near_stop)
+
+
+class JointState:
+    """Where the joints are and how fast, shapes (7,); semi-implicit Euler.
+
+    Velocities stand half a step behind positions. The speed-dependent part of the
+    dynamics takes them where the positions are, or a free swing loses energy.
+
+    Attributes:
+        rows: q [rad], qd [rad/s] and qd half a step on, shape (3, 7). A step makes
+            new ones, so what was taken of the old ones stays as it was.
+    """
+
+    def __init__(self, q: Array, dt: float) -> None:
+        """Rest at `q` [rad]; a step is `dt` [s] long."""
+        # P (q, qd, qdd): q + dt (qd + dt qdd), qd + dt qdd, and dt / 2 later
+        onward = [[1.0, dt, dt * dt], [0.0, 1.0, dt], [0.0, 1.0, 1.5 * dt]]
+        self._P = np.array(onward)
+        self.rest(q)
+
+    def rest(self, q: Array) -> None:
+        """Stand still at `q` [rad]."""
+        self.rows = np.stack((q, np.zeros(7), np.zeros(7)))
+
+    def move(self, q: Array) -> None:
+        """Be at `q` [rad] with the velocities of now."""
+        self.rows = np.stack((q, *self.rows[1:]))
+
+    def step(self, qdd: Array) -> Array:
+        """Go on by a step under `qdd` [rad/s^2]; return the new rows."""
+        rows = self.rows
+        rows[2] = qdd
+        self.rows = rows = self._P.dot(rows)
+        return rows
+
+
+_LAYOUT = Struct("26d")  # wrench on foot and hand, joint velocities, driving torques
+
+
+class JointLoads:
+    """Turns wrenches on foot and hand, motion and torques into torques of the joints.
+
+    Attributes:
+        A: rows that give the sole's velocity, the foot's turn, the hand's velocity and
+            turn from the joint velocities, shape (12, 7); to be filled in place.
+    """
+
+    def __init__(self) -> None:
+        self._B = np.vstack((np.zeros((12, 7)), np.zeros((7, 7)), np.eye(7)))
+        self.A = self._B[:12]
+        self._resisting = self._B[12:19].reshape(-1)[:: 7 + 1]  # the diagonal of -D
+        self._buffer = bytearray(_LAYOUT.size)
+        self._loads = np.frombuffer(self._buffer)
+
+    def resist(self, damping: Sequence[float]) -> None:
+        """Let the joints be damped by `damping` [N m s/rad], seven, from now on."""
+        np.negative(damping, out=self._resisting)
+
+    def torques(
+        self,
+        wrench: Sequence[float],
+        qd: Sequence[float],
+        driving: Sequence[float],
+    ) -> Array:
+        """Return A^T `wrench` - D `qd` + `driving` [N m], shape (7,).
+
+        Args:
+            wrench: on foot and hand, twelve numbers in the order of the rows of A.
+            qd: joint velocities [rad/s], seven.
+            driving: torques that drive the joints [N m], seven.
+        """
+        _LAYOUT.pack_into(self._buffer, 0, *wrench, *qd, *driving)
+        return self._loads.dot(self._B)

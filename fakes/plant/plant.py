@@ -20,11 +20,9 @@ import pinocchio as pin
 
 from fakes.ground.contact import NO_CONTACT
 from fakes.ground.terrain import Terrain
-from fakes.plant.gauges import Wrench, Wrist
+from fakes.plant.gauges import Wrench, WristGauges
 from fakes.plant.hand import Hand
-from fakes.plant.joint_loads import JointLoads
-from fakes.plant.joint_state import JointState
-from fakes.plant.joints import JointResistance
+from fakes.plant.joints import JointLoads, JointResistance, JointState
 from fakes.plant.model import FOREARM_MASS, arm_and_hand
 from fakes.plant.push import HandView
 from fakes.truth import Truth
@@ -78,7 +76,7 @@ class ArmPlant:
         self._constants = constants
         self._model, self._sole, self._hand = arm_and_hand(constants, tool, frame)
         self._data = self._model.createData()
-        self._wrist = Wrist(tool, frame.axes()[:, 2], CYCLE_NS * 1e-9)
+        self._wrist = WristGauges(tool, frame.axes()[:, 2], CYCLE_NS * 1e-9)
         self._substeps = options.substeps
         self._substep_ns = CYCLE_NS // options.substeps
         self._dt = self._substep_ns * 1e-9

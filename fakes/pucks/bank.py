@@ -5,10 +5,10 @@ from functools import partial
 from typing import Protocol
 
 from acquisition.devices import SafetyMode
-from fakes.pucks.event_queue import Schedule
+from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.power import AWAKE, Power, PuckLife, power_after, power_at_start
+from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
 from wam.bus.frames import (
     MOTOR_NODES,
@@ -50,7 +50,7 @@ class PuckBank:
         self,
         motors: MotorSide,
         options: NetworkOptions,
-        schedule: Schedule,
+        schedule: EventQueue,
         on_positions: Callable[[Mapping[int, int]], None],
     ) -> None:
         self._motors = motors
@@ -59,7 +59,7 @@ class PuckBank:
         self._on_positions = on_positions
         self._mode = options.safety_mode
         self._pucks = [
-            MotorPuck(PuckLife(node, options, schedule), options)
+            MotorPuck(PuckPower(node, options, schedule), options)
             for node in MOTOR_NODES
         ]
         self._members: dict[int, list[MotorPuck]] = {}

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fakes.pucks.event_queue import FRAME_NS, Schedule
+from fakes.pucks.event_queue import FRAME_NS, EventQueue
 from wam.bus.frames import compose_id
 
 # FROM 31 TO 9 wins every arbitration against pucks, FROM 11 TO group 11 (what the
@@ -47,13 +47,13 @@ class BusFaults:
 
     Devices among themselves are not touched: the faults sit before the host. Frames of
     one identifier keep their order, as they do in the queue of a CAN controller.
-    `count` is how many frames a fault strikes, None = all until `mend`.
+    `count` is how many frames a fault strikes, None = all until `clear_faults`.
 
     Attributes:
         is_off: the host's controller has left the bus: nothing is sent or received.
     """
 
-    def __init__(self, schedule: Schedule, seed: int = 0) -> None:
+    def __init__(self, schedule: EventQueue, seed: int = 0) -> None:
         self.is_off = False
         self._schedule = schedule
         self._rng = np.random.default_rng(seed)
@@ -99,7 +99,7 @@ class BusFaults:
         self.is_off = True
         self._step_in()
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End everything; frames that are late already still come."""
         self.is_off = False
         self._flood += 1

@@ -15,7 +15,7 @@ NEVER = 1 << 63  # later than any time [ns]
 FRAME_NS = tuple(1000 * bits for bits in (50, 58, 67, 76, 84, 93, 101, 110, 118))
 
 
-class Schedule:
+class EventQueue:
     """One time for all devices of a network, their plans and their frames.
 
     The wire asks for the next event with every frame, so it is kept, not looked up.

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from acquisition.devices import SafetyMode
-from fakes.pucks.event_queue import Schedule
+from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.power import Power, PuckLife, power_after, power_at_start
+from fakes.pucks.power import Power, PuckPower, power_after, power_at_start
 from fakes.sensor.errors import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
 from wam.bus.frames import (
     SENSOR_NODE,
@@ -23,7 +23,7 @@ from wam.bus.frames import (
     encode_torque,
     group_id,
 )
-from wam.bus.properties import Device, Role, Stat, names
+from wam.bus.properties import Device, PuckRole, PuckStatus, names
 
 # Data sheet: steps and ranges of fx fy fz tx ty tz [N, N m]
 STEPS = (0.05, 0.05, 0.08, 0.0015, 0.0015, 0.0015)
@@ -69,8 +69,10 @@ class ForceTorquePuck:
         life: its processor.
     """
 
-    def __init__(self, options: NetworkOptions, schedule: Schedule, load: Load) -> None:
-        self.life = PuckLife(SENSOR_NODE, options, schedule)
+    def __init__(
+        self, options: NetworkOptions, schedule: EventQueue, load: Load
+    ) -> None:
+        self.life = PuckPower(SENSOR_NODE, options, schedule)
         self.life.enter(power_at_start(options))
         self._options = options
         self._schedule = schedule
@@ -78,7 +80,7 @@ class ForceTorquePuck:
         self._zero = (0.0,) * 6
         self._latched = 0
         self._properties = {
-            **{"ROLE": int(Role.FORCE), "SN": 1008, "ID": SENSOR_NODE, "ERROR": 0},
+            **{"ROLE": int(PuckRole.FORCE), "SN": 1008, "ID": SENSOR_NODE, "ERROR": 0},
             **{"MODE": 0, "TEMP": 34, "PTEMP": 60, "OTEMP": 60, "VBUS": 48},
             **{"GRPA": 10, "GRPB": 10, "GRPC": 10, "LED": 0},
             **dict.fromkeys(("T1", "T2", "T3"), _THERMISTOR),
@@ -140,7 +142,7 @@ class ForceTorquePuck:
         if name == "VERS":
             return self._options.monitor_vers if is_asleep else _VERS
         if name == "STAT":
-            return int(Stat.RESET if is_asleep else Stat.READY)
+            return int(PuckStatus.RESET if is_asleep else PuckStatus.READY)
         if name in _GAUGES:
             return self._gauge(_GAUGES.index(name))
         if name in _COMPONENTS:

@@ -1,14 +1,14 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.power import AWAKE, Power, PuckLife
+from fakes.pucks.power import AWAKE, Power, PuckPower
 from wam.bus.frames import position_reply_id
 from wam.bus.properties import (
     MAGNETIC_ENCODER,
     Device,
     PuckMode,
-    Role,
-    Stat,
+    PuckRole,
+    PuckStatus,
     names,
     property_number,
 )
@@ -35,7 +35,7 @@ class MotorPuck:
         properties: what a host has set or may ask for, by name.
     """
 
-    def __init__(self, life: PuckLife, options: NetworkOptions) -> None:
+    def __init__(self, life: PuckPower, options: NetworkOptions) -> None:
         self.life = life
         self.node = node = life.node
         self.position_id = position_reply_id(node)
@@ -46,7 +46,7 @@ class MotorPuck:
         self.p_number = property_number(Device.MOTOR, "P", self.vers)
         self.t_header = 0x80 | property_number(Device.MOTOR, "T", self.vers)
         self.properties = {
-            "ROLE": MAGNETIC_ENCODER | Role.TATER,
+            "ROLE": MAGNETIC_ENCODER | PuckRole.TATER,
             **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
             **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33},
             **{"VBUS": 48},
@@ -83,7 +83,7 @@ class MotorPuck:
         is_asleep = self.life.power is Power.MONITOR
         computed = {
             "VERS": self._monitor_vers if is_asleep else self.vers,
-            "STAT": Stat.RESET if is_asleep else Stat.READY,
+            "STAT": PuckStatus.RESET if is_asleep else PuckStatus.READY,
             "MECH": counts % (self.properties["CTS"] or 1),
             "T": self.torque,
         }

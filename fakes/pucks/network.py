@@ -7,7 +7,7 @@ as far as hosts have described them.
 from acquisition.devices import SafetyMode
 from fakes.pucks.bank import MotorSide, PuckBank
 from fakes.pucks.bus_faults import BusFaults
-from fakes.pucks.event_queue import NEVER, OutFrame, Schedule
+from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
 from fakes.pucks.ft_puck import ForceTorquePuck, Load
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.safety_module import (
@@ -48,7 +48,7 @@ class PuckNetwork:
     ) -> None:
         """Join devices and motors; `load` is on the sensor, if there is one."""
         self.options = options or NetworkOptions()
-        self.schedule = schedule = Schedule(t_ns)
+        self.schedule = schedule = EventQueue(t_ns)
         self.faults = BusFaults(schedule)
         self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
         self._bank = PuckBank(

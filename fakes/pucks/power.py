@@ -4,9 +4,9 @@ from collections.abc import Callable
 from enum import Enum
 
 from acquisition.devices import SafetyMode
-from fakes.pucks.event_queue import Schedule
+from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.options import NetworkOptions
-from wam.bus.properties import Stat
+from wam.bus.properties import PuckStatus
 
 # Of the answers of neighbours; all come within the 75 to 150 us that are known.
 _APART_NS = 10_000
@@ -41,7 +41,7 @@ def power_after(mode: SafetyMode, before: SafetyMode) -> Power | None:
     return Power.MONITOR if before is SafetyMode.E_STOP else None
 
 
-class PuckLife:
+class PuckPower:
     """What the processor of one node does, and what it will do if it lives so long.
 
     Attributes:
@@ -50,7 +50,9 @@ class PuckLife:
         is_mute: its transmit wire is cut; it still hears.
     """
 
-    def __init__(self, node: int, options: NetworkOptions, schedule: Schedule) -> None:
+    def __init__(
+        self, node: int, options: NetworkOptions, schedule: EventQueue
+    ) -> None:
         self.node = node
         self.power = Power.OFF
         self.is_mute = False
@@ -70,9 +72,9 @@ class PuckLife:
 
     def change_by(self, stat: int) -> tuple[int, Power] | None:
         """Return what SET STAT does: a silence [ns] and the power after it, if any."""
-        if stat == Stat.READY and self.power is Power.MONITOR:
+        if stat == PuckStatus.READY and self.power is Power.MONITOR:
             return self._options.boot_ns, Power.AWAKE
-        if stat == Stat.RESET and self.power is Power.AWAKE:
+        if stat == PuckStatus.RESET and self.power is Power.AWAKE:
             return self._options.reset_ns, Power.MONITOR
         return None
 

@@ -8,17 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from acquisition.devices import SafetyMode
-from fakes.pucks.event_queue import NEVER, Schedule
+from fakes.pucks.event_queue import NEVER, EventQueue
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.speed_monitor import SpeedWatch
+from fakes.pucks.speed_monitor import SpeedMonitor
 from wam.bus.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
-from wam.bus.properties import Device, PuckMode, Role, Stat, names
-from wam.driver.safety_limits import COUNTS_PER_SPEED
+from wam.bus.properties import Device, PuckMode, PuckRole, PuckStatus, names
 from wam.driver.safety_module import (
+    COUNTS_PER_SPEED,
     MONITORS,
-    Button,
-    Level,
+    PendantButton,
     PendantWord,
+    SafetyLevel,
     encode_pendant,
 )
 
@@ -37,7 +37,7 @@ NOMINAL_VOLTAGE = 48.0  # of the power bus [V]
 _PATIENCE_NS = 500_000_000  # above VL2 for longer than this takes the power away
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _ACTIVE = SafetyMode.ACTIVE
-_SAFE, _WARNING, _FAULT = Level.SAFE, Level.WARNING, Level.FAULT
+_SAFE, _WARNING, _FAULT = SafetyLevel.SAFE, SafetyLevel.WARNING, SafetyLevel.FAULT
 _ZERO_CHARACTER, _E_CHARACTER = 0x3F, 0x79  # seven-segment patterns
 
 
@@ -59,7 +59,7 @@ class FakeSafetyModule:
     def __init__(
         self,
         options: NetworkOptions,
-        schedule: Schedule,
+        schedule: EventQueue,
         on_change: Callable[[SafetyMode], None],
     ) -> None:
         self.mode = options.safety_mode
@@ -67,18 +67,23 @@ class FakeSafetyModule:
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
-        self._levels: dict[str, Level] = dict.fromkeys(MONITORS, _SAFE)
+        self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, _SAFE)
         if not options.has_power:
             self._levels["other"] = _FAULT
-        self._speeds = SpeedWatch(options.cts)
+        self._speeds = SpeedMonitor(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
         self._is_deaf = False
         self._spared: dict[str, int] = {}  # limits as they were before `strain`
         self._largest_command: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
         self._properties = {
-            **{"VERS": options.safety_vers, "ROLE": int(Role.SAFETY)},
-            **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0, "STAT": int(Stat.READY)},
+            **{"VERS": options.safety_vers, "ROLE": int(PuckRole.SAFETY)},
+            **{
+                "SN": 1010,
+                "ID": SAFETY_NODE,
+                "ERROR": 0,
+                "STAT": int(PuckStatus.READY),
+            },
             **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
             **{
                 "VNOM": round(NOMINAL_VOLTAGE),
@@ -98,7 +103,7 @@ class FakeSafetyModule:
             segments=_E_CHARACTER if is_stopped else _ZERO_CHARACTER,
             is_idle_lit=self.mode is SafetyMode.IDLE,
             is_active_lit=self.mode is _ACTIVE,
-            button=Button.E_STOP if is_stopped else Button.NONE,
+            button=PendantButton.E_STOP if is_stopped else PendantButton.NONE,
         )
 
     def press(self, action: PendantAction) -> None:

@@ -20,7 +20,7 @@ _Row = tuple[float, float, float, float]
 _RATIOS = (42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93)
 
 
-class SpeedWatch:
+class SpeedMonitor:
     """Speeds out of position reports of motors 1 to 4 with `cts` counts per turn."""
 
     def __init__(self, cts: Sequence[int]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, Saying, Schedule
+from fakes.sensor.firmware import Measurement, SampleSchedule, Saying
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import Acknowledgement, BootText, BotaFrame
@@ -20,7 +20,7 @@ _COMMAND = re.compile(rb"[CRI#]|c,\d,\d,\d,\d|f,(\d{1,4}),\d,\d,\d")
 _COMMAND_BEGIN = re.compile(rb"c(,(\d(,(\d(,(\d(,)?)?)?)?)?)?)?|f(,[\d,]{0,10})?")
 
 
-class Mode(Enum):
+class BotaMode(Enum):
     """What the device is doing."""
 
     RUN = auto()
@@ -82,7 +82,7 @@ class BotaFirmware:
         self.baudrate = options.baudrate
         # The device counts its own time, so a fast clock samples early.
         self.clock_rate = 1 + options.clock_error_ppm * 1e-6
-        self.schedule: Schedule | None = None
+        self.schedule: SampleSchedule | None = None
         self.on_since_ns = start_ns
         self._options = options
         self._raw_starts = options.raw_starts
@@ -143,19 +143,19 @@ class BotaFirmware:
         self._raw_starts -= self._is_raw
 
     def _run_from(self, t_ns: int) -> None:
-        self._mode = Mode.RUN
+        self._mode = BotaMode.RUN
         period_ns = bota.frame_period_ns(self._sinc) / self.clock_rate
-        self.schedule = Schedule(t_ns, period_ns)
+        self.schedule = SampleSchedule(t_ns, period_ns)
 
     def _stop(self) -> None:
-        self._mode = Mode.CONFIGURATION
+        self._mode = BotaMode.CONFIGURATION
         self.schedule = None
 
     def _obey(self, t_ns: int, command: re.Match[bytes]) -> list[Saying]:
         letter = chr(command[0][0])
         if letter == "#":
             return self.power_up(t_ns)
-        is_running = self._mode is Mode.RUN
+        is_running = self._mode is BotaMode.RUN
         is_allowed = letter == "I" or is_running == (letter == "C")
         is_refused = not is_allowed or letter in self._options.refused
         if letter == "f" and not 1 <= int(command[1]) <= _SHIPPED_SINC:

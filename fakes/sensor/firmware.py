@@ -11,7 +11,7 @@ FULL_COUNT = 32767  # of a sensor that sends 16-bit counts
 
 
 @dataclass(frozen=True, slots=True)
-class Schedule:
+class SampleSchedule:
     """When a running device takes its samples, by its own clock: first and period."""
 
     first_ns: int
@@ -52,7 +52,7 @@ class Firmware(Protocol):
     """
 
     baudrate: int
-    schedule: Schedule | None
+    schedule: SampleSchedule | None
     on_since_ns: int
     clock_rate: float
     frame_size: int

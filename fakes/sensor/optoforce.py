@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, Saying, Schedule, count_of
+from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 from ft_sensor.vendors import optoforce
@@ -62,7 +62,7 @@ class OptoForceFirmware:
     def __init__(self, options: OptoForceOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate
         self.clock_rate = 1 + options.clock_error_ppm * 1e-6
-        self.schedule: Schedule | None = None
+        self.schedule: SampleSchedule | None = None
         self.on_since_ns = start_ns
         self._options = options
         self._input = b""
@@ -109,7 +109,7 @@ class OptoForceFirmware:
         )
 
     def _run_from(self, t_ns: int, period_ms: int) -> None:
-        self.schedule = Schedule(t_ns, period_ms * 1e6 / self.clock_rate)
+        self.schedule = SampleSchedule(t_ns, period_ms * 1e6 / self.clock_rate)
 
     def _obey(self, t_ns: int, data: bytes) -> bytes | None:
         if data == optoforce.ASK_SERIAL:

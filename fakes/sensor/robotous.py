@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Measurement, Saying, Schedule, count_of
+from fakes.sensor.firmware import Measurement, SampleSchedule, Saying, count_of
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.reading import Wrench
 from ft_sensor.vendors import robotous
@@ -62,7 +62,7 @@ class RobotousFirmware:
     def __init__(self, options: RobotousOptions, start_ns: int) -> None:
         self.baudrate = options.baudrate
         self.clock_rate = 1 + options.clock_error_ppm * 1e-6
-        self.schedule: Schedule | None = None
+        self.schedule: SampleSchedule | None = None
         self.on_since_ns = start_ns
         self._options = options
         known = MODELS.get(options.model)
@@ -121,7 +121,7 @@ class RobotousFirmware:
 
     def _run_from(self, t_ns: int) -> None:
         period_ns = 1e9 / _RATES[self._rate_code] / self.clock_rate
-        self.schedule = Schedule(t_ns, period_ns)
+        self.schedule = SampleSchedule(t_ns, period_ns)
 
     def _obey(self, t_ns: int, command: int, parameters: bytes) -> bytes | None:
         if command == robotous.STOP:

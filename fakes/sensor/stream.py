@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.firmware import Firmware, Measurement, Saying, Schedule
+from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
 from fakes.sensor.stream_faults import ByteFault, StreamFaults, damage
 from ft_sensor.reading import ALL_AXES, Wrench
 from ft_sensor.serial_line.framing import wire_time_ns
@@ -63,7 +63,7 @@ class SensorStream:
         self._on_since_ns = firmware.on_since_ns
         self._clock_start_us = self._device_us = clock_start_us
         self._number = 0
-        self._schedule: Schedule | None = None
+        self._schedule: SampleSchedule | None = None
         if firmware.schedule is None:
             self.reset(start_ns)
         self._follow_schedule()
@@ -135,7 +135,7 @@ class SensorStream:
         self.speak()
         self.status = 0
         self.is_clock_frozen = self._is_saturated = False
-        self.faults.mend()
+        self.faults.clear_faults()
         self.ranges = _NO_RANGES
         self.warming = 0.0
 

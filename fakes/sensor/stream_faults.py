@@ -29,7 +29,7 @@ def damage(data: bytes, fault: ByteFault, index: int, bit: int = 0) -> bytes:
 
 
 class StreamFaults:
-    """Freezes, spoils and garbles what a sensor says, until `mend`.
+    """Freezes, spoils and garbles what a sensor says, until `clear_faults`.
 
     Attributes:
         is_garbled: no frame reaches the host as it was sent.
@@ -47,7 +47,7 @@ class StreamFaults:
         self._is_frozen = True
         self._last = None
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """Show and send everything as it is."""
         self.is_garbled = self.is_nonsense = self._is_frozen = False
 

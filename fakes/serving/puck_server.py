@@ -70,7 +70,7 @@ class Port(Protocol):
         ...
 
 
-class Supported:
+class SupportedMotors:
     """Motors of an arm that somebody carries as long as no motor pulls.
 
     Implements fakes.pucks.bank.MotorSide. Without power, and under zero torque, the arm
@@ -206,7 +206,7 @@ def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
 
 
 @dataclass(frozen=True, slots=True)
-class Home:
+class HomePose:
     """An arm at its home position, and how it is found.
 
     Attributes:
@@ -222,7 +222,7 @@ class Home:
     is_idle_first: bool
 
 
-def build_home_server(port: Port, found: Home, clock: Clock) -> PuckServer:
+def build_home_server(port: Port, found: HomePose, clock: Clock) -> PuckServer:
     """Return a server of an arm that stands at its home position, not zeroed.
 
     It has a force/torque sensor on its bus or on a serial line.
@@ -241,7 +241,7 @@ def build_home_server(port: Port, found: Home, clock: Clock) -> PuckServer:
     plant = ArmPlant(constants, found.tool, found.frame, home)
     now_ns = clock.now_ns()
     plant.t_ns = now_ns // CYCLE_NS * CYCLE_NS
-    motors = Supported(plant)
+    motors = SupportedMotors(plant)
     rng = trial_generator(_SEED, "home", 0)
     errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
     options = NetworkOptions(

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.control_loop.realtime import Wish, request
-from acquisition.ipc.child import Station, name_process
+from acquisition.control_loop.realtime import RealtimeRequest, request
+from acquisition.ipc.child import ChildContext, name_process
 from acquisition.ipc.rpc import Channel, ChannelClosedError, Handler
 from fakes.bus.hub import SocketHub
 from fakes.plant.plant import PlantOptions
@@ -22,7 +22,7 @@ from fakes.pucks.wire import WiredNetwork
 from fakes.sensor.kinds import SensorChoice
 from fakes.sensor.pty import SerialPty
 from fakes.truth import truth_records
-from fakes.world.rig import FakeRig, Rehearsal, Scene
+from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import load_constants
 from wam.model.tool import tool_of
@@ -75,20 +75,20 @@ class RigServer:
 
     def __init__(
         self,
-        rehearsal: Rehearsal,
+        simulation: LocalSimulation,
         clock: WorldClock,
         folder: Path,
         channel: Channel,
     ) -> None:
         self._clock = clock
-        self._rig = rig = rehearsal.rig
+        self._rig = rig = simulation.rig
         self._wired = WiredNetwork(rig.network, is_far=True)
         self._channel = channel
         self._hub = SocketHub(folder / "can")
         now_ns = self._clock.now_ns()
         self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
         rig.cable = PtyCable(self._pty, clock)
-        self._handlers = rehearsal_handlers(rehearsal)
+        self._handlers = rehearsal_handlers(simulation)
         self._handlers["hello"] = lambda _: {
             "can": {
                 "interface": "traction-fake",
@@ -141,22 +141,22 @@ class RigServer:
         return max(0, min(wait_ns, TICK_NS)) * 1e-9
 
 
-def rehearsal_handlers(rehearsal: Rehearsal) -> dict[str, Handler]:
+def rehearsal_handlers(simulation: LocalSimulation) -> dict[str, Handler]:
     """Return what the console may ask of the simulation."""
-    rig = rehearsal.rig
+    rig = simulation.rig
     return {
-        "prepare": rehearsal.prepare,
-        "lift": lambda _: rehearsal.lift(),
-        "rest": lambda _: rehearsal.rest(),
-        "let_go": lambda _: rehearsal.let_go(),
-        "put_down": lambda _: rehearsal.put_down(),
-        "touch": rehearsal.touch,
-        "push": lambda _: rehearsal.push(),
-        "pendant": rehearsal.pendant,
-        "inject": rehearsal.inject,
-        "mend": lambda _: rehearsal.mend(),
-        "fault_names": lambda _: list(rehearsal.fault_names),
-        "parameters": lambda _: rehearsal.parameters(),
+        "prepare": simulation.prepare,
+        "lift": lambda _: simulation.lift(),
+        "rest": lambda _: simulation.rest(),
+        "let_go": lambda _: simulation.let_go(),
+        "put_down": lambda _: simulation.put_down(),
+        "touch": simulation.touch,
+        "push": lambda _: simulation.push(),
+        "pendant": simulation.pendant,
+        "inject": simulation.inject,
+        "clear_faults": lambda _: simulation.clear_faults(),
+        "fault_names": lambda _: list(simulation.fault_names),
+        "parameters": lambda _: simulation.parameters(),
         "truth_part": lambda _: _truth_part(rig),
     }
 
@@ -174,10 +174,10 @@ def _truth_part(rig: FakeRig) -> str:
     return base64.b64encode(records.tobytes()).decode()
 
 
-def scene_of(facts: dict[str, Any]) -> Scene:
+def scene_of(facts: dict[str, Any]) -> SimulatedScene:
     """Return the scene that was put into plain values."""
     frame = facts["frame"]
-    return Scene(
+    return SimulatedScene(
         terrain=facts["terrain"],
         stones=facts["stones"],
         foot=facts["foot"],
@@ -193,12 +193,12 @@ def scene_of(facts: dict[str, Any]) -> Scene:
     )
 
 
-def main(station: Station) -> None:
+def main(station: ChildContext) -> None:
     """Serve a simulated rig until the console hangs up."""
     name_process("traction-fake")
     # When the console dies, the driver still has to brake the arm.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    request(Wish(PRIORITY, station.settings.get("core")))
+    request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     folder = Path(tempfile.mkdtemp(prefix=f"traction-{os.getpid()}-"))
     try:
         settings, clock = station.settings, WorldClock()
@@ -209,7 +209,7 @@ def main(station: Station) -> None:
             clock,
             PlantOptions(friction=settings["friction"]),
         )
-        rehearsal = Rehearsal(rig, PACES[settings["pace"]])
-        RigServer(rehearsal, clock, folder, station.channel).serve()
+        simulation = LocalSimulation(rig, PACES[settings["pace"]])
+        RigServer(simulation, clock, folder, station.channel).serve()
     finally:
         shutil.rmtree(folder, ignore_errors=True)

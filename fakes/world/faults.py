@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
+from fakes.plant.plant import ArmPlant
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.event_queue import FRAME_NS
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.safety_module import NOMINAL_VOLTAGE
-from wam.bus.frames import MOTOR_NODES, position_reply_id
+from fakes.sensor.stream import SensorStream
+from wam.bus.frames import MOTOR_NODES, SENSOR_NODE, position_reply_id
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
@@ -22,7 +24,7 @@ _LOST_SHARE = 0.01  # of the replies of each puck
 
 
 def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
-    """Return what each name does to the network; `mend_network` undoes it."""
+    """Return what each name does to the network; `clear_network_faults` undoes it."""
     faults = network.faults
     return {
         **_reply_faults(faults),
@@ -45,13 +47,13 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
     }
 
 
-def mend_network(network: PuckNetwork) -> None:
+def clear_network_faults(network: PuckNetwork) -> None:
     """End every fault that can be ended without the arm.
 
     What the safety module latched waits for Shift-idle; a puck that rebooted sleeps
     until a start-up wakes it and has to be zeroed, as on a real arm.
     """
-    network.faults.mend()
+    network.faults.clear_faults()
     network.relax()
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     for node in MOTOR_NODES:
@@ -95,3 +97,91 @@ def _answer_too_late(faults: BusFaults) -> None:
     faults.delay(
         position_reply_id(6), _BEHIND_THE_NEXT_QUESTION_NS, None, every=_LATE_EVERY
     )
+
+
+_JOINT_5, _JOINT_7 = 4, 6
+_BLOW = 20.0  # rad/s; the safety module does not count the wrist, so the guard acts
+# The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
+# sudden twist would swing beyond that, so it grows.
+_TWIST, _TWIST_STEP = 1.2, 0.02  # N m
+_STEP_NS = 2_000_000
+_FINGER = (0.0, 0.0, 3.2)  # below the sole while it hangs free, terrain frame [N]
+
+Later = Callable[[int, Callable[[], None]], None]  # (delay [ns], action)
+
+
+class BodyFaults:
+    """Pushes and twists the arm until `clear_faults`; `later` schedules it."""
+
+    def __init__(self, plant: ArmPlant, later: Later) -> None:
+        self._plant = plant
+        self._later = later
+        self._is_twisting = False
+
+    def by_name(self) -> dict[str, Callable[[], None]]:
+        """Return what each name does to the arm."""
+        return {
+            "overspeed": self._hit,
+            "joint7-slip": self._begin_twist,
+            "residual": self._touch,
+            "tare-moved": self._touch,
+        }
+
+    def clear_faults(self) -> None:
+        """Let nobody twist or touch the foot any more."""
+        self._plant.finger = (0.0, 0.0, 0.0)
+        self._is_twisting = False
+        self._plant.disturbance[_JOINT_7] = 0.0
+
+    def _hit(self) -> None:
+        self._plant.qd[_JOINT_5] = _BLOW
+
+    def _touch(self) -> None:
+        self._plant.finger = _FINGER
+
+    def _begin_twist(self) -> None:
+        self._is_twisting = True
+        self._twist()
+
+    def _twist(self) -> None:
+        if not self._is_twisting:
+            return
+        torque = self._plant.disturbance[_JOINT_7] + _TWIST_STEP
+        self._plant.disturbance[_JOINT_7] = min(torque, _TWIST)
+        self._later(_STEP_NS, self._twist)
+
+
+CLOCK_JUMP_US = 10_000_000
+
+
+def stream_faults(
+    stream: SensorStream, unplug: Callable[[], None], now_ns: Callable[[], int]
+) -> dict[str, Callable[[], None]]:
+    """Return what each name does to a sensor on a serial port.
+
+    Args:
+        stream: the sensor.
+        unplug: pulls the cable.
+        now_ns: tells the time of the simulation [ns].
+    """
+    faults = stream.faults
+    return {
+        "ft-silent": stream.go_silent,
+        "ft-stale": stream.go_silent,
+        "ft-frozen": faults.freeze,
+        "ft-garbled": lambda: setattr(faults, "is_garbled", True),
+        "ft-saturated": stream.saturate,
+        "ft-not-a-number": lambda: setattr(faults, "is_nonsense", True),
+        "ft-unplugged": unplug,
+        "ft-reboot": lambda: stream.reset(now_ns()),
+        "ft-clock-jump": lambda: stream.jump_clock(CLOCK_JUMP_US),
+    }
+
+
+def bus_sensor_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
+    """Return what each name does to a sensor on the arm's bus."""
+    return {
+        "ft-silent": lambda: network.silence(SENSOR_NODE),
+        "ft-stale": lambda: network.silence(SENSOR_NODE),
+        "ft-reboot": lambda: network.reboot(SENSOR_NODE),
+    }

@@ -24,9 +24,13 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.port import FakeSerialPort
 from fakes.truth import truth_records
-from fakes.world.body_faults import BodyFaults
-from fakes.world.faults import mend_network, network_faults
-from fakes.world.sensor_faults import bus_sensor_faults, stream_faults
+from fakes.world.faults import (
+    BodyFaults,
+    bus_sensor_faults,
+    clear_network_faults,
+    network_faults,
+    stream_faults,
+)
 from ft_sensor.payload import TerrainFrame
 from wam.bus.frames import SENSOR_NODE
 from wam.model.arm_model import ArmModel
@@ -42,7 +46,7 @@ _ANY_SENSOR = SensorChoice()
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class SimulatedScene:
     """What stands on the laboratory floor.
 
     Attributes:
@@ -116,7 +120,7 @@ class FakeRig:
 
     def __init__(
         self,
-        scene: Scene,
+        scene: SimulatedScene,
         constants: ArmConstants,
         tool: Tool,
         clock: Clock,
@@ -175,14 +179,14 @@ class FakeRig:
             found["loop-late"] = lambda: self._let_lag(LAG_NS)
         return found
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
         self.stream.recover()
         if self.cable is not None:
             self.cable.plug_in()
-        self._body.mend()
+        self._body.clear_faults()
         self.network.silence(SENSOR_NODE, is_mute=False)
-        mend_network(self.network)
+        clear_network_faults(self.network)
         self._let_lag(0)
 
     def _let_lag(self, lag_ns: int) -> None:
@@ -217,7 +221,7 @@ def _place(number: int, travel: float) -> tuple[float, float]:
     return share * travel, ASIDE * (2.0 * (number * 0.383 % 1.0) - 1.0)
 
 
-class Rehearsal:
+class LocalSimulation:
     """What only the simulation can be asked: hand, pendant, bed, faults, truth.
 
     The drivers never see it; experiments.rig.rig owns it.
@@ -285,9 +289,9 @@ class Rehearsal:
         """Let a device fail; `fault` is one of `fault_names`."""
         self._faults[fault]()
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
-        self.rig.mend()
+        self.rig.clear_faults()
 
     def take_truth(self) -> Record:
         """Return traction_msgs/Truth records since the push began."""

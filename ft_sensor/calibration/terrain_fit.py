@@ -16,7 +16,7 @@ LEAST_LENGTH = 0.1  # m between the edges
 
 
 @dataclass(frozen=True, slots=True)
-class TerrainFit:
+class ContainerFit:
     """A container as touched.
 
     Attributes:
@@ -32,7 +32,7 @@ class TerrainFit:
     roll: float
 
 
-def fit_terrain(points: NDArray[np.float64]) -> TerrainFit:
+def fit_terrain(points: NDArray[np.float64]) -> ContainerFit:
     """Return the container's frame from touched points.
 
     The plane is that of least squares through all points; the way of the foot leads
@@ -70,14 +70,16 @@ def fit_terrain(points: NDArray[np.float64]) -> TerrainFit:
     distances = (points - centre) @ normal
     far -= normal * float((far - centre) @ normal)
     x, y, z = (float(value) for value in far)
-    return TerrainFit(
+    return ContainerFit(
         frame=TerrainFrame(incline, heading, (x, y, z), length),
         residual=float(np.sqrt(distances @ distances / len(distances))),
         roll=float(np.arcsin(np.clip(across[2], -1.0, 1.0))),
     )
 
 
-def check_terrain(fit: TerrainFit, expected: TerrainFrame, *, is_forced: bool) -> None:
+def check_terrain(
+    fit: ContainerFit, expected: TerrainFrame, *, is_forced: bool
+) -> None:
     """Hold a touched container against its row of the matrix.
 
     Raises:

@@ -13,7 +13,7 @@ LONGEST_PAUSE_NS = 4 * NS_PER_S
 _UNTOLD = "unknown"
 
 
-class SensorKeeper:
+class ReconnectingSensor:
     """A sensor that survives its cable, its power supply and a restart of its own.
 
     The loop stops a trial long before a sensor counts as lost here; the next trial
@@ -122,9 +122,9 @@ class SensorKeeper:
         )
 
 
-def stream_facts(keeper: SensorKeeper) -> dict[str, str]:
+def stream_facts(reconnecting: ReconnectingSensor) -> dict[str, str]:
     """Return what became of the stream since it was opened last, as text."""
-    facts = {"reopened": str(keeper.reopened), "trouble": keeper.trouble}
-    if keeper.sensor is not None:
-        facts |= keeper.sensor.stream_facts()
+    facts = {"reopened": str(reconnecting.reopened), "trouble": reconnecting.trouble}
+    if reconnecting.sensor is not None:
+        facts |= reconnecting.sensor.stream_facts()
     return facts

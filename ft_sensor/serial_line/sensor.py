@@ -9,10 +9,9 @@ from acquisition.devices import WrenchSample
 from acquisition.errors import TractionError
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.framing import FrameScanner, ScanCounters
-from ft_sensor.serial_line.link import SerialLink
-from ft_sensor.serial_line.port_settings import Line
-from ft_sensor.serial_line.startup import Listener
-from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.serial_line.link import PortSettings, SerialLink
+from ft_sensor.serial_line.startup import SerialDialog
+from ft_sensor.serial_line.timestamps import SampleTimestamper
 
 BURST_NS = 5_000_000  # of a stream read at once: an adapter collects bytes
 BURSTY = 0.1  # share of the reads
@@ -28,7 +27,7 @@ class SerialDevice(Protocol):
         stop: bytes that end its stream.
     """
 
-    line: Line
+    line: PortSettings
     timing: StreamTiming
     ranges: Wrench
     stop: bytes
@@ -37,7 +36,7 @@ class SerialDevice(Protocol):
         """Return a scanner for the frames of the stream."""
         ...
 
-    def start(self, listener: Listener) -> dict[str, str]:
+    def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Set it up and start its stream; return who it is and how it is set."""
         ...
 
@@ -107,9 +106,9 @@ class SerialSensor:
                 trusted, or its rate is below 495 Hz.
         """
         device, scanner = self._device, self._device.scanner()
-        listener = Listener(self._link, self._clock, scanner)
-        self._facts = device.start(listener)
-        self._rate = listener.measure_rate(device.timing, device.line.rate_check)
+        dialog = SerialDialog(self._link, self._clock, scanner)
+        self._facts = device.start(dialog)
+        self._rate = dialog.measure_rate(device.timing, device.line.rate_check)
         scanner.counters = ScanCounters()
         self._begin(scanner)
 
@@ -128,7 +127,7 @@ class SerialSensor:
         if readings:
             self._reads += 1
             self._bursts += len(readings) > self._most_at_once
-        return self._dating.date(readings, now_ns, scanned.discarded - before)
+        return self._timestamper.date(readings, now_ns, scanned.discarded - before)
 
     def fileno(self) -> int:
         """Return the descriptor of the port, -1 if it has none."""
@@ -141,7 +140,7 @@ class SerialSensor:
     @property
     def counters(self) -> SensorCounters:
         """What happened to the stream since it was opened."""
-        scanned, dated = self._scanner.counters, self._dating
+        scanned, dated = self._scanner.counters, self._timestamper
         return SensorCounters(
             frames=scanned.frames,
             bad_checks=scanned.bad_checks,
@@ -180,6 +179,6 @@ class SerialSensor:
     def _begin(self, scanner: FrameScanner[Reading]) -> None:
         timing = self._device.timing
         self._scanner = scanner
-        self._dating = FrameDating(timing)
+        self._timestamper = SampleTimestamper(timing)
         self._bursts = self._reads = 0
         self._most_at_once = BURST_NS / timing.period_ns

@@ -17,7 +17,7 @@ _HEARD_SIZE = 2048  # answers are looked for in this much of what came last
 T = TypeVar("T")
 
 
-class Listener:
+class SerialDialog:
     """One side of a conversation with a sensor that may be streaming meanwhile.
 
     Attributes:

@@ -12,7 +12,7 @@ _SILENT_NS = 30_000_000  # longer than an adapter collects bytes
 _ALIKE = 0.1  # share by which a pause of the device and of the host may differ
 
 
-class ShownClock:
+class DeviceClock:
     """The time of a device that shows a clock or counts its frames.
 
     Attributes:
@@ -57,7 +57,7 @@ class ShownClock:
         return step_ns
 
 
-class CountedClock:
+class FrameCounter:
     """The time of a device that shows none: its frames are counted.
 
     Damaged bytes and long silence tell of lost frames at once. A loss that nobody saw
@@ -124,7 +124,7 @@ class CountedClock:
         return round(periods * period_ns)
 
 
-class FrameDating:
+class SampleTimestamper:
     """Turns readings into dated samples and notices what is missing or frozen.
 
     The newest reading of a batch left the sensor one wire time before it was read, at
@@ -139,7 +139,7 @@ class FrameDating:
     def __init__(self, timing: StreamTiming) -> None:
         self.frozen = 0
         self._timing = timing
-        self._device = ShownClock(timing) if timing.modulus else CountedClock(timing)
+        self._device = DeviceClock(timing) if timing.modulus else FrameCounter(timing)
         self._device_ns = 0
         self._fit = ClockFit()
         self._t_ns: int = -(1 << 62)
@@ -184,7 +184,7 @@ class FrameDating:
         self._device_ns += max(step_ns, 0)
         fit = self._fit
         device = self._device
-        if isinstance(device, CountedClock) and fit.has_line:
+        if isinstance(device, FrameCounter) and fit.has_line:
             excess_ns = latest_ns - fit.host_ns(self._device_ns)
             self._device_ns += device.correct(excess_ns, self._device_ns)
         fit.offer(self._device_ns, latest_ns)

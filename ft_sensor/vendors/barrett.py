@@ -13,8 +13,8 @@ from ft_sensor.vendors.barrett_frames import (
 )
 from wam.bus.frames import SENSOR_NODE, Payload, encode_get
 from wam.bus.link import Link
-from wam.bus.properties import Device, Role, Stat, property_number
-from wam.bus.property_client import Dialogue
+from wam.bus.properties import Device, PuckRole, PuckStatus, property_number
+from wam.bus.property_client import PropertyClient
 
 _FT = property_number(Device.SENSOR, "FT")
 _GET_FT = encode_get(_FT)
@@ -39,7 +39,7 @@ class _Identity:
 class BarrettSensor:
     """The force/torque sensor on a WAM's bus.
 
-    Implements `WrenchSensor` and, for the arm's driver, `Companion`: the driver sends
+    Implements `WrenchSensor` and, for the arm's driver, `BusDevice`: the driver sends
     its questions and hands it the frames.
 
     Attributes:
@@ -50,7 +50,7 @@ class BarrettSensor:
         self.counters = BarrettCounters()
         self._link = link
         self._clock = clock
-        self._dialogue = Dialogue(link, clock)
+        self._properties = PropertyClient(link, clock)
         self._identity = _Identity()
         self._pairing = WrenchPairing(self.counters)
         self._inbox: list[WrenchSample] = []
@@ -69,7 +69,7 @@ class BarrettSensor:
         """
         self._wake()
         role, vers, serial_number = (
-            self._dialogue.ask(SENSOR_NODE, number) for number in (_ROLE, _VERS, _SN)
+            self._properties.ask(SENSOR_NODE, number) for number in (_ROLE, _VERS, _SN)
         )
         first = self._exchange()
         if first is None:
@@ -110,8 +110,8 @@ class BarrettSensor:
         Raises:
             LinkError: the bus is down.
         """
-        self._dialogue.tell(SENSOR_NODE, _FT, 0)
-        self._dialogue.pause(_WAKE_NS)
+        self._properties.tell(SENSOR_NODE, _FT, 0)
+        self._properties.pause(_WAKE_NS)
         self._exchange()
 
     def describe(self) -> dict[str, str]:
@@ -138,17 +138,17 @@ class BarrettSensor:
         self._inbox = []
 
     def _wake(self) -> None:
-        stat = self._dialogue.ask(SENSOR_NODE, _STAT)
+        stat = self._properties.ask(SENSOR_NODE, _STAT)
         if stat is None:
             raise LinkTimeoutError(
                 "The F/T sensor (node 8) does not answer on the arm's bus.",
                 hint="Check its cable and the arm's power, or ft_sensor.kind.",
             )
-        if stat == Stat.RESET:
-            self._dialogue.tell(SENSOR_NODE, _STAT, Stat.READY)
-            self._dialogue.pause(_WAKE_NS + _BOOT_NS)
-            stat = self._dialogue.ask(SENSOR_NODE, _STAT)
-        if stat != Stat.READY:
+        if stat == PuckStatus.RESET:
+            self._properties.tell(SENSOR_NODE, _STAT, PuckStatus.READY)
+            self._properties.pause(_WAKE_NS + _BOOT_NS)
+            stat = self._properties.ask(SENSOR_NODE, _STAT)
+        if stat != PuckStatus.READY:
             raise DeviceFaultError(
                 f"The F/T sensor (node 8) is not ready: STAT {_text(stat)}, not 2.",
                 hint="Switch the arm off and on, then start again.",
@@ -156,7 +156,7 @@ class BarrettSensor:
 
     def _exchange(self) -> WrenchSample | None:
         """Ask outside the loop; return the answer, None if it does not come."""
-        self._dialogue.drain()
+        self._properties.drain()
         now_ns = self._clock.now_ns()
         deadline_ns = now_ns + _ANSWER_NS
         self._link.send(*self.request(now_ns))
@@ -177,5 +177,7 @@ def _text(value: int | None) -> str:
 def _role_text(role: int | None) -> str:
     if role is None:
         return "ROLE unknown"
-    is_usual = role & 0x1F == Role.FORCE
-    return f"ROLE {role:#06x}" + ("" if is_usual else f", usually {Role.FORCE:#06x}")
+    is_usual = role & 0x1F == PuckRole.FORCE
+    return f"ROLE {role:#06x}" + (
+        "" if is_usual else f", usually {PuckRole.FORCE:#06x}"
+    )

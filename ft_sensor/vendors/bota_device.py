@@ -6,8 +6,8 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
-from ft_sensor.serial_line.port_settings import Line
-from ft_sensor.serial_line.startup import FIRST_READINGS, Listener
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.startup import FIRST_READINGS, SerialDialog
 from ft_sensor.vendors import bota
 from ft_sensor.vendors.bota import BootText, BotaStatus
 
@@ -59,7 +59,7 @@ class BotaDevice:
 
     stop = bota.CONFIGURE
 
-    def __init__(self, line: Line, settings: BotaSettings) -> None:
+    def __init__(self, line: PortSettings, settings: BotaSettings) -> None:
         """Take line and settings.
 
         Raises:
@@ -89,7 +89,7 @@ class BotaDevice:
         """Return what the set bits of `status` say."""
         return bota.status_words(status)
 
-    def start(self, listener: Listener) -> dict[str, str]:
+    def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Set the sensor up and start its stream; return who it is and how it is set.
 
         Takes boot text or a running stream, for about three seconds; a sensor in
@@ -102,11 +102,11 @@ class BotaDevice:
                 inactive.
         """
         self._boot, self._answers = BootText(), 0
-        listener.wait_for(lambda: self._first_sign(listener), _LISTEN_NS)
+        dialog.wait_for(lambda: self._first_sign(dialog), _LISTEN_NS)
         if self._boot.is_complete:
             # It takes no commands before its stream runs.
-            listener.wait_for(lambda: listener.frames > 0 or None, _SETTLE_NS)
-        self._start_until_plausible(listener)
+            dialog.wait_for(lambda: dialog.frames > 0 or None, _SETTLE_NS)
+        self._start_until_plausible(dialog)
         fir = "on" if self._settings.is_fir_on else "off"
         unknown = "unknown (no boot text seen)"
         return {
@@ -118,47 +118,47 @@ class BotaDevice:
             "time": "device clock, fitted to arrival less wire time; filter unknown",
         }
 
-    def _first_sign(self, listener: Listener) -> bool | None:
-        self._boot = bota.find_boot_text(listener.heard)
-        return self._boot.is_complete or listener.frames > 0 or None
+    def _first_sign(self, dialog: SerialDialog) -> bool | None:
+        self._boot = bota.find_boot_text(dialog.heard)
+        return self._boot.is_complete or dialog.frames > 0 or None
 
-    def _start_until_plausible(self, listener: Listener) -> None:
+    def _start_until_plausible(self, dialog: SerialDialog) -> None:
         for _ in range(_RESETS):
-            self._set_up(listener)
-            if _is_plausible(listener.first_readings()):
+            self._set_up(dialog)
+            if _is_plausible(dialog.first_readings()):
                 return
-            listener.say(bota.SOFT_RESET)
-            listener.pause(_RESET_NS)
-            listener.forget()
+            dialog.say(bota.SOFT_RESET)
+            dialog.pause(_RESET_NS)
+            dialog.forget()
         raise DeviceFaultError(
             f"The F/T sensor sends raw gauge data or absurd forces after "
             f"{_RESETS} starts (limits {_MAX_FORCE:g} N, {_MAX_TORQUE:g} N m).",
             hint="Take its power away for ten seconds, then open it again.",
         )
 
-    def _set_up(self, listener: Listener) -> None:
+    def _set_up(self, dialog: SerialDialog) -> None:
         """Bring the sensor from any mode to a running stream; several tries."""
         for tries_left in reversed(range(_TRIES)):
             try:
-                self._configure_and_run(listener)
+                self._configure_and_run(dialog)
             except (DeviceFaultError, LinkTimeoutError):
-                known = self._answers or listener.frames or self._boot.is_started
+                known = self._answers or dialog.frames or self._boot.is_started
                 if not known:
-                    listener.refuse_stranger(self.line.baudrate)
+                    dialog.refuse_stranger(self.line.baudrate)
                 if not tries_left:
                     raise
             else:
                 return
 
-    def _configure_and_run(self, listener: Listener) -> None:
+    def _configure_and_run(self, dialog: SerialDialog) -> None:
         # A sensor already in configuration mode need not answer this one.
-        self._ask(listener, bota.CONFIGURE)
+        self._ask(dialog, bota.CONFIGURE)
         for command in (
             bota.communication_command(self.line.baudrate),
             bota.filter_command(self._settings.sinc, self._settings.is_fir_on),
             bota.RUN,
         ):
-            code = self._ask(listener, command)
+            code = self._ask(dialog, command)
             text = command.decode("ascii")
             if code is None:
                 raise LinkTimeoutError(
@@ -172,21 +172,21 @@ class BotaDevice:
                     hint="Check sinc length and speed against its manual.",
                 )
 
-    def _ask(self, listener: Listener, command: bytes) -> int | None:
+    def _ask(self, dialog: SerialDialog, command: bytes) -> int | None:
         """Send `command`; return the code of its answer, None when there is none."""
         for key in command:
-            listener.say(bytes((key,)))
-            listener.pause(_KEYSTROKE_NS)
+            dialog.say(bytes((key,)))
+            dialog.pause(_KEYSTROKE_NS)
         letter = chr(command[0])
 
         def answer() -> int | None:
-            for found in bota.find_acknowledgements(listener.heard):
+            for found in bota.find_acknowledgements(dialog.heard):
                 if found.letter == letter:
                     self._answers += 1
                     return found.code
             return None
 
-        return listener.wait_for(answer, _ANSWER_NS)
+        return dialog.wait_for(answer, _ANSWER_NS)
 
 
 def _is_plausible(readings: list[Reading]) -> bool:

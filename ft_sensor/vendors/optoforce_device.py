@@ -6,8 +6,8 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
-from ft_sensor.serial_line.port_settings import Line
-from ft_sensor.serial_line.startup import Listener
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.startup import SerialDialog
 from ft_sensor.vendors import optoforce
 
 BAUDRATE = 1_000_000
@@ -58,7 +58,7 @@ class OptoForceDevice:
 
     stop = optoforce.encode_configuration(optoforce.STOPPED, 0)
 
-    def __init__(self, line: Line, settings: OptoForceSettings) -> None:
+    def __init__(self, line: PortSettings, settings: OptoForceSettings) -> None:
         """Take line and settings.
 
         Raises:
@@ -88,7 +88,7 @@ class OptoForceDevice:
         """Return what a status says."""
         return optoforce.status_words(status)
 
-    def start(self, listener: Listener) -> dict[str, str]:
+    def start(self, dialog: SerialDialog) -> dict[str, str]:
         """See that it is the unit of the report, set it up and start its stream.
 
         Raises:
@@ -97,13 +97,13 @@ class OptoForceDevice:
             DeviceFaultError: it is another unit, runs firmware of an older protocol,
                 refused its settings, or reports a failure.
         """
-        listener.wait_for(lambda: listener.frames > 0 or None, _LISTEN_NS)
-        self._configure(listener, self.stop)
-        serial_number = self._serial_number(listener)
+        dialog.wait_for(lambda: dialog.frames > 0 or None, _LISTEN_NS)
+        self._configure(dialog, self.stop)
+        serial_number = self._serial_number(dialog)
         cutoff = self._settings.filter_hz
         codes = optoforce.SPEED_CODES[RATE], optoforce.FILTER_CODES[cutoff]
-        self._configure(listener, optoforce.encode_configuration(*codes))
-        self._refuse_failure(listener.first_readings())
+        self._configure(dialog, optoforce.encode_configuration(*codes))
+        self._refuse_failure(dialog.first_readings())
         return {
             "model": "OptoForce / OnRobot HEX, 6 axes",
             "serial_number": serial_number,
@@ -112,11 +112,11 @@ class OptoForceDevice:
             "time": "device counter, fitted to arrival less wire time; filter unknown",
         }
 
-    def _serial_number(self, listener: Listener) -> str:
+    def _serial_number(self, dialog: SerialDialog) -> str:
         for _ in range(_TRIES):
-            listener.say(optoforce.ASK_SERIAL)
-            found = listener.wait_for(
-                lambda: optoforce.find_serial_number(listener.heard), _ANSWER_NS
+            dialog.say(optoforce.ASK_SERIAL)
+            found = dialog.wait_for(
+                lambda: optoforce.find_serial_number(dialog.heard), _ANSWER_NS
             )
             if found is not None:
                 break
@@ -133,11 +133,11 @@ class OptoForceDevice:
             )
         return found
 
-    def _configure(self, listener: Listener, command: bytes) -> None:
+    def _configure(self, dialog: SerialDialog, command: bytes) -> None:
         for _ in range(_TRIES):
-            listener.say(command)
-            code = listener.wait_for(
-                lambda: optoforce.find_configuration_answer(listener.heard), _ANSWER_NS
+            dialog.say(command)
+            code = dialog.wait_for(
+                lambda: optoforce.find_configuration_answer(dialog.heard), _ANSWER_NS
             )
             if code == 0:
                 return
@@ -146,13 +146,13 @@ class OptoForceDevice:
                     f"The F/T sensor refused its configuration with code {code}.",
                     hint="Cycle its power; check filter_hz against its manual.",
                 )
-            if optoforce.is_older_protocol(listener.heard):
+            if optoforce.is_older_protocol(dialog.heard):
                 raise DeviceFaultError(
                     "The F/T sensor speaks an older protocol of its maker.",
                     hint="Its firmware has to be brought up to date.",
                 )
-        if not listener.frames:
-            listener.refuse_stranger(self.line.baudrate)
+        if not dialog.frames:
+            dialog.refuse_stranger(self.line.baudrate)
         raise LinkTimeoutError(
             f"The F/T sensor did not answer within {_TRIES * _ANSWER_NS / NS_PER_S:g} "
             "s.",

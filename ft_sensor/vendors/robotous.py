@@ -34,7 +34,7 @@ _COUNTS = struct.Struct(">6h")
 
 
 @dataclass(frozen=True, slots=True)
-class Model:
+class RobotousModel:
     """What a model measures.
 
     Attributes:
@@ -53,13 +53,13 @@ def _rated(fxy: float, fz: float, torque: float) -> Wrench:
 
 
 MODELS = {
-    "RFT40-SA01": Model(_rated(100.0, 150.0, 2.5), 2000.0, most_hz=200),
-    "RFT44-SB01": Model(_rated(100.0, 150.0, 2.5), 2000.0, most_hz=200),
-    "RFT60-HA01": Model(_rated(150.0, 200.0, 4.0), 2000.0),
-    "RFT64-SB01": Model(_rated(150.0, 200.0, 4.0), 2000.0),
-    "RFT76-HA01": Model(_rated(300.0, 300.0, 10.0), 2000.0),
-    "RFT82-HA02": Model(_rated(400.0, 400.0, 20.0), 1000.0),
-    "RFT80-6A01": Model(_rated(400.0, 400.0, 20.0), 1000.0),
+    "RFT40-SA01": RobotousModel(_rated(100.0, 150.0, 2.5), 2000.0, most_hz=200),
+    "RFT44-SB01": RobotousModel(_rated(100.0, 150.0, 2.5), 2000.0, most_hz=200),
+    "RFT60-HA01": RobotousModel(_rated(150.0, 200.0, 4.0), 2000.0),
+    "RFT64-SB01": RobotousModel(_rated(150.0, 200.0, 4.0), 2000.0),
+    "RFT76-HA01": RobotousModel(_rated(300.0, 300.0, 10.0), 2000.0),
+    "RFT82-HA02": RobotousModel(_rated(400.0, 400.0, 20.0), 1000.0),
+    "RFT80-6A01": RobotousModel(_rated(400.0, 400.0, 20.0), 1000.0),
 }
 
 

@@ -6,10 +6,10 @@ from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
-from ft_sensor.serial_line.port_settings import Line
-from ft_sensor.serial_line.startup import Listener
+from ft_sensor.serial_line.link import PortSettings
+from ft_sensor.serial_line.startup import SerialDialog
 from ft_sensor.vendors import robotous
-from ft_sensor.vendors.robotous import FIRMWARE, MODEL, MODELS, SERIAL, Model
+from ft_sensor.vendors.robotous import FIRMWARE, MODEL, MODELS, SERIAL, RobotousModel
 
 BAUDRATE = 921600
 _FIRST_BAUDRATE = 115200  # as it leaves the factory, at 200 Hz
@@ -59,7 +59,7 @@ class RobotousDevice:
 
     stop = robotous.encode_command(robotous.STOP)
 
-    def __init__(self, line: Line, settings: RobotousSettings) -> None:
+    def __init__(self, line: PortSettings, settings: RobotousSettings) -> None:
         """Take line and settings.
 
         Raises:
@@ -97,7 +97,7 @@ class RobotousDevice:
         """Return what the overload bits say."""
         return robotous.status_words(status)
 
-    def start(self, listener: Listener) -> dict[str, str]:
+    def start(self, dialog: SerialDialog) -> dict[str, str]:
         """Stop the sensor, identify it, set it up, read that back, start its stream.
 
         Raises:
@@ -106,20 +106,20 @@ class RobotousDevice:
             DeviceFaultError: it is an unknown model, too slow a model, or refused a
                 setting; or it spoke at the factory's speed and needs its power cycled.
         """
-        self._make_quiet(listener)
-        name = self._identify(listener)
+        self._make_quiet(dialog)
+        name = self._identify(dialog)
         facts = {
             "model": f"Robotous {name}",
-            "serial_number": self._text(listener, SERIAL),
-            "firmware": self._text(listener, FIRMWARE),
+            "serial_number": self._text(dialog, SERIAL),
+            "firmware": self._text(dialog, FIRMWARE),
         }
         if self.line.baudrate == _FIRST_BAUDRATE:
-            self._leave_first_baudrate(listener)
-        self._set_filter(listener)
-        self._set_rate(listener)
-        overloads = self._ask(listener, robotous.OVERLOADS)
-        listener.say(robotous.encode_command(robotous.STREAM))
-        self._refuse_absurd(listener.first_readings())
+            self._leave_first_baudrate(dialog)
+        self._set_filter(dialog)
+        self._set_rate(dialog)
+        overloads = self._ask(dialog, robotous.OVERLOADS)
+        dialog.say(robotous.encode_command(robotous.STREAM))
+        self._refuse_absurd(dialog.first_readings())
         low_pass = f"low-pass {self._settings.filter_hz} Hz"
         return {
             **facts,
@@ -128,18 +128,18 @@ class RobotousDevice:
             "time": "frames counted, fitted to arrival less wire time; no device clock",
         }
 
-    def _make_quiet(self, listener: Listener) -> None:
+    def _make_quiet(self, dialog: SerialDialog) -> None:
         """End a stream that an earlier program left; this command has no answer."""
-        listener.say(self.stop)
-        listener.pause(_QUIET_NS)
-        listener.forget()
+        dialog.say(self.stop)
+        dialog.pause(_QUIET_NS)
+        dialog.forget()
 
-    def _identify(self, listener: Listener) -> str:
+    def _identify(self, dialog: SerialDialog) -> str:
         try:
-            name = self._text(listener, MODEL)
+            name = self._text(dialog, MODEL)
         except LinkTimeoutError:
-            if not listener.frames:
-                listener.refuse_stranger(self.line.baudrate)
+            if not dialog.frames:
+                dialog.refuse_stranger(self.line.baudrate)
             raise
         found = _model_of(name)
         if found is None:
@@ -155,32 +155,32 @@ class RobotousDevice:
         self._model, self.ranges = found, found.ranges
         return name
 
-    def _leave_first_baudrate(self, listener: Listener) -> None:
+    def _leave_first_baudrate(self, dialog: SerialDialog) -> None:
         """Let the sensor speak faster from its next power-on; raises in any case."""
-        self._set(listener, robotous.SET_BAUDRATE, robotous.BAUD_CODES[BAUDRATE])
+        self._set(dialog, robotous.SET_BAUDRATE, robotous.BAUD_CODES[BAUDRATE])
         raise DeviceFaultError(
             f"At {_FIRST_BAUDRATE} baud the F/T sensor is too slow for the loop. It "
             f"was told to use {BAUDRATE} baud from its next power-on.",
             hint=f"Cycle its power and set baudrate = {BAUDRATE} in rig.toml.",
         )
 
-    def _set_filter(self, listener: Listener) -> None:
+    def _set_filter(self, dialog: SerialDialog) -> None:
         cutoff = self._settings.filter_hz
         wished = (1, robotous.FILTER_CODES[cutoff]) if cutoff else (0, 0)
-        self._set(listener, robotous.SET_FILTER, *wished)
-        got = self._ask(listener, robotous.GET_FILTER)
+        self._set(dialog, robotous.SET_FILTER, *wished)
+        got = self._ask(dialog, robotous.GET_FILTER)
         if (got[0], got[1] if got[0] else 0) != wished:
             raise _not_taken("filter", wished, tuple(got[:2]))
 
-    def _set_rate(self, listener: Listener) -> None:
+    def _set_rate(self, dialog: SerialDialog) -> None:
         wished = robotous.RATE_CODES[self._settings.rate]
-        self._set(listener, robotous.SET_RATE, wished)
-        got = self._ask(listener, robotous.GET_RATE)
+        self._set(dialog, robotous.SET_RATE, wished)
+        got = self._ask(dialog, robotous.GET_RATE)
         if got[0] != wished:
             raise _not_taken("rate", (wished,), (got[0],))
 
-    def _set(self, listener: Listener, command: int, *parameters: int) -> None:
-        answer = self._ask(listener, command, *parameters)
+    def _set(self, dialog: SerialDialog, command: int, *parameters: int) -> None:
+        answer = self._ask(dialog, command, *parameters)
         if answer[0] != 1:
             reason = robotous.ERRORS.get(answer[1], f"error {answer[1]}")
             raise DeviceFaultError(
@@ -189,19 +189,19 @@ class RobotousDevice:
                 hint="Check rate, filter and speed against its manual.",
             )
 
-    def _text(self, listener: Listener, command: int) -> str:
-        return robotous.text_of(self._ask(listener, command))
+    def _text(self, dialog: SerialDialog, command: int) -> str:
+        return robotous.text_of(self._ask(dialog, command))
 
-    def _ask(self, listener: Listener, command: int, *parameters: int) -> bytes:
+    def _ask(self, dialog: SerialDialog, command: int, *parameters: int) -> bytes:
         """Return the 15 bytes of the answer to `command`.
 
         Raises:
             LinkTimeoutError: it did not come, several times.
         """
         for _ in range(_TRIES):
-            listener.say(robotous.encode_command(command, *parameters))
-            found = listener.wait_for(
-                lambda: robotous.find_answer(listener.heard, command), _ANSWER_NS
+            dialog.say(robotous.encode_command(command, *parameters))
+            found = dialog.wait_for(
+                lambda: robotous.find_answer(dialog.heard, command), _ANSWER_NS
             )
             if found is not None:
                 return found
@@ -224,7 +224,7 @@ class RobotousDevice:
             )
 
 
-def _model_of(name: str) -> Model | None:
+def _model_of(name: str) -> RobotousModel | None:
     """Return what is known of a model that calls itself `name`."""
     plain = name.upper().replace(" ", "")
     for known, model in MODELS.items():

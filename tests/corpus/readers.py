@@ -10,9 +10,9 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
-from experiments.operator.scripted import ScriptKeys
-from experiments.session.crash_recovery import settle
-from experiments.session.journal import open_book
+from experiments.operator.scripted import ScriptedOperator
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
 from experiments.session.matrix_board import count_board
 from experiments.session.store import list_sessions
@@ -21,7 +21,7 @@ from experiments.settings.load import load_settings
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
-from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import bota, optoforce, robotous
 from wam.bus.decoder import BusReader
 from wam.bus.frames import (
@@ -56,7 +56,7 @@ _TIMING = StreamTiming(1_250_000.0, 803_000, _WRAP, 1000.0, 50_000_000, 37)
 
 
 def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None:
-    """Put a session with one hostile file into `folder` and look at it, then settle."""
+    """Put a session with one hostile file into `folder` and look at it, then recover_session."""
     path = folder / "sessions" / SESSION
     for below in ("trials", "rejected", "faults"):
         (path / below).mkdir(parents=True)
@@ -67,7 +67,7 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     count_board(folder, matrix)
     (session,) = list_sessions(folder)
     with session_lock(session):
-        settle(open_book(session, SystemClock()))
+        recover_session(open_journal(session, SystemClock()))
 
 
 def _settings(name: str) -> Callable[[bytes, Path], None]:
@@ -107,7 +107,7 @@ def _database(data: bytes, folder: Path) -> None:
 def _script(data: bytes, folder: Path) -> None:
     path = folder / "script.txt"
     path.write_bytes(data)
-    ScriptKeys(path)
+    ScriptedOperator(path)
 
 
 def _bus_log(data: bytes, _: Path) -> None:
@@ -137,10 +137,10 @@ def _sensor(data: bytes, _: Path) -> None:
         optoforce.scanner(_RANGES),
     )
     for scanner in scanners:
-        dating = FrameDating(_TIMING)
+        timestamper = SampleTimestamper(_TIMING)
         for at_ns, start in enumerate(range(0, len(data), 23)):
             readings = scanner.feed(data[start : start + 23])
-            dating.date(readings, at_ns * 1_000_000, 0)
+            timestamper.date(readings, at_ns * 1_000_000, 0)
     bota.find_boot_text(data)
     bota.find_acknowledgements(data)
     robotous.find_answer(data, 1)

@@ -11,7 +11,7 @@ from tests.corpus.readers import READERS
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class GuardVerdict:
     """What became of an input.
 
     Attributes:
@@ -32,7 +32,7 @@ class Verdict:
         return (not self.error or self.is_refused) and not self.strays
 
 
-def read(name: str, data: bytes) -> Verdict:
+def read(name: str, data: bytes) -> GuardVerdict:
     """Read `data` by the reader `name` in a folder of its own."""
     with tempfile.TemporaryDirectory(prefix="corpus-") as place:
         outside = Path(place)
@@ -53,4 +53,4 @@ def read(name: str, data: bytes) -> Verdict:
         seconds = time.process_time() - start
         found = {path for path in outside.rglob("*") if path.is_file()}
         strays = [path for path in found if folder not in path.parents]
-    return Verdict(error, is_refused, seconds, tuple(map(str, sorted(strays))))
+    return GuardVerdict(error, is_refused, seconds, tuple(map(str, sorted(strays))))

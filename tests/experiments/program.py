@@ -14,7 +14,7 @@ import pytest
 
 import fakes.world.rig
 from experiments.cli import main
-from experiments.operator.prompts import AutoKeys
+from experiments.operator.prompts import AutoOperator
 
 TRAVEL = 0.07  # m, a container that is crossed in a few seconds
 
@@ -101,13 +101,13 @@ def run_watched(config, data, *arguments, press=None):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fakes.world.rig, "FakeRig", Seen)
         if press is not None:
-            usual = AutoKeys.answer
+            usual = AutoOperator.answer
 
             def answer(self, asked):
                 key = press(asked, seen[0])
                 return usual(self, asked) if key is None else key
 
-            patch.setattr(AutoKeys, "answer", answer)
+            patch.setattr(AutoOperator, "answer", answer)
         done = run_short(config, data, "TF", *arguments)
     return Watched(done, only_session(data), seen[0])
 

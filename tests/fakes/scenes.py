@@ -4,7 +4,7 @@ import numpy as np
 
 from fakes.clock import SteppedClock
 from fakes.plant.plant import ArmPlant, PlantOptions
-from fakes.world.rig import FakeRig, Scene, solve_start
+from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
 from wam.model.arm_model import ArmModel
 from wam.model.constants import Body, load_constants
@@ -54,7 +54,7 @@ def sole(plant):
 
 def make_rig(seed=1, terrain="S0", stones="small", network=None):
     clock = SteppedClock()
-    scene = Scene(terrain, stones, "tread", FRAME, START_Q, seed)
+    scene = SimulatedScene(terrain, stones, "tread", FRAME, START_Q, seed)
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, network=network)
     clock.world = rig
     return rig, clock

@@ -2,7 +2,7 @@
 
 from tests.faults.expected import TABLE, Cell, End
 from tests.faults.processes import TABLE as PROCESSES
-from tests.faults.stage import PHASES
+from tests.faults.rehearse import PHASES
 
 HEAD = """\
 # Every fault in every phase

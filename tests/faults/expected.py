@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from acquisition.control_loop.states import ArmState
-from tests.faults.stage import PHASES
+from tests.faults.rehearse import PHASES
 
 HOLD, DAMP = ArmState.HOLD, ArmState.DAMP
 

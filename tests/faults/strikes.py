@@ -7,40 +7,40 @@ from dataclasses import replace
 
 import numpy as np
 
-from tests.faults.stage import MS, Scene, Strike, inject
+from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
 
 _J2, _J6 = 1, 5
 
 
-def _tighten(change: Callable[[Scene], dict[str, object]]) -> Strike:
+def _tighten(change: Callable[[SimulatedScene], dict[str, object]]) -> Strike:
     """Return a strike that moves limits to where the arm is, until it is mended."""
 
-    def strike(scene: Scene) -> None:
+    def inject(scene: SimulatedScene) -> None:
         cycle = scene.cycle
         scene.usual_limits = cycle._limits
         cycle._limits = replace(cycle._limits, **change(scene))
 
-    return strike
+    return inject
 
 
-def _behind_a_stop(scene: Scene) -> dict[str, object]:
+def _behind_a_stop(scene: SimulatedScene) -> dict[str, object]:
     upper = list(scene.cycle._limits.q_upper)
     upper[_J6] = float(scene.rig.plant.q[_J6]) - 0.01
     return {"q_upper": tuple(upper)}
 
 
-def _weak(scene: Scene) -> dict[str, object]:
+def _weak(scene: SimulatedScene) -> dict[str, object]:
     tau = list(scene.cycle._limits.tau)
     tau[_J2] = 0.5  # the arm's weight is more
     return {"tau": tuple(tau)}
 
 
-def _swing(scene: Scene) -> dict[str, object]:
+def _swing(scene: SimulatedScene) -> dict[str, object]:
     scene.rig.plant.qd[_J6] = 8.0
     return {"foot_speed": 0.2}
 
 
-def _nonsense(scene: Scene) -> None:
+def _nonsense(scene: SimulatedScene) -> None:
     """Let the control law come to no number."""
     nan = np.full(7, np.nan)
     scene.patch.setattr(scene.cycle._law, "torque", lambda _: (nan, nan))
@@ -49,14 +49,14 @@ def _nonsense(scene: Scene) -> None:
 def _stall(duration_ms: int) -> Strike:
     """Return a strike that takes the computer away from the loop."""
 
-    def strike(scene: Scene) -> None:
+    def inject(scene: SimulatedScene) -> None:
         clock = scene.rig._clock
         clock.sleep_until(clock.now_ns() + duration_ms * MS)
 
-    return strike
+    return inject
 
 
-def _step_utc(scene: Scene) -> None:
+def _step_utc(scene: SimulatedScene) -> None:
     clock = scene.rig._clock
     usual = clock.utc_ns
     scene.patch.setattr(clock, "utc_ns", lambda: usual() + 3600 * 1000 * MS)

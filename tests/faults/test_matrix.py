@@ -8,7 +8,7 @@ import pytest
 
 from tests.experiments.program import kept_and_sound, write_config
 from tests.faults.expected import TABLE, Cell, End, cells
-from tests.faults.stage import PHASES, resume, run_with
+from tests.faults.rehearse import PHASES, resume, run_with
 from tests.faults.strikes import strike_of
 
 pytestmark = pytest.mark.timeout(240)  # two simulated minutes on a busy machine

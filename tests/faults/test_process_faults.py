@@ -18,7 +18,7 @@ from acquisition.devices import SafetyMode
 from tests.experiments.program import traction, write_config
 from tests.faults.expected import End
 from tests.faults.processes import TABLE
-from tests.faults.stage import PHASES
+from tests.faults.rehearse import PHASES
 from tests.processes.watching import (
     NAMES,
     ROOT,
@@ -96,7 +96,7 @@ PROMPTS = {
 
 
 @dataclass
-class Scene:
+class SimulatedScene:
     """A session that waits in a phase."""
 
     seen: Session
@@ -150,7 +150,7 @@ def waiting_in(phase, folder, fault):
         )
     os.close(theirs)
     seen = Session(process, data)
-    scene = Scene(seen, ours, marker)
+    scene = SimulatedScene(seen, ours, marker)
     threading.Thread(target=scene.read_terminal, daemon=True).start()
     try:
         yield scene
@@ -187,7 +187,7 @@ def arrive(scene, phase):
     return True
 
 
-def strike(scene, fault):
+def inject(scene, fault):
     """Let `fault` happen."""
     seen, console = scene.seen, scene.seen.process.pid
     if fault.endswith(" killed"):
@@ -203,7 +203,7 @@ def strike(scene, fault):
 
 
 def is_safe(seen):
-    if seen.board is None:
+    if seen.shared is None:
         return True  # nobody has asked for the arm
     if is_running(seen.pids["control"]) and seen.status().is_running:
         return seen.status().control.state in SAFE
@@ -237,7 +237,7 @@ def is_survived(folder, fault, phase, cell):
         seen = scene.seen
         if not arrive(scene, phase):
             return False
-        strike(scene, fault)
+        inject(scene, fault)
         if cell.end is not End.COMPLETE:
             assert until(lambda: is_safe(seen), REACTION) is not None, seen.output()
         if cell.end is End.COMPLETE:

@@ -20,8 +20,7 @@ from fakes.sensor.optoforce import (
 from fakes.sensor.port import FakeSerialPort
 from fakes.sensor.robotous import RobotousOptions, robotous_stream
 from fakes.sensor.stream import SensorStream
-from ft_sensor.serial_line.link import SerialLink
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.sensor import SerialDevice, SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
@@ -76,7 +75,7 @@ class Make:
 
     stream: Callable[..., SensorStream]
     options: Callable[..., Any]
-    device: Callable[[Line], SerialDevice]
+    device: Callable[[PortSettings], SerialDevice]
     baudrate: int
     rate: float
     resolution: tuple[float, ...]
@@ -140,7 +139,9 @@ class SensorBench:
         self.port = ChunkedPort(self.device, self.clock, line_xor)
         self.port.chunk = chunk
         self.clock.world = self.port
-        self.driver = self.make.device(Line("/dev/sensor", self.make.baudrate, 0.25))
+        self.driver = self.make.device(
+            PortSettings("/dev/sensor", self.make.baudrate, 0.25)
+        )
         self.sensor = SerialSensor(SerialLink(self.port), self.clock, self.driver)
 
     def opened(self) -> "SensorBench":
@@ -179,7 +180,7 @@ class BusBench:
     def opened(self) -> "BusBench":
         self.arm.start()
         self.sensor.open()
-        self.arm.accompany(self.sensor)
+        self.arm.attach_device(self.sensor)
         return self
 
     def silence(self) -> None:

@@ -17,11 +17,11 @@ def rig():
     settings = load_settings(None)
     rig = build_rig(settings, settings.row(ROW), FakeOptions(is_fast=False, seed=1))
     yield rig
-    rig.crew.close()
+    rig.backend.close()
 
 
 def is_fresh(rig):
-    newest = rig.board.wrenches.last(1)
+    newest = rig.shared.wrenches.last(1)
     if not len(newest):
         return False
     age_ns = rig.clock.now_ns() - int(newest["t_ns"][0])
@@ -29,17 +29,17 @@ def is_fresh(rig):
 
 
 def test_a_sensor_is_read_again_after_it_was_unplugged(rig):
-    rig.crew.start_arm()
-    facts = rig.crew.open_sensor()
+    rig.backend.start_arm()
+    facts = rig.backend.open_sensor()
     assert until(lambda: is_fresh(rig), 2)
-    rig.rehearsal.inject("ft-unplugged")
+    rig.simulation.inject("ft-unplugged")
     assert until(lambda: not is_fresh(rig), 2)
     assert until(lambda: "serial port" in trouble(rig), 3), trouble(rig)
-    rig.rehearsal.mend()
+    rig.simulation.clear_faults()
     assert until(lambda: is_fresh(rig), FOUND_AGAIN), trouble(rig)
-    assert rig.crew.sensor_facts()["reopened"] == "1"
-    assert rig.crew.open_sensor()["model"] == facts["model"]
+    assert rig.backend.sensor_facts()["reopened"] == "1"
+    assert rig.backend.open_sensor()["model"] == facts["model"]
 
 
 def trouble(rig):
-    return rig.crew.sensor_facts()["trouble"]
+    return rig.backend.sensor_facts()["trouble"]

@@ -14,9 +14,9 @@ import can
 
 from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
-from acquisition.ipc.commands import StatusBoard
-from acquisition.ipc.layout import Board
-from acquisition.ipc.memory import SharedMemory
+from acquisition.ipc.commands import StatusSlot
+from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.rings import SharedMemory
 from fakes.bus.client import SocketBus
 
 ROOT = Path(__file__).parents[2]
@@ -77,7 +77,7 @@ class Session:
         self.process = process
         self.data = data
         self.pids = {}
-        self.board = None
+        self.shared = None
 
     def wait_for_trial(self):
         """Return when a trial is being recorded; False if the machine is too slow."""
@@ -91,7 +91,7 @@ class Session:
 
     def attach(self):
         """Look at the memory that the processes share."""
-        self.board = Board(SharedMemory(self._open_board()))
+        self.shared = SharedLayout(SharedMemory(self._open_board()))
 
     def has_stalled(self):
         """Return whether the arm was stopped because the machine stood still."""
@@ -104,7 +104,7 @@ class Session:
         return [json.loads(line) for line in paths[0].read_text().splitlines()]
 
     def status(self):
-        return StatusBoard(self.board.status).read()
+        return StatusSlot(self.shared.status).read()
 
     def pucks_mode(self):
         """Ask the simulated safety module for its mode, as another host on the bus."""
@@ -124,7 +124,7 @@ class Session:
 
     def newest_cycle_ns(self):
         """Return when the newest cycle on the board was measured [monotonic ns]."""
-        return int(self.board.cycles.last(1)["host_ns"][0])
+        return int(self.shared.cycles.last(1)["host_ns"][0])
 
     def has_trial_ended(self):
         """Return whether something was written after the trial's start."""

@@ -29,7 +29,7 @@ from wam.bus.frames import (
     split_id,
 )
 from wam.bus.log import LoggedFrame
-from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, Stat, names
+from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, names
 
 LIMIT_NS = 1_000_000  # an answer is late after this
 _GIVE_UP_NS = 1_000_000_000
@@ -50,7 +50,7 @@ _GROUP_NAMES = {
 }
 
 
-class Answer(Enum):
+class ReplyKind(Enum):
     """Answers that are not property replies, by the group they are sent to."""
 
     POSITION = Group.POSITION
@@ -61,16 +61,16 @@ class Answer(Enum):
 
 
 _SPECIAL = {
-    (Device.MOTOR, "P"): (Answer.POSITION,),
-    (Device.MOTOR, "JP"): (Answer.JOINT_ENCODER,),
-    (Device.SENSOR, "FT"): (Answer.FORCE, Answer.TORQUE),
-    (Device.SENSOR, "A"): (Answer.ACCELERATION,),
+    (Device.MOTOR, "P"): (ReplyKind.POSITION,),
+    (Device.MOTOR, "JP"): (ReplyKind.JOINT_ENCODER,),
+    (Device.SENSOR, "FT"): (ReplyKind.FORCE, ReplyKind.TORQUE),
+    (Device.SENSOR, "A"): (ReplyKind.ACCELERATION,),
 }
-_Key = tuple[int, Answer | int]  # node, and what it is to say: a property by number
+_Key = tuple[int, ReplyKind | int]  # node, and what it is to say: a property by number
 
 
 @dataclass(frozen=True, slots=True)
-class Spoken:
+class DecodedLine:
     """A sentence, and when it was said: UTC [ns]."""
 
     utc_ns: int
@@ -78,7 +78,7 @@ class Spoken:
 
 
 @dataclass(slots=True)
-class Tally:
+class BusSummary:
     """What a log adds up to.
 
     Attributes:
@@ -118,39 +118,41 @@ class BusReader:
     """
 
     def __init__(self) -> None:
-        self.tally = Tally()
+        self.tally = BusSummary()
         self._open: dict[_Key, list[int]] = {}  # when asked [ns], the oldest key first
         self._vers: dict[int, int] = {}
         self._asleep: set[int] = set()
 
-    def read(self, frame: LoggedFrame) -> list[Spoken]:
+    def read(self, frame: LoggedFrame) -> list[DecodedLine]:
         """Return what `frame` says, after the questions it shows to be unanswered."""
         self.tally.frames += 1
         spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
         if not frame.is_of_wam:
             self.tally.foreign += 1
             text = f"a frame no WAM uses: {frame.can_id:x}"
-            return [*spoken, Spoken(frame.utc_ns, text)]
+            return [*spoken, DecodedLine(frame.utc_ns, text)]
         address = split_id(frame.can_id)
         try:
             text = self._say(frame, address, spoken)
         except FrameError as error:
             text = f"{node_name(address.sender)}: {error.message}"
-        return [*spoken, Spoken(frame.utc_ns, text)]
+        return [*spoken, DecodedLine(frame.utc_ns, text)]
 
-    def finish(self) -> list[Spoken]:
+    def finish(self) -> list[DecodedLine]:
         """Return the questions still open at the end of the log."""
         newest = max((t for asked in self._open.values() for t in asked), default=0)
         return self._give_up(newest)
 
-    def _say(self, frame: LoggedFrame, address: Address, spoken: list[Spoken]) -> str:
+    def _say(
+        self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]
+    ) -> str:
         if address.sender == HOST:
             return self._hear_host(frame, address, spoken)
         who = node_name(address.sender)
         if address.is_group and address.to == Group.PROPERTY:
             return self._hear_reply(frame, address.sender)
-        if address.is_group and address.to in {answer.value for answer in Answer}:
-            answer = Answer(Group(address.to))
+        if address.is_group and address.to in {answer.value for answer in ReplyKind}:
+            answer = ReplyKind(Group(address.to))
             delay = self._answered((address.sender, answer), frame.utc_ns)
             return f"{who} {_describe(answer, frame.data)}{delay}"
         if address.is_group and address.to == Group.BUS:
@@ -158,7 +160,7 @@ class BusReader:
         return f"{who} sends {frame.can_id:03x} {frame.data.hex(' ')}"
 
     def _hear_host(
-        self, frame: LoggedFrame, address: Address, spoken: list[Spoken]
+        self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]
     ) -> str:
         nodes, whom = [address.to], node_name(address.to)
         if address.is_group:
@@ -193,7 +195,9 @@ class BusReader:
 
     def _learn(self, node: int, name: str, value: int) -> None:
         if name == "STAT":
-            (self._asleep.add if value == Stat.RESET else self._asleep.discard)(node)
+            (self._asleep.add if value == PuckStatus.RESET else self._asleep.discard)(
+                node
+            )
         elif name == "VERS" and node not in self._asleep and value >= FIRST_RELEASED:
             self._vers[node] = value
 
@@ -210,7 +214,7 @@ class BusReader:
     def _value(self, node: int, name: str, value: int) -> str:
         words: dict[int, str] = {}
         if name == "STAT":
-            words = {int(stat): stat.name for stat in Stat}
+            words = {int(stat): stat.name for stat in PuckStatus}
         elif name == "MODE":
             modes = SafetyMode if node == SAFETY_NODE else PuckMode
             words = {int(mode): mode.name for mode in modes}
@@ -220,11 +224,11 @@ class BusReader:
             return str(value)
         return f"{value} ({words[value].lower().replace('_', '-')})"
 
-    def _answers_to(self, node: int, number: int) -> tuple[Answer | int, ...]:
+    def _answers_to(self, node: int, number: int) -> tuple[ReplyKind | int, ...]:
         device = self._device(node)
         return _SPECIAL.get((device, self._name(node, number)), (number,))
 
-    def _ask(self, key: _Key, utc_ns: int) -> list[Spoken]:
+    def _ask(self, key: _Key, utc_ns: int) -> list[DecodedLine]:
         """Note a question; return the one it replaces if that had its time."""
         self.tally.questions += 1
         asked = self._open.get(key)
@@ -251,9 +255,9 @@ class BusReader:
             f", {'LATE: ' if is_late else ''}{delay_ns // 1000} us after the question"
         )
 
-    def _give_up(self, before_ns: int) -> list[Spoken]:
+    def _give_up(self, before_ns: int) -> list[DecodedLine]:
         """Drop the questions asked until `before_ns`."""
-        dropped: list[Spoken] = []
+        dropped: list[DecodedLine] = []
         while self._open:
             key = next(iter(self._open))
             if self._open[key][0] > before_ns:
@@ -261,9 +265,9 @@ class BusReader:
             dropped += self._drop(key)
         return dropped
 
-    def _drop(self, key: _Key) -> list[Spoken]:
+    def _drop(self, key: _Key) -> list[DecodedLine]:
         node, kind = key
-        if isinstance(kind, Answer):
+        if isinstance(kind, ReplyKind):
             name = kind.name.lower().replace("_", " ")
         else:
             name = self._name(node, kind)
@@ -271,21 +275,21 @@ class BusReader:
         asked = self._open.pop(key, [])
         if asked:
             self.tally.silent[what] += len(asked)
-        return [Spoken(t, f"UNANSWERED {what}") for t in asked]
+        return [DecodedLine(t, f"UNANSWERED {what}") for t in asked]
 
 
-def _describe(answer: Answer, data: bytes) -> str:
-    if answer is Answer.POSITION:
+def _describe(answer: ReplyKind, data: bytes) -> str:
+    if answer is ReplyKind.POSITION:
         encoder = decode_joint_encoder(data)
         extra = "" if encoder is None else f", joint encoder {encoder}"
         return f"is at {decode_position(data)}{extra}"
-    if answer is Answer.JOINT_ENCODER:
+    if answer is ReplyKind.JOINT_ENCODER:
         return f"has its joint encoder at {decode_position(data)}"
-    if answer is Answer.TORQUE:
+    if answer is ReplyKind.TORQUE:
         torque, status = decode_torque(data)
         extra = f", status {status:08b}" if status else ""
         return f"feels the torque {_triple(torque)} N m{extra}"
-    if answer is Answer.FORCE:
+    if answer is ReplyKind.FORCE:
         return f"feels the force {_triple(decode_force(data))} N"
     return f"feels the acceleration {_triple(decode_acceleration(data))} m/s2"
 

@@ -27,7 +27,7 @@ class Device(Enum):
     MONITOR = "sleeping puck"
 
 
-class Role(IntEnum):
+class PuckRole(IntEnum):
     """The low five bits of ROLE."""
 
     TATER = 0
@@ -39,7 +39,7 @@ class Role(IntEnum):
     FORCE = 6
 
 
-class Stat(IntEnum):
+class PuckStatus(IntEnum):
     """Values of STAT."""
 
     RESET = 0
@@ -58,16 +58,16 @@ class PuckMode(IntEnum):
     TRAPEZOIDAL = 5
 
 
-def device_of(role: int, stat: int = Stat.READY) -> Device | None:
+def device_of(role: int, stat: int = PuckStatus.READY) -> Device | None:
     """Return the table a device follows, None for a role no driver knows."""
-    if stat == Stat.RESET:
+    if stat == PuckStatus.RESET:
         return Device.MONITOR
     kinds = {
-        Role.TATER: Device.MOTOR,
-        Role.WRAPTOR: Device.MOTOR,
-        Role.BHAND: Device.MOTOR,
-        Role.SAFETY: Device.SAFETY,
-        Role.FORCE: Device.SENSOR,
+        PuckRole.TATER: Device.MOTOR,
+        PuckRole.WRAPTOR: Device.MOTOR,
+        PuckRole.BHAND: Device.MOTOR,
+        PuckRole.SAFETY: Device.SAFETY,
+        PuckRole.FORCE: Device.SENSOR,
     }
     return kinds.get(role & 0x1F)  # pyright: ignore[reportArgumentType, reportCallIssue]
 

@@ -17,7 +17,7 @@ from wam.bus.link import Frame, Link
 _ANSWER_NS = 50_000_000  # a puck answers within 1 ms; a slow adapter may sit on it
 
 
-class Dialogue:
+class PropertyClient:
     """Questions to devices outside the loop, one at a time.
 
     Replies carry no sequence number, so each is matched by device and property, and

@@ -27,7 +27,7 @@ _REACH = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
-class Halt:
+class MeasurementPose:
     """A place on the way.
 
     Attributes:
@@ -98,7 +98,7 @@ def plan_halts(
     floor: float,
     *,
     is_two_sided: bool = True,
-) -> list[Halt]:
+) -> list[MeasurementPose]:
     """Return the halts: each pose from below and from above, in every joint.
 
     The way begins at `start` [rad], shape (7,), goes by the upright pose and ends at
@@ -128,7 +128,7 @@ def plan_halts(
     way += [(upright, None), (start, None)]
     before = [start, *(q for q, _ in way[:-1])]
     return [
-        Halt(
+        MeasurementPose(
             q,
             APPROACH_SPEED
             if pose is not None and is_two_sided
@@ -174,7 +174,7 @@ def leg_speed(model: ArmModel, start: Array, goal: Array) -> float:
     return float(min(TOP_SPEED, max(fastest, APPROACH_SPEED)))
 
 
-def way_seconds(start: Array, halts: Sequence[Halt]) -> float:
+def way_seconds(start: Array, halts: Sequence[MeasurementPose]) -> float:
     """Return how long the moves take without the stops [s]."""
     total, here = 0.0, start
     for halt in halts:

@@ -13,11 +13,11 @@ from acquisition.errors import (
 )
 from wam.bus.frames import MOTOR_NODES
 from wam.bus.link import Link
-from wam.bus.property_client import Dialogue
-from wam.driver.cyclic_io import Companion, CycleTraffic
-from wam.driver.discovery import pucks_do
+from wam.bus.property_client import PropertyClient
+from wam.driver.cyclic_io import BusDevice, CycleTraffic
+from wam.driver.discovery import pucks_verb
 from wam.driver.health import PuckHealth
-from wam.driver.joint_estimator import Motion
+from wam.driver.joint_estimator import JointEstimator
 from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 from wam.driver.startup import ArmInfo, StartUp
@@ -49,11 +49,11 @@ class WamArm:
         self._clock = clock
         self._settings = settings or ArmSettings()
         self._traffic = CycleTraffic(link, clock, self._settings)
-        self._watch = self._traffic.watch
+        self._poller = self._traffic.poller
         self.counters = self._traffic.counters
-        self._dialogue = Dialogue(link, clock)
-        self._safety = SafetyModule(self._dialogue, clock, vers=0)
-        self._motion: Motion | None = None
+        self._properties = PropertyClient(link, clock)
+        self._safety = SafetyModule(self._properties, clock, vers=0)
+        self._motion: JointEstimator | None = None
         self._missing_cycles = 0
         self._is_commanded = True
         self._is_closed = False
@@ -73,9 +73,9 @@ class WamArm:
         """The safety module, for use outside the loop."""
         return self._safety
 
-    def accompany(self, companion: Companion) -> None:
+    def attach_device(self, bus_device: BusDevice) -> None:
         """Ask a device on the arm's bus along with the positions from now on."""
-        self._traffic.companion = companion
+        self._traffic.bus_device = bus_device
 
     def start(self) -> ArmInfo:
         """Find, wake and question the pucks; the arm can be read afterwards.
@@ -87,14 +87,14 @@ class WamArm:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        info = StartUp(self._dialogue, self._clock, self._settings).run()
-        self._safety = SafetyModule(self._dialogue, self._clock, info.safety_vers)
-        self._watch.set_firmware(info.safety_vers)
-        self._watch.note_mode(info.safety_mode)
-        self._watch.is_lowering = False
-        self._watch.note_pendant(info.pendant)
+        info = StartUp(self._properties, self._clock, self._settings).run()
+        self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
+        self._poller.set_firmware(info.safety_vers)
+        self._poller.note_mode(info.safety_mode)
+        self._poller.is_lowering = False
+        self._poller.note_pendant(info.pendant)
         health = [puck.health for puck in info.pucks]
-        self._watch.health.begin(health, self._clock.now_ns())
+        self._poller.health.begin(health, self._clock.now_ns())
         self._traffic.set_firmware(info.pucks[0].vers)
         transmission = Transmission(
             self._settings.j2mp,
@@ -102,13 +102,13 @@ class WamArm:
             tuple(puck.ipnm for puck in info.pucks),
             self._settings.torque_limits,
         )
-        self._motion = Motion(transmission, self._settings)
+        self._motion = JointEstimator(transmission, self._settings)
         self._begin_at_rest()
         pucks = tuple(
             replace(puck, health=dated)
             for puck, dated in zip(info.pucks, self.health(), strict=True)
         )
-        return replace(info, pucks=pucks, late_replies=self._dialogue.late_replies)
+        return replace(info, pucks=pucks, late_replies=self._properties.late_replies)
 
     def read(self, now_ns: int) -> ArmReading:
         """Ask for the joint positions at `now_ns` and return them.
@@ -159,15 +159,15 @@ class WamArm:
 
     def safety_mode(self) -> SafetyMode:
         """Return the last known mode; UNKNOWN when the module stopped answering."""
-        return self._watch.mode
+        return self._poller.mode
 
     def safety_warnings(self) -> tuple[str, ...]:
         """Return the monitors of the safety module that warn, as last heard."""
-        return self._watch.warnings
+        return self._poller.warnings
 
     def safety_faults(self) -> tuple[str, ...]:
         """Return the monitors of the safety module in fault, as last heard."""
-        return self._watch.faults
+        return self._poller.faults
 
     @property
     def is_bus_down(self) -> bool:
@@ -176,7 +176,7 @@ class WamArm:
 
     def health(self) -> tuple[PuckHealth, ...]:
         """Return what pucks 1 to 7 said last, and when; does not wait."""
-        return tuple(self._watch.health.pucks)
+        return tuple(self._poller.health.pucks)
 
     def idle(self) -> bool:
         """Brake the arm: module to IDLE, confirmed, then zero torque.
@@ -186,10 +186,10 @@ class WamArm:
         Never raises. Returns whether the module confirmed.
         """
         if self._is_closed:
-            return self._watch.mode in BRAKED
-        self._watch.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
-        if self._watch.mode not in BRAKED:
-            self._watch.is_lowering = True
+            return self._poller.mode in BRAKED
+        self._poller.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
+        if self._poller.mode not in BRAKED:
+            self._poller.is_lowering = True
             return False
         self._traffic.transmit([0] * MOTORS)
         self._look_at_pendant()
@@ -220,8 +220,8 @@ class WamArm:
         counts = motion.transmission.counts(q)
         self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)
         for node, value in zip(MOTOR_NODES, counts, strict=True):
-            self._dialogue.tell(node, self._traffic.p_number, value)
-            self._dialogue.pause(_MS)
+            self._properties.tell(node, self._traffic.p_number, value)
+            self._properties.pause(_MS)
         # The module must see the new positions while it still ignores speed.
         self._begin_at_rest()
         self._check_taken(counts, motion.counts)
@@ -232,7 +232,7 @@ class WamArm:
         if self._motion is None:
             return
         try:
-            self._watch.note_pendant(self._safety.pendant())
+            self._poller.note_pendant(self._safety.pendant())
         except LinkError:
             self.counters.link_errors += 1
         except DeviceFaultError:
@@ -246,7 +246,7 @@ class WamArm:
                 hint="The arm must not move while it is zeroed. Zero it again.",
             )
 
-    def _started(self) -> Motion:
+    def _started(self) -> JointEstimator:
         if self._motion is None:
             raise DeviceFaultError(
                 "The arm was not started.", hint="This is an error of the program."
@@ -265,6 +265,6 @@ class WamArm:
                 return
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
         raise LinkTimeoutError(
-            f"{pucks_do(silent)} not report a position.",
+            f"{pucks_verb(silent)} not report a position.",
             hint="Check the cable, or a puck in reset.",
         )

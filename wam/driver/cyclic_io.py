@@ -21,7 +21,7 @@ from wam.bus.frames import (
 from wam.bus.link import Link
 from wam.bus.properties import MODERN, Device, property_number
 from wam.driver.settings import ArmSettings
-from wam.driver.status_poller import Watch
+from wam.driver.status_poller import StatusPoller
 from wam.driver.transmission import MOTORS
 
 _ARM_ID = group_id(Group.ARM)
@@ -62,7 +62,7 @@ class LinkCounters:
         }
 
 
-class Companion(Protocol):
+class BusDevice(Protocol):
     """A device that is asked along with the positions, such as a wrist sensor.
 
     The loop never waits for it: its frames are heard when they have come, in this cycle
@@ -98,8 +98,8 @@ class CycleTraffic:
         self.arm_ns = 0
         self.sent = [0] * MOTORS
         self.sent_ns = 0
-        self.watch = Watch(link, settings)
-        self.companion: Companion | None = None
+        self.poller = StatusPoller(link, settings)
+        self.bus_device: BusDevice | None = None
         self.counters = LinkCounters()
         self.is_down = False
         self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
@@ -120,7 +120,7 @@ class CycleTraffic:
         Replies carry no number. What has come by now is late and thrown away. A motor
         that owes an earlier answer is given the time to send two: the last one counts.
         """
-        self.watch.begin_cycle(now_ns)
+        self.poller.begin_cycle(now_ns)
         self.arm_ns = 0
         self.received = [None] * MOTORS
         try:
@@ -154,17 +154,17 @@ class CycleTraffic:
         return True
 
     def ask(self, *, is_urgent: bool = False) -> None:
-        """Use the free bus time for the question that is due; see `Watch.ask`."""
+        """Ask the status question that is due in the free bus time."""
         try:
-            self.watch.ask(is_urgent=is_urgent)
+            self.poller.ask(is_urgent=is_urgent)
         except LinkError:
             self.counters.link_errors += 1
 
     def _ask_companion(self) -> None:
         """Send the companion's question; a refusal does not cost the positions."""
-        if self.companion is None:
+        if self.bus_device is None:
             return
-        can_id, data = self.companion.request(self._clock.now_ns())
+        can_id, data = self.bus_device.request(self._clock.now_ns())
         try:
             self._link.send(can_id, data)
         except LinkError:
@@ -203,9 +203,9 @@ class CycleTraffic:
                     received[index] = counts
                     found += 1
                 else:
-                    if self.companion is not None:
-                        self.companion.hear(can_id, data)
-                    self.watch.hear(can_id, data)
+                    if self.bus_device is not None:
+                        self.bus_device.hear(can_id, data)
+                    self.poller.hear(can_id, data)
             except DeviceFaultError:
                 self.counters.malformed += 1
         return found

@@ -6,8 +6,8 @@ from acquisition.clock import Clock
 from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, PreflightError
 from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
-from wam.bus.properties import Stat
-from wam.bus.property_client import Dialogue
+from wam.bus.properties import PuckStatus
+from wam.bus.property_client import PropertyClient
 from wam.driver.safety_module import SafetyModule
 
 _STAT = 5  # the same in every firmware
@@ -19,7 +19,9 @@ _SECOND_LOOK_NS = 50 * _MS  # it waits as long as for a puck that was woken
 _WRIST_NODES = [5, 6, 7]
 
 
-def call_roll(dialogue: Dialogue, clock: Clock, boot_ns: int) -> dict[int, int]:
+def discover_pucks(
+    properties: PropertyClient, clock: Clock, boot_ns: int
+) -> dict[int, int]:
     """Return STAT by node of everything on the bus, the arm being complete.
 
     Healthy devices answer within 1 ms. If one of the arm is silent, the bus is left
@@ -31,40 +33,44 @@ def call_roll(dialogue: Dialogue, clock: Clock, boot_ns: int) -> dict[int, int]:
         DeviceFaultError: a puck says that it does not work.
         LinkError: the bus is down.
     """
-    stats = _ask(dialogue, range(1, 32), _MS)
-    mode = _mode(dialogue, clock, stats)
+    stats = _ask(properties, range(1, 32), _MS)
+    mode = _mode(properties, clock, stats)
     for _ in range(_SECOND_LOOKS):
         silent = [node for node in _EXPECTED if node not in stats]
         if not silent or mode is SafetyMode.E_STOP:  # without power nobody answers
             break
-        dialogue.pause(boot_ns)
-        stats.update(_ask(dialogue, silent, _SECOND_LOOK_NS))
-        mode = _mode(dialogue, clock, stats)
+        properties.pause(boot_ns)
+        stats.update(_ask(properties, silent, _SECOND_LOOK_NS))
+        mode = _mode(properties, clock, stats)
     _check_present(stats, mode)
     return dict(sorted(stats.items()))
 
 
-def pucks_do(nodes: Sequence[int]) -> str:
+def pucks_verb(nodes: Sequence[int]) -> str:
     """Return "Puck 5 does" or "Pucks 5,6 do"."""
     names = ",".join(map(str, nodes))
     return f"Puck {names} does" if len(nodes) == 1 else f"Pucks {names} do"
 
 
-def _ask(dialogue: Dialogue, nodes: Iterable[int], within_ns: int) -> dict[int, int]:
+def _ask(
+    properties: PropertyClient, nodes: Iterable[int], within_ns: int
+) -> dict[int, int]:
     """Return STAT by node of those of `nodes` that answer in time."""
     found: dict[int, int] = {}
     for node in nodes:
-        stat = dialogue.ask(node, _STAT, within_ns)
+        stat = properties.ask(node, _STAT, within_ns)
         if stat is not None:
             found[node] = stat
     return found
 
 
-def _mode(dialogue: Dialogue, clock: Clock, stats: dict[int, int]) -> SafetyMode:
+def _mode(
+    properties: PropertyClient, clock: Clock, stats: dict[int, int]
+) -> SafetyMode:
     """Return the safety module's mode, UNKNOWN while it is silent."""
     if SAFETY_NODE not in stats:
         return SafetyMode.UNKNOWN
-    return SafetyModule(dialogue, clock, vers=0).mode()
+    return SafetyModule(properties, clock, vers=0).mode()
 
 
 def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
@@ -86,11 +92,11 @@ def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:
                 "Is this a four-joint WAM? Traction needs the wrist. Otherwise check "
                 "the cable behind puck 4."
             )
-        raise PreflightError(f"{pucks_do(missing)} not answer ({others}).", hint=hint)
-    ill = [n for n in present if stats[n] not in (Stat.RESET, Stat.READY)]
+        raise PreflightError(f"{pucks_verb(missing)} not answer ({others}).", hint=hint)
+    ill = [n for n in present if stats[n] not in (PuckStatus.RESET, PuckStatus.READY)]
     if ill:
         raise DeviceFaultError(
-            f"{pucks_do(ill)} not work: STAT {stats[ill[0]]}.",
+            f"{pucks_verb(ill)} not work: STAT {stats[ill[0]]}.",
             hint="Switch the arm off and on, then start again.",
         )
 

@@ -12,7 +12,7 @@ _LONGEST_GUESS = 0.05  # s; beyond, a silent joint is taken to stand still
 _PAUSE = 0.1  # s without any reading; positions may then be anywhere
 
 
-class Motion:
+class JointEstimator:
     """Positions and velocities of one arm out of replies that may be missing.
 
     Velocities are differences over the time between the requests that were answered,

@@ -11,15 +11,44 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkError
 from wam.bus.frames import SAFETY_NODE
 from wam.bus.properties import Device, property_number
-from wam.bus.property_client import Dialogue
-from wam.driver.safety_limits import SafetyLimits
+from wam.bus.property_client import PropertyClient
+
+COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
+WARNING_SHARE = 0.9  # of the fault's value, where no warning is given
+
+
+@dataclass(frozen=True, slots=True)
+class SafetyLimits:
+    """Limits of the safety module; the defaults are its own after power-up.
+
+    Attributes:
+        speed_warning: of elbow and forearm [m/s].
+        speed_fault: beyond it the module takes the arm to IDLE [m/s].
+        torque_warning_units: largest commanded torque of any motor [puck units].
+        torque_fault_units: beyond it the module takes the arm to IDLE [puck units].
+    """
+
+    speed_warning: float = 0.5
+    speed_fault: float = 1.0
+    torque_warning_units: int = 4731
+    torque_fault_units: int = 5204
+
+    def words(self) -> dict[str, int]:
+        """Return the value of each property, floored as libbarrett does."""
+        return {
+            "VL1": int(self.speed_warning * COUNTS_PER_SPEED),
+            "VL2": int(self.speed_fault * COUNTS_PER_SPEED),
+            "TL1": self.torque_warning_units,
+            "TL2": self.torque_fault_units,
+        }
+
 
 _MODE = 8  # the same in every firmware
 _RETRY_NS = 10_000_000
 _CONFIG_GAP_NS = 10_000_000  # configuration frames closer together are not promised
 
 
-class Level(IntEnum):
+class SafetyLevel(IntEnum):
     """State of one of the module's monitors."""
 
     SAFE = 1
@@ -27,7 +56,7 @@ class Level(IntEnum):
     FAULT = 4
 
 
-class Button(IntEnum):
+class PendantButton(IntEnum):
     """What is pressed on the pendant."""
 
     E_STOP = 0
@@ -48,25 +77,29 @@ class PendantWord:
         button: what is pressed.
     """
 
-    velocity: Level
-    torque: Level
-    voltage: Level
-    heartbeat: Level
-    other: Level
+    velocity: SafetyLevel
+    torque: SafetyLevel
+    voltage: SafetyLevel
+    heartbeat: SafetyLevel
+    other: SafetyLevel
     segments: int
     is_idle_lit: bool
     is_active_lit: bool
-    button: Button
+    button: PendantButton
 
     @property
     def faults(self) -> tuple[str, ...]:
         """Names of the monitors that report a fault."""
-        return tuple(name for name in MONITORS if getattr(self, name) is Level.FAULT)
+        return tuple(
+            name for name in MONITORS if getattr(self, name) is SafetyLevel.FAULT
+        )
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Names of the monitors that warn."""
-        return tuple(name for name in MONITORS if getattr(self, name) is Level.WARNING)
+        return tuple(
+            name for name in MONITORS if getattr(self, name) is SafetyLevel.WARNING
+        )
 
 
 MONITORS = ("velocity", "torque", "voltage", "heartbeat", "other")
@@ -84,7 +117,7 @@ def decode_pendant(word: int) -> PendantWord:
         segments=word >> 16 & 0xFF,
         is_idle_lit=bool(word >> 24 & 1),
         is_active_lit=bool(word >> 25 & 1),
-        button=Button(word >> 26 & 3),
+        button=PendantButton(word >> 26 & 3),
     )
 
 
@@ -105,8 +138,8 @@ def decode_mode(value: int) -> SafetyMode:
 class SafetyModule:
     """Client of the safety module, for use outside the loop."""
 
-    def __init__(self, dialogue: Dialogue, clock: Clock, vers: int) -> None:
-        self._dialogue = dialogue
+    def __init__(self, properties: PropertyClient, clock: Clock, vers: int) -> None:
+        self._properties = properties
         self._clock = clock
         self._vers = vers
 
@@ -117,7 +150,7 @@ class SafetyModule:
             LinkTimeoutError: the module is silent.
             DeviceFaultError: it answered a mode that does not exist.
         """
-        value = self._dialogue.require(SAFETY_NODE, _MODE, "MODE")
+        value = self._properties.require(SAFETY_NODE, _MODE, "MODE")
         mode = decode_mode(value)
         if mode is SafetyMode.UNKNOWN:
             raise DeviceFaultError(
@@ -140,14 +173,14 @@ class SafetyModule:
                 mode = decode_mode(value)
             if mode in (SafetyMode.IDLE, SafetyMode.E_STOP):
                 break
-            self._dialogue.pause(_RETRY_NS // 10)
+            self._properties.pause(_RETRY_NS // 10)
         return mode
 
     def _ask_down(self) -> int | None:
         """Ask for IDLE once; return MODE as answered, None without an answer."""
         try:
-            self._dialogue.tell(SAFETY_NODE, _MODE, SafetyMode.IDLE)
-            return self._dialogue.ask(SAFETY_NODE, _MODE, _RETRY_NS)
+            self._properties.tell(SAFETY_NODE, _MODE, SafetyMode.IDLE)
+            return self._properties.ask(SAFETY_NODE, _MODE, _RETRY_NS)
         except LinkError:
             return None
 
@@ -204,15 +237,15 @@ class SafetyModule:
 
     def _get(self, name: str) -> int:
         number = property_number(Device.SAFETY, name, self._vers)
-        return self._dialogue.require(SAFETY_NODE, number, name)
+        return self._properties.require(SAFETY_NODE, number, name)
 
     def _set(self, name: str, value: int) -> None:
         number = property_number(Device.SAFETY, name, self._vers)
-        self._dialogue.tell(SAFETY_NODE, number, value)
-        self._dialogue.pause(_CONFIG_GAP_NS)
+        self._properties.tell(SAFETY_NODE, number, value)
+        self._properties.pause(_CONFIG_GAP_NS)
 
 
-def _level(word: int, shift: int, name: str) -> Level:
+def _level(word: int, shift: int, name: str) -> SafetyLevel:
     bits = word >> shift & 7
     if bits not in (1, 2, 4):
         raise DeviceFaultError(
@@ -220,4 +253,4 @@ def _level(word: int, shift: int, name: str) -> Level:
             f"(word {word:08X}).",
             hint="Switch the arm off and on, then look at the pendant.",
         )
-    return Level(bits)
+    return SafetyLevel(bits)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from wam.driver.safety_limits import SafetyLimits
+from wam.driver.safety_module import SafetyLimits
 from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix, coupled_ratios
 
 _MS = 1_000_000

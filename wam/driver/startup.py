@@ -14,12 +14,12 @@ from wam.bus.properties import (
     POLES_OF_WRIST,
     Device,
     PuckMode,
-    Stat,
+    PuckStatus,
     device_of,
     property_number,
 )
-from wam.bus.property_client import Dialogue
-from wam.driver.discovery import call_roll, pucks_do
+from wam.bus.property_client import PropertyClient
+from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.safety_module import PendantWord, SafetyModule
 from wam.driver.settings import ArmSettings
@@ -84,8 +84,10 @@ class StartUp:
     It follows libbarrett's start-up, without its waits for a person.
     """
 
-    def __init__(self, dialogue: Dialogue, clock: Clock, settings: ArmSettings) -> None:
-        self._dialogue = dialogue
+    def __init__(
+        self, properties: PropertyClient, clock: Clock, settings: ArmSettings
+    ) -> None:
+        self._properties = properties
         self._clock = clock
         self._boot_ns = settings.boot_ns
         self._limits = settings.safety_limits
@@ -100,20 +102,20 @@ class StartUp:
             LinkTimeoutError: a device stopped answering on the way.
             LinkError: the bus is down.
         """
-        stats = call_roll(self._dialogue, self._clock, self._boot_ns)
-        safety_vers = self._dialogue.require(SAFETY_NODE, _VERS, "VERS")
+        stats = discover_pucks(self._properties, self._clock, self._boot_ns)
+        safety_vers = self._properties.require(SAFETY_NODE, _VERS, "VERS")
         _check_firmware("The safety module", safety_vers, MODERN)
-        safety = SafetyModule(self._dialogue, self._clock, safety_vers)
+        safety = SafetyModule(self._properties, self._clock, safety_vers)
         mode = safety.mode()
         safety.set_limits(self._limits)
-        asleep = [node for node, stat in stats.items() if stat == Stat.RESET]
+        asleep = [node for node, stat in stats.items() if stat == PuckStatus.RESET]
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
         self._check_wrist(pucks[-1])
         if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
             safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
-            self._dialogue.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
+            self._properties.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
@@ -121,7 +123,7 @@ class StartUp:
             safety_mode=safety.mode(),
             pendant=safety.pendant(),
             is_zeroed=safety.is_zeroed(),
-            late_replies=self._dialogue.late_replies,
+            late_replies=self._properties.late_replies,
         )
 
     def _wake(self, asleep: list[int]) -> None:
@@ -132,22 +134,22 @@ class StartUp:
         if not asleep:
             return
         for node in asleep:
-            self._dialogue.tell(node, _STAT, Stat.READY)
-            self._dialogue.pause(10 * _MS)
-        self._dialogue.pause(self._boot_ns)
-        stats = {node: self._dialogue.ask(node, _STAT) for node in asleep}
-        dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != Stat.READY]
+            self._properties.tell(node, _STAT, PuckStatus.READY)
+            self._properties.pause(10 * _MS)
+        self._properties.pause(self._boot_ns)
+        stats = {node: self._properties.ask(node, _STAT) for node in asleep}
+        dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY]
         if dozing:
             raise PreflightError(
-                f"{pucks_do(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
+                f"{pucks_verb(dozing)} not wake up within {self._boot_ns / 1e9:.1f} s.",
                 hint="Switch the arm off and on, then start again.",
             )
 
     def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
         # Asleep, VERS is the monitor's; only now does it select the right table.
-        vers = self._dialogue.require(node, _VERS, "VERS")
+        vers = self._properties.require(node, _VERS, "VERS")
         _check_firmware(f"Puck {node}", vers, OLDEST_DRIVEN)
-        role = self._dialogue.require(node, _ROLE, "ROLE")
+        role = self._properties.require(node, _ROLE, "ROLE")
         if device_of(role) is not Device.MOTOR:
             raise PreflightError(
                 f"Node {node} is not a motor puck (ROLE {role:#06x}).",
@@ -162,7 +164,7 @@ class StartUp:
         mech = None
         if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
             mech = self._get(node, "MECH", vers)
-        health = ask_health(lambda number: self._dialogue.ask(node, number))
+        health = ask_health(lambda number: self._properties.ask(node, number))
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
 
     def _check_wrist(self, puck: PuckInfo) -> None:
@@ -176,7 +178,7 @@ class StartUp:
 
     def _get(self, node: int, name: str, vers: int) -> int:
         number = property_number(Device.MOTOR, name, vers)
-        return self._dialogue.require(node, number, name)
+        return self._properties.require(node, number, name)
 
 
 def _check_firmware(who: str, found: int, needed: int) -> None:

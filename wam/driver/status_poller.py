@@ -31,7 +31,7 @@ _NODES: Final = {property_reply_id(node): node for node in MOTOR_NODES}
 _UNANSWERED_POLLS = 4  # this many questions without an answer: mode unknown
 
 
-class Watch:
+class StatusPoller:
     """Asks safety module and pucks how they are and keeps the newest answers.
 
     In a cycle there is one question at most. The mode goes before the pendant's word,

@@ -34,17 +34,23 @@ _Counts7 = tuple[
 ]
 
 
-class _Model(BaseModel):
+class ModelSection(BaseModel):
+    """A table of the constants file; unknown keys are refused."""
+
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class _Kinematics(_Model):
+class KinematicsSection(ModelSection):
+    """Denavit-Hartenberg: angles [pi rad], lengths and offsets [m]."""
+
     alpha_over_pi: _Vector7
     a: _Vector7
     d: _Vector7
 
 
-class _Limits(_Model):
+class LimitsSection(ModelSection):
+    """Joint stops [rad]."""
+
     lower: _Vector7
     upper: _Vector7
 
@@ -55,57 +61,75 @@ class _Limits(_Model):
         return self
 
 
-class _Home(_Model):
+class HomeSection(ModelSection):
+    """Joint positions [rad] at the home pose."""
+
     position: _Vector7
 
 
-class _Transmission(_Model):
+class TransmissionSection(ModelSection):
+    """Joint to motor positions, a matrix."""
+
     j2mp: tuple[_Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7]
 
 
-class _Pucks(_Model):
+class PucksSection(ModelSection):
+    """Encoder counts per turn, torque units per N m, poles."""
+
     cts: _Counts7
     ipnm: _Counts7
     poles: _Counts7
     mt: _Counts7
 
 
-class _Motors(_Model):
+class MotorsSection(ModelSection):
+    """Inertia of each drive [kg m^2]."""
+
     drive_inertia: _Vector7
 
 
-class _Link(_Model):
+class LinkSection(ModelSection):
+    """Mass [kg], centre [m] and inertia [kg m^2] of a link."""
+
     mass: float = Field(gt=0)
     com: _Vector3
     inertia: tuple[_Vector3, _Vector3, _Vector3]
 
 
-class _Friction(_Model):
+class FrictionSection(ModelSection):
+    """Coulomb [N m] and viscous [N m s/rad] friction of the joints."""
+
     coulomb: _Vector7
     viscous: _Vector7
 
 
-class _Control(_Model):
+class ConstantsControlSection(ModelSection):
+    """Gains of a joint controller [N m/rad], [N m s/rad]."""
+
     kp: _Vector7
     kd: _Vector7
 
 
-class _Gravity(_Model):
+class GravityConstantsSection(ModelSection):
+    """First moments [kg m] as the maker calibrates them."""
+
     mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
     poses: tuple[_Vector7, ...]
 
 
-class _File(_Model):
-    kinematics: _Kinematics
-    joint_limits: _Limits
-    home: _Home
-    transmission: _Transmission
-    pucks: _Pucks
-    motors: _Motors
-    links: tuple[_Link, ...] = Field(min_length=7, max_length=7)
-    gravity: _Gravity
-    friction: _Friction
-    control: _Control
+class ConstantsFile(ModelSection):
+    """The whole file."""
+
+    kinematics: KinematicsSection
+    joint_limits: LimitsSection
+    home: HomeSection
+    transmission: TransmissionSection
+    pucks: PucksSection
+    motors: MotorsSection
+    links: tuple[LinkSection, ...] = Field(min_length=7, max_length=7)
+    gravity: GravityConstantsSection
+    friction: FrictionSection
+    control: ConstantsControlSection
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +207,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
     if text is None:
         text = (resources.files("wam.data") / "wam7.toml").read_text()
     try:
-        file = _File.model_validate(tomllib.loads(text))
+        file = ConstantsFile.model_validate(tomllib.loads(text))
     except (tomllib.TOMLDecodeError, ValidationError, RecursionError) as error:
         raise SettingsError(
             f"The arm model cannot be read: {_reason(error)}.",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Limits
+from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import PERIOD_NS, Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
@@ -14,7 +14,7 @@ from acquisition.schema import CYCLE
 
 MS = 1_000_000
 START_NS = 1_000 * MS
-LIMITS = Limits(
+LIMITS = GuardLimits(
     q_lower=(-2.0,) * 7,
     q_upper=(2.0,) * 7,
     qd=(1.5,) * 7,

@@ -5,10 +5,10 @@ import pytest
 
 from acquisition.control_loop.guard import (
     Action,
+    GuardLimits,
     GuardState,
-    Limits,
+    GuardVerdict,
     Observation,
-    Verdict,
     check,
 )
 from acquisition.devices import ArmReading, SafetyMode
@@ -16,7 +16,7 @@ from acquisition.devices import ArmReading, SafetyMode
 MS = 1_000_000
 S = 1_000_000_000
 ARMED = GuardState(armed=0x7F)
-LIMITS = Limits(
+LIMITS = GuardLimits(
     q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
     q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
     qd=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
@@ -144,7 +144,7 @@ def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, reason):
 
 def test_a_quiet_cycle_passes():
     state, verdict = check(LIMITS, ARMED, QUIET)
-    assert verdict == Verdict(Action.NONE)
+    assert verdict == GuardVerdict(Action.NONE)
     assert state == ARMED
 
 
@@ -198,7 +198,7 @@ def test_no_fault_hides_a_more_severe_one():
 
 
 def test_damping_is_worse_than_holding_and_better_than_idle():
-    severities = [Verdict(action).severity for action in Action]
+    severities = [GuardVerdict(action).severity for action in Action]
     assert severities == sorted(severities)
     assert len(set(severities)) == 4
 
@@ -261,7 +261,7 @@ def test_only_joints_whose_limit_is_armed_are_judged():
 
 
 def late_cycles(times, state=ARMED):
-    verdict = Verdict(Action.NONE)
+    verdict = GuardVerdict(Action.NONE)
     for t_ns in times:
         changes = {"is_late": True, "host_ns": t_ns}
         state, verdict = check(LIMITS, state, seen(**changes))
@@ -311,7 +311,7 @@ def test_facts_are_told_in_the_units_of_the_message():
 
 
 def test_severity_counts_what_is_taken_from_the_arm():
-    assert {action: Verdict(action).severity for action in Action} == {
+    assert {action: GuardVerdict(action).severity for action in Action} == {
         Action.NONE: 0,
         Action.HOLD: 1,
         Action.DAMP: 2,

@@ -3,7 +3,7 @@ import os
 
 import pytest
 
-from acquisition.control_loop.realtime import Wish, choose_cores, request
+from acquisition.control_loop.realtime import RealtimeRequest, choose_cores, request
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def granting(monkeypatch):
 
 
 def test_what_the_kernel_refuses_is_named_with_what_it_needs(refusing):
-    grants = request(Wish(priority=80, core=1, nice=5))
+    grants = request(RealtimeRequest(priority=80, core=1, nice=5))
     assert [grant.is_granted for grant in grants] == [False] * 3
     assert [grant.what for grant in grants] == ["core 1", "SCHED_FIFO", "nice 5"]
     assert "EPERM" in grants[1].reason
@@ -34,7 +34,7 @@ def test_what_the_kernel_refuses_is_named_with_what_it_needs(refusing):
 
 
 def test_everything_wished_is_asked_for(granting):
-    grants = request(Wish(priority=80, core=1))
+    grants = request(RealtimeRequest(priority=80, core=1))
     assert [grant.is_granted for grant in grants] == [True, True]
     assert granting[0] == ("sched_setaffinity", (0, {1}))
     name, (pid, policy, parameter) = granting[1]
@@ -43,7 +43,7 @@ def test_everything_wished_is_asked_for(granting):
 
 
 def test_no_wish_asks_for_nothing(granting):
-    assert request(Wish()) == []
+    assert request(RealtimeRequest()) == []
     assert granting == []
 
 

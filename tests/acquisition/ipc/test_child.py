@@ -8,7 +8,7 @@ import pytest
 
 from acquisition.errors import LinkError
 from acquisition.ipc.child import Child, ProcessLostError
-from acquisition.ipc.layout import Board
+from acquisition.ipc.layout import SharedLayout
 
 pytestmark = pytest.mark.wall_clock
 HERE = "tests.acquisition.ipc.test_child"
@@ -20,7 +20,7 @@ def answering(station):
         "add": sum,
         "refuse": refuse,
         "settings": lambda _: dict(station.settings),
-        "write": lambda text: station.board.status.write(text.encode()),
+        "write": lambda text: station.shared.status.write(text.encode()),
         "descriptors": lambda _: descriptors(),
         "terminal": lambda _: os.getsid(0) == os.getpid(),
         "break": lambda _: 1 / 0,
@@ -57,15 +57,15 @@ def deaf(station):
 
 
 @pytest.fixture
-def board():
-    board = Board.create()
-    yield board
-    board.close()
+def shared():
+    shared = SharedLayout.create()
+    yield shared
+    shared.close()
 
 
 @pytest.fixture
-def child(board):
-    child = Child("helper", f"{HERE}:answering", {"word": "go"}, board)
+def child(shared):
+    child = Child("helper", f"{HERE}:answering", {"word": "go"}, shared)
     yield child
     child.stop()
 
@@ -81,9 +81,9 @@ def test_errors_of_a_child_arrive_as_errors(child):
     assert child.is_alive
 
 
-def test_the_board_is_shared(child, board):
+def test_the_board_is_shared(child, shared):
     child.ask("write", "hello")
-    assert board.status.read() == b"hello"
+    assert shared.status.read() == b"hello"
 
 
 def test_a_child_inherits_nothing_but_what_it_needs(child):
@@ -106,8 +106,8 @@ def test_a_child_that_breaks_leaves_its_last_words(child):
         child.ask("break")
 
 
-def test_a_child_that_fails_at_once_says_why(board):
-    child = Child("helper", f"{HERE}:failing", {"word": "nonsense"}, board)
+def test_a_child_that_fails_at_once_says_why(shared):
+    child = Child("helper", f"{HERE}:failing", {"word": "nonsense"}, shared)
     with pytest.raises(ProcessLostError, match="told nonsense"):
         child.ask("anything")
     child.stop()
@@ -120,7 +120,7 @@ def test_stopping_ends_a_child_and_can_be_repeated(child):
     assert not child.is_alive
 
 
-def test_a_deaf_child_is_killed(board):
-    child = Child("helper", f"{HERE}:deaf", {}, board)
+def test_a_deaf_child_is_killed(shared):
+    child = Child("helper", f"{HERE}:deaf", {}, shared)
     child.stop()
     assert not child.is_alive

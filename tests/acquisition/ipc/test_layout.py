@@ -4,40 +4,51 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.devices import WrenchSample
-from acquisition.ipc.layout import Board, Role, pack_wrench, unpack_wrenches
-from acquisition.ipc.memory import SharedMemory
+from acquisition.ipc.layout import (
+    ProcessRole,
+    SharedLayout,
+    pack_wrench,
+    unpack_wrenches,
+)
+from acquisition.ipc.rings import SharedMemory
 from acquisition.schema import CYCLE
 
 finite = st.floats(allow_nan=False)
-BOARD = Board.create()
+BOARD = SharedLayout.create()
 
 
 def test_two_who_map_the_same_memory_see_the_same():
-    one = Board.create()
-    other = Board(SharedMemory(one.memory.descriptor))
+    one = SharedLayout.create()
+    other = SharedLayout(SharedMemory(one.memory.descriptor))
     payload = (bytes(range(256)) * 3)[: CYCLE.size]
     one.cycles.write(payload)
     one.status.write(b"fine")
-    one.beats.beat(Role.READER, 7)
+    one.heartbeats.beat(ProcessRole.READER, 7)
     assert other.cycles.last(1).tobytes() == payload
     assert other.status.read() == b"fine"
-    assert other.beats.last_ns(Role.READER) == 7
+    assert other.heartbeats.last_ns(ProcessRole.READER) == 7
 
 
 def test_areas_do_not_overlap():
-    board = Board.create()
-    rings = (board.commands, board.cycles, board.wrenches, board.frames, board.timings)
+    shared = SharedLayout.create()
+    rings = (
+        shared.commands,
+        shared.cycles,
+        shared.wrenches,
+        shared.frames,
+        shared.timings,
+    )
     for number, ring in enumerate(rings, 1):
         size = ring.last(0).dtype.itemsize
         for _ in range(ring.slots):
             ring.write(bytes([number]) * size)
-    for slot in (board.status, board.recorder, board.health):
+    for slot in (shared.status, shared.recorder, shared.health):
         slot.write(b"\xff" * 8192)
     for number, ring in enumerate(rings, 1):
         records = ring.last(ring.slots)
         assert len(records) == ring.slots - 1
         assert set(records.tobytes()) == {number}
-    assert all(board.beats.last_ns(role) == 0 for role in Role)
+    assert all(shared.heartbeats.last_ns(role) == 0 for role in ProcessRole)
 
 
 @given(

@@ -5,9 +5,9 @@ import pytest
 from acquisition.control_loop.guard import Action
 from acquisition.control_loop.loop import PERIOD_NS, Tick
 from acquisition.control_loop.states import ArmState, ControlStatus
-from acquisition.ipc.commands import Kind, Mailbox, StatusBoard
-from acquisition.ipc.layout import Board, Role
-from acquisition.ipc.loop_server import Attendant, Surroundings
+from acquisition.ipc.commands import CommandKind, CommandQueue, StatusSlot
+from acquisition.ipc.layout import ProcessRole, SharedLayout
+from acquisition.ipc.loop_server import LoopHooks, LoopServer
 
 MS = 1_000_000
 START_NS = 10**12
@@ -50,23 +50,23 @@ class Loop:
     """An attendant whose periods pass when told; the console beats unless silent."""
 
     def __init__(self):
-        self.board = Board.create()
+        self.shared = SharedLayout.create()
         self.cycle = Cycle()
         self.now_ns = START_NS
         self.rung = 0
-        self.console = Mailbox(self.board.commands)
-        around = Surroundings(lambda: self.now_ns, lambda: {"puck": "warm"}, self.ring)
-        self.attendant = Attendant(self.cycle, Arm(), self.board, around)
+        self.console = CommandQueue(self.shared.commands)
+        around = LoopHooks(lambda: self.now_ns, lambda: {"puck": "warm"}, self.ring)
+        self.loop_server = LoopServer(self.cycle, Arm(), self.shared, around)
         self.number = 0
 
     def ring(self):
         self.rung += 1
 
-    def run(self, seconds, *, beating=(Role.CONSOLE, Role.RECORDER)):
+    def run(self, seconds, *, beating=(ProcessRole.CONSOLE, ProcessRole.RECORDER)):
         for _ in range(max(1, round(seconds * 500))):
             for role in beating:
-                self.board.beats.beat(role, self.now_ns)
-            self.attendant(Tick(self.number, self.now_ns, self.now_ns, False))
+                self.shared.heartbeats.beat(role, self.now_ns)
+            self.loop_server(Tick(self.number, self.now_ns, self.now_ns, False))
             self.number += 1
             self.now_ns += PERIOD_NS
 
@@ -80,31 +80,31 @@ def loop():
 
 
 def test_commands_reach_the_cycle_and_are_confirmed(loop):
-    loop.console.post(Kind.ENTER, ArmState.FLOAT)
-    loop.console.post(Kind.WATCH_TRIAL, 1)
-    loop.console.post(Kind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
-    number = loop.console.post(Kind.MOVE, values=(*GOAL, 0.25))
+    loop.console.post(CommandKind.ENTER, ArmState.FLOAT)
+    loop.console.post(CommandKind.WATCH_TRIAL, 1)
+    loop.console.post(CommandKind.SET_BIAS, values=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    number = loop.console.post(CommandKind.MOVE, values=(*GOAL, 0.25))
     loop.run(0.002)
     assert loop.cycle.requests == [ArmState.FLOAT]
     assert loop.cycle.is_recording
     assert loop.cycle.biases == [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)]
     assert loop.cycle.goals == [(GOAL, 0.25)]
-    assert StatusBoard(loop.board.status).read().obeyed == number
+    assert StatusSlot(loop.shared.status).read().obeyed == number
 
 
 def test_the_loop_ends_when_it_is_told_to_leave(loop):
     loop.run(0.01)
-    assert not loop.attendant.is_over
-    loop.console.post(Kind.LEAVE)
+    assert not loop.loop_server.is_over
+    loop.console.post(CommandKind.LEAVE)
     loop.run(0.002)
-    assert loop.attendant.is_over
+    assert loop.loop_server.is_over
 
 
 def test_the_end_of_the_loop_can_be_seen(loop):
     loop.run(0.01)
-    assert StatusBoard(loop.board.status).read().is_running
-    loop.attendant.leave()
-    assert not StatusBoard(loop.board.status).read().is_running
+    assert StatusSlot(loop.shared.status).read().is_running
+    loop.loop_server.leave()
+    assert not StatusSlot(loop.shared.status).read().is_running
 
 
 def test_a_beating_console_and_recorder_leave_the_arm_alone(loop):
@@ -136,34 +136,34 @@ def test_an_arm_left_alone_for_a_minute_rings_every_second(loop):
     assert loop.rung == 0
     loop.run(3.2, beating=())
     assert loop.rung == 3
-    assert not loop.attendant.is_over
+    assert not loop.loop_server.is_over
 
 
 def test_a_silent_recorder_stops_a_trial_only(loop):
     loop.run(0.1)
-    loop.run(1.0, beating=(Role.CONSOLE,))
+    loop.run(1.0, beating=(ProcessRole.CONSOLE,))
     assert loop.cycle.reports == []
     loop.cycle.is_recording = True
-    loop.run(0.002, beating=(Role.CONSOLE,))
+    loop.run(0.002, beating=(ProcessRole.CONSOLE,))
     assert loop.reasons() == {"recorder-silent"}
 
 
 def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
     loop.run(0.1)
-    loop.attendant.is_orphaned = True
+    loop.loop_server.is_orphaned = True
     loop.run(0.002)
     assert loop.reasons() == {"console-lost"}
     loop.run(0.998)
     assert loop.cycle.requests == []
     loop.run(0.01)
     assert set(loop.cycle.requests) == {ArmState.IDLE}
-    assert loop.attendant.is_over
+    assert loop.loop_server.is_over
 
 
 def test_the_loop_shows_that_it_is_alive_and_when_what_happened(loop):
     loop.run(0.004)
-    assert loop.board.beats.last_ns(Role.CONTROL) == START_NS + PERIOD_NS
-    (first, second) = loop.board.timings.last(2)
+    assert loop.shared.heartbeats.last_ns(ProcessRole.CONTROL) == START_NS + PERIOD_NS
+    (first, second) = loop.shared.timings.last(2)
     assert int(second["number"]) == int(first["number"]) + 1
     assert int(second["replies_ns"]) == START_NS + PERIOD_NS + 700_000
     assert int(second["sent_ns"]) == Arm.sent_ns
@@ -171,9 +171,9 @@ def test_the_loop_shows_that_it_is_alive_and_when_what_happened(loop):
 
 def test_what_the_devices_say_is_published_once_a_second(loop):
     loop.run(0.002)
-    version = loop.board.health.version
-    assert json.loads(loop.board.health.read()) == {"puck": "warm"}
+    version = loop.shared.health.version
+    assert json.loads(loop.shared.health.read()) == {"puck": "warm"}
     loop.run(0.99)
-    assert loop.board.health.version == version
+    assert loop.shared.health.version == version
     loop.run(0.02)
-    assert loop.board.health.version != version
+    assert loop.shared.health.version != version

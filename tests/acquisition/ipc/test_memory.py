@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from acquisition.ipc.memory import SharedMemory, give_back_heap
+from acquisition.ipc.rings import SharedMemory, give_back_heap
 
 MB = 1_000_000
 

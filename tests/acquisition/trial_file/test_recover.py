@@ -15,7 +15,7 @@ from acquisition.sample import Flag
 from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover, recovered_path
-from acquisition.trial_file.salvage import Salvage, recorded_seconds
+from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
 from acquisition.trial_file.verify import verify
 from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
 from tests.acquisition.ros import messages_of
@@ -76,7 +76,7 @@ def chunks(data):
 
 def salvaged_messages(data, path):
     """Return the log time of every message salvaged from `data`."""
-    salvage = Salvage(data, path)
+    salvage = SoundRecords(data, path)
     found = [r.log_time for r in salvage if hasattr(r, "log_time")]
     return found, salvage
 

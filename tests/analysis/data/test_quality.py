@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.data.quality import Coverage, coverage, quick_ratio, suggest
+from analysis.data.quality import CoverageGrid, coverage, quick_ratio, suggest
 
 
 class Trial:
@@ -28,17 +28,17 @@ def test_speed_counts_in_both_directions():
 def test_the_emptiest_cell_a_person_can_aim_at_is_suggested():
     counts = np.full((4, 4), 100)
     counts[1, 2] = 1
-    assert suggest(Coverage(counts)) == "slower than 0.05 m/s, pressing harder"
+    assert suggest(CoverageGrid(counts)) == "slower than 0.05 m/s, pressing harder"
 
 
 def test_nothing_is_suggested_when_every_aim_is_covered():
-    assert suggest(Coverage(np.full((4, 4), 100))) == ""
+    assert suggest(CoverageGrid(np.full((4, 4), 100))) == ""
 
 
 def test_cells_nobody_can_aim_at_are_not_asked_for():
     counts = np.full((4, 4), 100)
     counts[3, 3] = counts[0, 0] = 0
-    assert suggest(Coverage(counts)) == ""
+    assert suggest(CoverageGrid(counts)) == ""
 
 
 def test_without_a_trial_nothing_is_suggested():

@@ -11,10 +11,13 @@ from analysis.figures.confusion import shares_of
 from analysis.figures.trials import way_of
 from analysis.findings.as_numbers import findings_rows, plain_findings
 from analysis.findings.findings import find
-from analysis.findings.noise_summary import noise_summaries
-from analysis.findings.residuals import residual_band
 from analysis.findings.surfaces import cell_edges, coverages
-from analysis.findings.trends import fit_trend, trends_of
+from analysis.findings.trends import (
+    fit_trend,
+    noise_summaries,
+    residual_band,
+    trends_of,
+)
 from analysis.study.fits import to_csv, to_plain
 from analysis.study.models import GP_SE, GP_SE_NOISE, FitOptions
 from analysis.study.study import StudyOptions, run_study

@@ -7,7 +7,7 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.regression import posterior_search
-from analysis.gp.search import Scores, maximise
+from analysis.gp.search import StartScores, maximise
 
 SE = SquaredExponential(2)
 MODEL = (SE, ConstantNoise())
@@ -39,7 +39,7 @@ def search(objective, rough=None):
     def exact(theta):
         return objective(theta)[0]
 
-    scores = Scores(rough or exact, exact)
+    scores = StartScores(rough or exact, exact)
     return maximise(MODEL, objective, ROWS, 1.0, scores)
 
 

@@ -7,7 +7,7 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.figures.curves import draw_excerpts
 from analysis.figures.errors import draw_cross_map, draw_errors
-from analysis.figures.selection import best_excerpt
+from analysis.figures.selection import best_window
 from analysis.figures.style import render, styled
 from analysis.findings.findings import find
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
@@ -155,8 +155,8 @@ def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study
 
 
 def test_excerpt_holds_slips_where_there_are_some(small_study):
-    assert len(best_excerpt(small_study.terrains["S0"]).slips) >= 2
-    assert len(best_excerpt(small_study.terrains["TF"]).slips) == 0
+    assert len(best_window(small_study.terrains["S0"]).slips) >= 2
+    assert len(best_window(small_study.terrains["TF"]).slips) == 0
 
 
 def test_summary_counts_what_was_kept(small_study):

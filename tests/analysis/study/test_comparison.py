@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.study.comparison import compare, standard_error
+from analysis.study.metrics import compare, standard_error
 
 
 def test_ten_differences_of_one_sign_are_as_rare_as_two_patterns_in_1024():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.data.prepare import PrepareOptions, prepare
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
@@ -86,7 +86,7 @@ def test_scores_of_a_fold_are_those_of_its_model_on_the_unseen_trial(trials):
     task = tasks[0]
     result = run_fold(task)
     foreign = [rows for (rows,) in task.others.values()]
-    tested = Rows.joined([task.training, *foreign])
+    tested = SampleTable.joined([task.training, *foreign])
     where = tested.count - foreign[-1].count
     assert list(task.others)[-1] == "TF"
     for name in (TUSTIN, GP_SE):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from analysis.data.rows import Rows, Training
+from analysis.data.samples import SampleTable, TrainingSet
 from analysis.gp.regression import fit_gp
 from analysis.study.metrics import Prediction
 from analysis.study.noise_selection import TailedNoise, choose_noise
@@ -13,9 +13,9 @@ def training(noise, trials=6, seed=0):
     rng = np.random.default_rng(seed)
     count = trials * PER_TRIAL
     F_n, v_t = rng.uniform(1, 8, count), rng.uniform(0.01, 0.2, count)
-    rows = Rows(F_n, v_t, 0.5 * F_n + noise(rng, F_n))
+    rows = SampleTable(F_n, v_t, 0.5 * F_n + noise(rng, F_n))
     chosen = rng.choice(count, 100, replace=False)
-    return Training(rows, (PER_TRIAL,) * trials, chosen)
+    return TrainingSet(rows, (PER_TRIAL,) * trials, chosen)
 
 
 def test_constant_noise_is_kept_where_it_is_the_truth():
@@ -63,6 +63,6 @@ def test_tails_keep_the_mean_and_state_their_standard_deviation():
 
 def test_without_rows_outside_the_chosen_there_are_no_tails():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
-    everything = Training(data.rows, data.lengths, np.arange(data.rows.count))
+    everything = TrainingSet(data.rows, data.lengths, np.arange(data.rows.count))
     process = fit_gp(data.subset.inputs, data.subset.F_t)
     assert TailedNoise.of(process, everything) is None

@@ -18,7 +18,7 @@ from analysis.terrains.export import database_of
 from analysis.terrains.identify import (
     Confusion,
     Expert,
-    Scores,
+    TerrainScores,
     identify_study,
     kind_of,
     log_densities,
@@ -150,11 +150,13 @@ def test_the_paper_s_rule_stands_beside_the_density(found):
 def test_many_half_convinced_models_of_one_kind_outvote_a_single_one():
     density = np.zeros((10, 3))
     density[:, 2] = 0.05  # the plate is a little likelier than either bed
-    scores = Scores(("S0", "S10", "TF"), density, np.zeros((10, 3)), np.zeros((10, 3)))
+    scores = TerrainScores(
+        ("S0", "S10", "TF"), density, np.zeros((10, 3)), np.zeros((10, 3))
+    )
     rows = slice(0, 10)
     assert scores.likeliest(rows) == "TF"
     assert scores.likeliest_kind(rows, surface_of) == "rocky"
-    sure = Scores(scores.terrains, 100.0 * density, scores.error, scores.strain)
+    sure = TerrainScores(scores.terrains, 100.0 * density, scores.error, scores.strain)
     assert sure.likeliest_kind(rows, surface_of) == "flat"
 
 
@@ -217,16 +219,16 @@ def test_more_traction_than_there_is_is_a_risk(path):
 
 
 def test_the_tables_are_close_to_the_model_between_their_points(study, path):
-    from analysis.data.rows import Rows, Training
+    from analysis.data.samples import SampleTable, TrainingSet
     from analysis.study.models import FITTERS
     from analysis.terrains.export import _STREAM, zlib
 
     trials = study.terrains["S0"].trials
-    rows = Rows.of(trials)
+    rows = SampleTable.of(trials)
     key = (study.options.fit.seed, zlib.crc32(b"S0"), _STREAM)
     chosen = np.random.default_rng(key).choice(rows.count, 60, replace=False)
     lengths = tuple(trial.kept for trial in trials)
-    model = FITTERS[GP_SE](Training(rows, lengths, chosen), study.options.fit)
+    model = FITTERS[GP_SE](TrainingSet(rows, lengths, chosen), study.options.fit)
     F_n = np.linspace(2.6, 4.4, 37)
     v_t = np.linspace(0.021, 0.079, 37)
     exact = model.predict(F_n, v_t)

@@ -6,7 +6,7 @@ from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare
-from analysis.data.rows import Rows
+from analysis.data.samples import SampleTable
 from analysis.tustin.bootstrap import bootstrap_tustin
 from analysis.tustin.box_least_squares import solve_in_box
 from analysis.tustin.identifiability import correlation_samples
@@ -36,7 +36,7 @@ def samples(vectors):
 @pytest.fixture
 def stones(slice_trials):
     trials = [prepare(series, PrepareOptions()) for series in slice_trials["S0"]]
-    return Rows.of(trials)
+    return SampleTable.of(trials)
 
 
 def test_equation_one_has_the_reference_values(vectors):

@@ -8,7 +8,7 @@ from analysis.data.prepare import PrepareOptions, prepare
 from analysis.data.series import TractionSeries
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from analysis.validation.bands import BANDS, Band, Finding, hold_against_bands
+from analysis.validation.bands import BANDS, Band, BandResult, hold_against_bands
 from analysis.validation.model_measures import model_measures
 from analysis.validation.slip_measures import GroundTrials, slip_measures
 from tests.fakes.point_foot import PointFoot
@@ -36,7 +36,7 @@ def test_there_are_forty_three_bands_and_each_has_its_name():
     ],
 )
 def test_a_band_is_met_when_every_value_is_inside(values, is_met):
-    assert Finding(BAND, values).is_met is is_met
+    assert BandResult(BAND, values).is_met is is_met
 
 
 def test_what_was_not_measured_is_not_met():
@@ -46,7 +46,7 @@ def test_what_was_not_measured_is_not_met():
 
 
 def test_several_values_are_told_by_the_smallest_and_the_largest():
-    assert Finding(BAND, (0.31, 0.22, 0.28)).text == "0.22 .. 0.31"
+    assert BandResult(BAND, (0.31, 0.22, 0.28)).text == "0.22 .. 0.31"
 
 
 # --- slips, samples, rest -------------------------------------------------------------

@@ -11,7 +11,7 @@ import fakes.world.rig
 from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
 from experiments.calibrating import pose_walk as walk
-from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from fakes.plant.plant import PlantOptions
 from tests.experiments.program import traction, write_config
 from wam.calibration import poses as calibration_poses
@@ -65,13 +65,13 @@ def calibrate(out, *options, press=None, is_quick=True):
             patch.setattr(calibration_poses, "APPROACH_SPEED", 0.1)
             patch.setattr(calibration_poses, "_REACH", 0.6 * calibration_poses._REACH)
         if press is not None:
-            usual = AutoKeys.answer
+            usual = AutoOperator.answer
 
             def answer(self, asked):
                 press(asked, HeavierRig.made[-1])
                 return usual(self, asked)
 
-            patch.setattr(AutoKeys, "answer", answer)
+            patch.setattr(AutoOperator, "answer", answer)
         arguments = ("calibrate", "gravity", "--fake", "--fast", "--out", out)
         return traction(*arguments, *options), HeavierRig.made[-1]
 

@@ -54,7 +54,7 @@ class OtherRig(fakes.world.rig.FakeRig):
 class DriftingErrors(SensorErrors):
     """A sensor that goes on drifting while it is calibrated."""
 
-    def settle(self):
+    def recover_session(self):
         """Do not settle."""
 
 

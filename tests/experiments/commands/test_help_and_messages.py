@@ -19,7 +19,7 @@ from acquisition.ipc.child import ProcessLostError
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
 from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
-from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.preflight import preflight
 from experiments.rig import fake as simulated
 from experiments.rig import inline as inline_crew
@@ -84,7 +84,7 @@ def give_up(prompt):
 
 
 @dataclass
-class Scene:
+class SimulatedScene:
     """A copy of the session on the disk, and who works on it.
 
     Attributes:
@@ -114,16 +114,16 @@ class Scene:
         self.patch.setattr(
             fakes.world.rig, "FakeRig", self._seen(fakes.world.rig.FakeRig, "rigs")
         )
-        crew = self._seen(simulated.InlineCrew, "crews")
-        self.patch.setattr(simulated, "InlineCrew", crew)
-        usual = AutoKeys.answer
+        backend = self._seen(simulated.InProcessBackend, "crews")
+        self.patch.setattr(simulated, "InProcessBackend", backend)
+        usual = AutoOperator.answer
 
         def answer(keys, asked):
             found = press(asked, self) if press is not None else None
             found = hurry(asked) if found is None else found
             return usual(keys, asked) if found is None else found
 
-        self.patch.setattr(AutoKeys, "answer", answer)
+        self.patch.setattr(AutoOperator, "answer", answer)
 
     def _seen(self, kind, name):
         seen = getattr(self, name)
@@ -152,7 +152,7 @@ class Case:
         words: what the message says beside the words of the catalogue.
     """
 
-    act: Callable[[Scene], Done]
+    act: Callable[[SimulatedScene], Done]
     code: int
     mode: SafetyMode | None = IDLE
     words: str = ""
@@ -189,11 +189,11 @@ def acted(prompt, act, code=5, words="", since=0.1) -> Case:
 def struck(name, mode=IDLE, words="") -> Case:
     """Return the case of a fault of the devices during the tare, which ends it all."""
 
-    def strike(scene):
+    def inject(scene):
         scene.rig.faults()[name]()
 
     return Case(
-        lambda scene: resume(scene, press=once(Prompt.LIFT, strike)), 4, mode, words
+        lambda scene: resume(scene, press=once(Prompt.LIFT, inject)), 4, mode, words
     )
 
 
@@ -236,7 +236,7 @@ def _weak(scene):
 
 
 def _not_a_number(scene):
-    law = scene.crews[-1].desk.passing._loop._cycle._cycle._law
+    law = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle._law
     scene.patch.setattr(
         type(law), "torque", lambda *_: (np.full(7, np.nan), np.zeros(7))
     )
@@ -244,19 +244,19 @@ def _not_a_number(scene):
 
 def _deaf(scene):
     """Let the console show no sign of life for 0.6 s."""
-    desk, left = scene.crews[-1].desk, [30]
-    usual = desk.beat
+    loop_client, left = scene.crews[-1].loop_client, [30]
+    usual = loop_client.beat
 
     def beat():
         left[0] -= 1
         if left[0] < 0:
             usual()
 
-    desk.beat = beat
+    loop_client.beat = beat
 
 
 def _orphan(scene):
-    scene.crews[-1].desk.passing._loop._cycle.is_orphaned = True
+    scene.crews[-1].loop_client.advance_cycles._loop._cycle.is_orphaned = True
 
 
 def _stuck_recorder(scene):
@@ -264,14 +264,14 @@ def _stuck_recorder(scene):
 
 
 def _move(scene):
-    scene.crews[-1].desk.move_to([0.0] * 7, 0.1)
+    scene.crews[-1].loop_client.move_to([0.0] * 7, 0.1)
 
 
 def _lose_recorder(scene):
-    def passing(cycles):
+    def advance_cycles(cycles):
         raise ProcessLostError("recorder", "killed by signal 9")
 
-    scene.crews[-1].desk.passing = passing
+    scene.crews[-1].loop_client.advance_cycles = advance_cycles
 
 
 def _swing(scene):
@@ -280,7 +280,7 @@ def _swing(scene):
 
 def _narrow(scene):
     """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
-    cycle = scene.crews[-1].desk.passing._loop._cycle._cycle
+    cycle = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle
     upper = (*cycle._limits.q_upper[:5], 1.0, cycle._limits.q_upper[6])
     cycle._limits = replace(cycle._limits, q_upper=upper)
 
@@ -301,7 +301,7 @@ def _no_loop(scene):
 
 def _lost_sensor(scene):
     facts = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(inline_crew.InlineCrew, "sensor_facts", lambda _: facts)
+    scene.patch.setattr(inline_crew.InProcessBackend, "sensor_facts", lambda _: facts)
     return resume(scene)
 
 
@@ -477,7 +477,7 @@ def scene(base, config, tmp_path, monkeypatch):
     shutil.copytree(base, tmp_path / "data")
     monkeypatch.setattr(taring, "TARE_SECONDS", 0.5)
     monkeypatch.setattr(tare, "MIN_DURATION", 0.4)
-    return Scene(tmp_path / "data", config, monkeypatch)
+    return SimulatedScene(tmp_path / "data", config, monkeypatch)
 
 
 def pattern(name):

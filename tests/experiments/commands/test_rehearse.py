@@ -9,7 +9,7 @@ import pytest
 from acquisition.trial_file.reader import TrialReader
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings
-from experiments.tools import acceptance as rehearsal
+from experiments.tools import acceptance as simulation
 from tests.experiments.program import traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -65,8 +65,8 @@ def rehearsed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rehearsed")
     config = two_terrains(folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rehearsal, "_record", in_this_process)
-        patch.setattr(rehearsal, "_pool", lambda _: InThisThread())
+        patch.setattr(simulation, "_record", in_this_process)
+        patch.setattr(simulation, "_pool", lambda _: InThisThread())
         done = traction(
             *("rehearse", "--trials", 1, "--seed", 3, "--jobs", 1),
             *("--config", config, "--data", folder),
@@ -109,8 +109,8 @@ def test_what_every_session_said_is_kept(rehearsed):
 def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
     config = two_terrains(tmp_path)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rehearsal, "_record", in_this_process)
-        patch.setattr(rehearsal, "_pool", lambda _: InThisThread())
+        patch.setattr(simulation, "_record", in_this_process)
+        patch.setattr(simulation, "_pool", lambda _: InThisThread())
         done = traction(
             *("rehearse", "--trials", 1, "--friction", 1, "--jobs", 1),
             *("--config", config, "--data", tmp_path),

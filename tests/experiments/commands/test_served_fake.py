@@ -9,8 +9,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from fakes.bus.client import SocketBus, open_socket
-from ft_sensor.serial_line.link import SerialLink, open_port
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings, SerialLink, open_port
 from ft_sensor.serial_line.sensor import SerialSensor
 from tests.experiments.program import run_short, traction
 from tests.ft_sensor.sensor_bench import MAKES
@@ -191,7 +190,7 @@ def test_a_sensor_is_served_to_a_driver_in_another_process(tmp_path, kind):
         clock = SystemClock()
         make = MAKES[kind]
         link = SerialLink(open_port(str(path), make.baudrate).port)
-        driver = make.device(Line(str(path), make.baudrate, 0.5))
+        driver = make.device(PortSettings(str(path), make.baudrate, 0.5))
         sensor = SerialSensor(link, clock, driver)
         sensor.open()
         found, end_ns = [], clock.now_ns() + int(PATIENCE * 1e9)

@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 
 from experiments.operator.console import Console
-from experiments.operator.cues import Cue, Cues, build_cues
-from experiments.operator.speech import Speaker, find_speech
+from experiments.operator.feedback import (
+    FeedbackSignal,
+    OperatorFeedback,
+    SpeechOutput,
+    build_cues,
+    find_speech,
+)
 from experiments.settings.rig import OperatorSection
-from experiments.trial.header import PaceWatch
+from experiments.trial.header import PaceMonitor
 
 
 class Terminal(io.StringIO):
@@ -37,9 +42,9 @@ class Words:
 
 def rung(stream, *, bell=True):
     with contextlib.redirect_stdout(stream):
-        cues = build_cues(OperatorSection(bell=bell), Console())
-        for cue in Cue:
-            cues.give(cue)
+        feedback = build_cues(OperatorSection(bell=bell), Console())
+        for cue in FeedbackSignal:
+            feedback.give(cue)
     return stream.getvalue()
 
 
@@ -57,16 +62,18 @@ def test_the_bell_can_be_switched_off():
 
 def test_cues_are_spoken_in_fixed_words_and_end_with_the_session():
     words = Words()
-    cues = Cues(Console(), words, rings=False)
-    for cue in Cue:
-        cues.give(cue)
-    cues.close()
+    feedback = OperatorFeedback(Console(), words, rings=False)
+    for cue in FeedbackSignal:
+        feedback.give(cue)
+    feedback.close()
     assert words.said == ["recording", "slower", "done"]
     assert words.is_closed
 
 
 def test_nobody_speaks_unless_asked(monkeypatch):
-    monkeypatch.setattr("experiments.operator.cues.find_speech", lambda: "/bin/speak")
+    monkeypatch.setattr(
+        "experiments.operator.feedback.find_speech", lambda: "/bin/speak"
+    )
     assert build_cues(OperatorSection(), Console())._speaker is None
     speaking = build_cues(OperatorSection(speech=True), Console())
     assert speaking._speaker.program == "/bin/speak"
@@ -110,36 +117,36 @@ def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
         return started[-1]
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    speaker = Speaker(str(program))
-    speaker.say("slower; touch /tmp/x")
+    speech = SpeechOutput(str(program))
+    speech.say("slower; touch /tmp/x")
     with started[0].stdout as heard:
         assert heard.readline() == b"heard\n"
-    speaker.close()
+    speech.close()
     assert (tmp_path / "said").read_text() == "True ['slower; touch /tmp/x']"
     assert started[0].returncode == -9  # ended, not waited for
 
 
 def test_new_words_cut_the_old_ones_short(program):
-    speaker = Speaker(str(program))
-    speaker.say("recording")
-    first = speaker._speaking
-    speaker.say("done")
+    speech = SpeechOutput(str(program))
+    speech.say("recording")
+    first = speech._speaking
+    speech.say("done")
     assert first.returncode == -9
-    assert speaker._speaking.poll() is None
-    speaker.close()
-    speaker.close()
-    assert speaker._speaking is None
+    assert speech._speaking.poll() is None
+    speech.close()
+    speech.close()
+    assert speech._speaking is None
 
 
 def test_a_speech_program_that_cannot_start_stops_nobody(tmp_path):
-    speaker = Speaker(str(tmp_path / "gone"))
-    speaker.say("recording")
-    assert speaker._speaking is None
+    speech = SpeechOutput(str(tmp_path / "gone"))
+    speech.say("recording")
+    assert speech._speaking is None
     assert os.listdir(tmp_path) == []  # noqa: PTH208
 
 
 def too_fast(speeds, dt=0.02):
-    watch = PaceWatch()
+    watch = PaceMonitor()
     path = np.cumsum(np.array(speeds) * dt)
     return [i * dt for i, x in enumerate(path) if watch.is_too_fast(i * dt, float(x))]
 

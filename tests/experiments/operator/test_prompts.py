@@ -8,19 +8,19 @@ from experiments.fault_injection.plan import FaultPlan, parse_fault
 from experiments.operator.prompts import (
     AUTO_ATTEMPTS,
     AUTO_PATIENCE,
-    Asked,
-    AutoKeys,
+    AutoOperator,
     Prompt,
-    RehearsedHand,
+    PromptState,
+    SimulatedHand,
 )
 from experiments.operator.select import choose_keys
-from experiments.operator.terminal import TerminalKeys
+from experiments.operator.terminal import TerminalInput
 
 KNOWN = ("ft-stale", "ft-silent", "estop")
 
 
 def asked(prompt, *, attempt=1, is_complete=False, since=0.0):
-    return Asked(prompt, 1, attempt, is_complete, since)
+    return PromptState(prompt, 1, attempt, is_complete, since)
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def asked(prompt, *, attempt=1, is_complete=False, since=0.0):
     ],
 )
 def test_the_automatic_operator_presses_the_obvious_key(question, key):
-    assert AutoKeys().answer(question) == key
+    assert AutoOperator().answer(question) == key
 
 
 def test_the_hand_does_each_thing_once_per_prompt():
@@ -48,18 +48,18 @@ def test_the_hand_does_each_thing_once_per_prompt():
         def __getattr__(self, name):
             return lambda *arguments: done.append((name, *arguments))
 
-    hand = RehearsedHand(Recorder())
+    hand = SimulatedHand(Recorder())
     for prompt in (Prompt.LIFT, Prompt.LIFT, Prompt.READY, Prompt.READY):
-        hand.follow(Asked(prompt, 2, 3, False, 0.0))
-    hand.follow(Asked(Prompt.RECORDING, 2, 3, False, 0.0))
-    hand.follow(Asked(Prompt.REVIEW, 2, 3, True, 0.0))
+        hand.follow(PromptState(prompt, 2, 3, False, 0.0))
+    hand.follow(PromptState(Prompt.RECORDING, 2, 3, False, 0.0))
+    hand.follow(PromptState(Prompt.REVIEW, 2, 3, True, 0.0))
     assert done == [("lift",), ("prepare", 2002), ("put_down",), ("push",), ("rest",)]
 
 
 @pytest.mark.parametrize("stdin", [None, io.StringIO()])
 def test_a_simulation_without_a_terminal_runs_by_itself(monkeypatch, stdin):
     monkeypatch.setattr(sys, "stdin", stdin)
-    assert isinstance(choose_keys(None, is_fake=True), AutoKeys)
+    assert isinstance(choose_keys(None, is_fake=True), AutoOperator)
 
 
 @pytest.mark.parametrize("stdin", [None, io.StringIO()])
@@ -74,7 +74,7 @@ def test_a_person_at_a_terminal_is_asked(monkeypatch):
     terminal.isatty = lambda: True
     terminal.fileno = lambda: 99
     monkeypatch.setattr(sys, "stdin", terminal)
-    assert isinstance(choose_keys(None, is_fake=False), TerminalKeys)
+    assert isinstance(choose_keys(None, is_fake=False), TerminalInput)
 
 
 @pytest.mark.parametrize(

@@ -5,8 +5,8 @@ import termios
 
 import pytest
 
-from experiments.operator.prompts import Asked, AutoKeys, Prompt
-from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalKeys, keyboard
+from experiments.operator.prompts import AutoOperator, Prompt, PromptState
+from experiments.operator.terminal import LONGEST_LINE, Cbreak, TerminalInput, keyboard
 
 
 @pytest.fixture
@@ -20,12 +20,12 @@ def terminal():
 
 
 def asked(prompt=Prompt.REVIEW):
-    return Asked(prompt, 1, 1, True, 0.0)
+    return PromptState(prompt, 1, 1, True, 0.0)
 
 
 def keys_of(terminal):
     person, program = terminal
-    keys = TerminalKeys(program)
+    keys = TerminalInput(program)
     keys.answer(asked())  # the prompt is on the screen before anything is typed
     return person, keys
 
@@ -37,7 +37,7 @@ def local_flags(descriptor):
 def test_a_key_counts_without_enter_and_is_not_echoed(terminal):
     person, program = terminal
     with Cbreak(program):
-        keys = TerminalKeys(program)
+        keys = TerminalInput(program)
         keys.answer(asked())
         os.write(person, b"k")
         assert keys.answer(asked()) == "k"
@@ -122,9 +122,9 @@ def test_a_keyboard_that_is_unplugged_quits(terminal):
 def test_only_keys_of_a_terminal_switch_it_over(terminal):
     _, program = terminal
     before = termios.tcgetattr(program)
-    with keyboard(AutoKeys()):
+    with keyboard(AutoOperator()):
         assert termios.tcgetattr(program) == before
-    with keyboard(TerminalKeys(program)):
+    with keyboard(TerminalInput(program)):
         assert termios.tcgetattr(program) != before
 
 

@@ -8,7 +8,7 @@ import pytest
 from acquisition.devices import SafetyMode
 from experiments.operator.prompts import Prompt
 from experiments.session.reducer import replay
-from experiments.session.states import OPEN, Event, Phase
+from experiments.session.states import OPEN, Event, SessionPhase
 from tests.experiments.program import (
     journal,
     kept_and_sound,
@@ -32,22 +32,22 @@ class Moment:
     """
 
     prompt: Prompt
-    phase: Phase
+    phase: SessionPhase
     code: int = 5
-    end: Phase = Phase.UNFINISHED
+    end: SessionPhase = SessionPhase.UNFINISHED
     rejected: int = 0
     trial: int = 1
 
 
 MOMENTS = [
-    Moment(Prompt.SUPPORT, Phase.PREFLIGHT, trial=0),
-    Moment(Prompt.LIFT, Phase.READY),
-    Moment(Prompt.READY, Phase.READY),
-    Moment(Prompt.NOTE, Phase.READY),
-    Moment(Prompt.PAUSED, Phase.PAUSED),
-    Moment(Prompt.RECORDING, Phase.RECORDING, rejected=1),
-    Moment(Prompt.REVIEW, Phase.REVIEW, rejected=1),
-    Moment(Prompt.LIFT, Phase.READY, 0, Phase.COMPLETE, trial=0),
+    Moment(Prompt.SUPPORT, SessionPhase.PREFLIGHT, trial=0),
+    Moment(Prompt.LIFT, SessionPhase.READY),
+    Moment(Prompt.READY, SessionPhase.READY),
+    Moment(Prompt.NOTE, SessionPhase.READY),
+    Moment(Prompt.PAUSED, SessionPhase.PAUSED),
+    Moment(Prompt.RECORDING, SessionPhase.RECORDING, rejected=1),
+    Moment(Prompt.REVIEW, SessionPhase.REVIEW, rejected=1),
+    Moment(Prompt.LIFT, SessionPhase.READY, 0, SessionPhase.COMPLETE, trial=0),
 ]
 _ON_THE_WAY = {Prompt.NOTE: "n", Prompt.PAUSED: "p"}
 
@@ -88,7 +88,7 @@ def test_ctrl_c_ends_every_phase_with_the_arm_at_rest(
     def line(keys, asked):
         press(asked, None)
 
-    monkeypatch.setattr("experiments.operator.prompts.AutoKeys.line", line)
+    monkeypatch.setattr("experiments.operator.prompts.AutoOperator.line", line)
     session = run_watched(config, tmp_path, 1, press=press)
     events, state = journal(session.folder), replay(journal(session.folder))
     assert seen[1:] == [moment.phase]  # it came once, and where it should

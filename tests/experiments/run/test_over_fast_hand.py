@@ -30,28 +30,28 @@ class Bench:
         settings = replace(shipped, rig=rig)
         row = settings.row("TF")
         self.rig = build_rig(settings, row, FakeOptions(is_fast=True, seed=1))
-        crew = self.rig.crew
-        self.desk = crew.desk
-        self.plant = self.rig.rehearsal.rig.plant
-        crew.start_arm()
-        crew.open_sensor()
-        crew.begin()
-        self.desk.request(ArmState.HOLD)
-        self.desk.advance(0.1)
-        self.rig.rehearsal.pendant("activate")
-        self.desk.advance(0.2)
-        self.desk.request(ArmState.FLOAT)
-        self.desk.advance(0.1)
+        backend = self.rig.backend
+        self.loop_client = backend.loop_client
+        self.plant = self.rig.simulation.rig.plant
+        backend.start_arm()
+        backend.open_sensor()
+        backend.begin()
+        self.loop_client.request(ArmState.HOLD)
+        self.loop_client.advance(0.1)
+        self.rig.simulation.pendant("activate")
+        self.loop_client.advance(0.2)
+        self.loop_client.request(ArmState.FLOAT)
+        self.loop_client.advance(0.1)
         self.plant.hand.let_go()
 
     def pull(self, joint, torque):
         """Pull at a joint until the guard says something; return its verdict."""
         self.plant.disturbance[joint] = torque
         for _ in range(100):
-            self.desk.advance(0.004)
-            if self.desk.status.verdict is not None:
+            self.loop_client.advance(0.004)
+            if self.loop_client.status.verdict is not None:
                 break
-        return self.desk.status.verdict
+        return self.loop_client.status.verdict
 
 
 @pytest.fixture
@@ -64,7 +64,7 @@ def build():
 
     yield build_one
     for bench in benches:
-        bench.rig.crew.close()
+        bench.rig.backend.close()
 
 
 @pytest.mark.parametrize("reason", LIMITS)
@@ -72,7 +72,7 @@ def test_an_arm_that_is_too_fast_is_damped(build, reason):
     bench = build(**LIMITS[reason])
     verdict = bench.pull(J1, PULL)
     assert (verdict.reason, verdict.action) == (reason, Action.DAMP)
-    assert bench.desk.status.state is ArmState.DAMP
+    assert bench.loop_client.status.state is ArmState.DAMP
 
 
 @pytest.mark.parametrize("reason", LIMITS)
@@ -80,8 +80,8 @@ def test_a_damped_arm_gets_its_weight_and_a_brake_and_never_zero_torque(build, r
     bench = build(**LIMITS[reason])
     bench.pull(J1, PULL)
     bench.plant.disturbance[:] = 0.0
-    bench.desk.advance(0.2)
-    records = bench.desk.last(0.2)
+    bench.loop_client.advance(0.2)
+    records = bench.loop_client.last(0.2)
     brake = (records["torque_command"] - records["torque_gravity"])[:, J1]
     speed = records["velocity"][:, J1]
     moving = np.abs(speed) > 0.1
@@ -94,10 +94,10 @@ def test_a_damped_arm_comes_to_rest_and_stays_active(build):
     bench = build(**LIMITS["overspeed"])
     bench.pull(J1, PULL)
     bench.plant.disturbance[:] = 0.0
-    bench.desk.advance(2.0)
+    bench.loop_client.advance(2.0)
     assert np.abs(bench.plant.qd).max() < 0.05
-    assert bench.desk.status.state is ArmState.DAMP
-    assert bench.desk.status.safety is SafetyMode.ACTIVE
+    assert bench.loop_client.status.state is ArmState.DAMP
+    assert bench.loop_client.status.safety is SafetyMode.ACTIVE
 
 
 def test_an_arm_pressed_against_a_stop_is_held_off_by_the_soft_wall(build):
@@ -105,8 +105,8 @@ def test_an_arm_pressed_against_a_stop_is_held_off_by_the_soft_wall(build):
     upper = bench.rig.model.constants.q_upper[J6]
     for second in range(20):  # slowly, and held there
         bench.plant.disturbance[J6] = min(0.1 * second, 0.8)
-        bench.desk.advance(0.2)
+        bench.loop_client.advance(0.2)
     depth = bench.plant.q[J6] - (upper - 0.1)
     # The hand and the foot's own weight against a spring of 2.5 N m in 0.2 rad.
     assert 0.04 < depth < 0.09
-    assert bench.desk.status.verdict is None
+    assert bench.loop_client.status.verdict is None

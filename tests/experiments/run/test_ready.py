@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from acquisition.devices import SafetyMode
-from analysis.data.quality import Coverage, suggest
-from experiments.operator.prompts import Asked, Prompt
-from experiments.operator.scripted import ScriptKeys
+from analysis.data.quality import CoverageGrid, suggest
+from experiments.operator.prompts import Prompt, PromptState
+from experiments.operator.scripted import ScriptedOperator
 from experiments.session.reducer import replay
 from experiments.trial.files import cells_of
 from tests.experiments.program import (
@@ -120,7 +120,7 @@ def test_the_next_push_is_suggested_from_the_kept_trials(recorded):
     (suggested,) = [line for line in lines if line.startswith("Suggested next: ")]
     assert lines.index(suggested) > first + 2  # not before there is a kept trial
     kept = sidecar(recorded.folder / "trials" / "T01.mcap")["coverage"]
-    left_open = suggest(Coverage(np.array(kept)))
+    left_open = suggest(CoverageGrid(np.array(kept)))
     assert suggested == f"Suggested next: {left_open}"
     assert suggested == "Suggested next: slower than 0.05 m/s, pressing harder"
 
@@ -176,13 +176,13 @@ def test_the_end_names_report_and_next_terrains(recorded):
 
 
 def asked(prompt, since=3.0):
-    return Asked(prompt, 1, 1, is_complete=True, since=since)
+    return PromptState(prompt, 1, 1, is_complete=True, since=since)
 
 
 def keys_of(folder, text):
     path = folder / "script.txt"
     path.write_text(text)
-    return ScriptKeys(path)
+    return ScriptedOperator(path)
 
 
 def test_lines_wait_for_their_own_prompt(tmp_path):

@@ -2,20 +2,20 @@
 
 import pytest
 
-from acquisition.control_loop.guard import Action, Verdict
+from acquisition.control_loop.guard import Action, GuardVerdict
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
-from experiments.messages import Circumstances, fault_text
+from experiments.messages import FaultContext, fault_text
 from experiments.operator.prompts import Prompt
 from experiments.rig.build import build_safety_limits
 from experiments.settings.load import load_settings
 from tests.experiments.program import run_watched, traction, write_config
 from wam.bus.frames import encode_set
-from wam.driver.safety_limits import SafetyLimits
+from wam.driver.safety_module import SafetyLimits
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
-FOUND = Circumstances("T01", 1.5)
+FOUND = FaultContext("T01", 1.5)
 SAFETY_TABLE = """
 speed_warning = 0.5       # m/s at elbow and forearm; left out: 0.9 of the fault
 speed_fault = 1.0  """
@@ -50,7 +50,7 @@ VL1 = 45
     ],
 )
 def test_a_stop_of_the_safety_circuit_is_told_with_its_cause(reason, causes, text):
-    verdict = Verdict(Action.IDLE, reason, causes=causes)
+    verdict = GuardVerdict(Action.IDLE, reason, causes=causes)
     assert fault_text(verdict, FOUND).startswith(text)
 
 

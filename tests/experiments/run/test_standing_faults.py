@@ -14,9 +14,9 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 MANY = 40  # looks of 20 ms, of which the fault takes 5 and more each time it is mended
 
 
-def narrow(crew):
+def narrow(backend):
     """Let joint 6 stand beyond what it is allowed from now on."""
-    cycle = crew.desk.passing._loop._cycle._cycle
+    cycle = backend.loop_client.advance_cycles._loop._cycle._cycle
     upper = (*cycle._limits.q_upper[:5], -1.5, cycle._limits.q_upper[6])
     cycle._limits = replace(cycle._limits, q_upper=upper)
 
@@ -26,12 +26,12 @@ def crews(monkeypatch):
     """Return the crews that work a rig from now on."""
     seen = []
 
-    class Seen(simulated.InlineCrew):
+    class Seen(simulated.InProcessBackend):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
             seen.append(self)
 
-    monkeypatch.setattr(simulated, "InlineCrew", Seen)
+    monkeypatch.setattr(simulated, "InProcessBackend", Seen)
     return seen
 
 
@@ -42,7 +42,7 @@ def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, crews, prompt):
     def press(asked, _):
         if asked.prompt is prompt:
             looks.append(asked)
-            states.add(crews[0].desk.status.state)
+            states.add(crews[0].loop_client.status.state)
             if len(looks) == 1:
                 narrow(crews[0])
             return "q" if len(looks) > MANY else ""

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from experiments.operator.prompts import AutoKeys, Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.session.reducer import replay
 from tests.experiments.program import (
     digest,
@@ -51,14 +51,14 @@ def shorten(monkeypatch):
     """Let every push end by key before the foot has crossed the container, at once."""
     for module in ("operator", "scripted"):
         monkeypatch.setattr(f"experiments.{module}.READY_SECONDS", 0.1)
-    usual = AutoKeys.answer
+    usual = AutoOperator.answer
 
     def answer(self, asked):
         if asked.prompt is Prompt.RECORDING and asked.since > 0.8:
             return " "
         return usual(self, asked)
 
-    monkeypatch.setattr(AutoKeys, "answer", answer)
+    monkeypatch.setattr(AutoOperator, "answer", answer)
 
 
 @pytest.mark.parametrize(

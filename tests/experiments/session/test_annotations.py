@@ -15,7 +15,7 @@ from acquisition.clock import SystemClock
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
 from experiments.session.annotations import parse_trial
-from experiments.session.order import confounding, suggest_order
+from experiments.session.matrix_board import confounding, suggest_order
 from experiments.session.reducer import replay
 from experiments.settings.load import load_settings
 from tests.experiments.program import (

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from acquisition.trial_file.verify import verify
-from experiments.session.crash_recovery import settle
-from experiments.session.journal import Book, open_book
-from experiments.session.states import Event, Phase
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import Journal, open_journal
+from experiments.session.states import Event, SessionPhase
 from experiments.session.store import create_session, read_json, sha256_of, write_json
 from tests.acquisition.trials import make_cycles, write_trial
 
@@ -64,7 +64,7 @@ def killed_at(step, monkeypatch):
 def make_session(data):
     """Return the book of an ended session: T01 and T02 kept, T01 rejected once."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
-    book = Book(folder, Now())
+    book = Journal(folder, Now())
     book.note(Event.STARTED, terrain="S0", trials=2)
     book.note(Event.ACTIVATED)
     record(book, 1, 1, Event.TRIAL_REJECTED)
@@ -98,7 +98,7 @@ def contents(folder):
 
 def check_agreement(folder):
     """Hold the files against the journal."""
-    book = open_book(folder, Now())
+    book = open_journal(folder, Now())
     kept = [path.stem for path in folder.kept_trials()]
     assert kept == sorted(f"T{number:02d}" for number in book.state.kept)
     for number, attempt in book.state.kept_attempts:
@@ -120,7 +120,7 @@ def kill_in_verdict(data, monkeypatch, step, verdict):
         facts |= {"verdict": "keep", "attempt": 1}
     with killed_at(step, monkeypatch) as was_killed:
         book.note(Event.VERDICT, **facts)
-    settle(open_book(book.folder, Now()))
+    recover_session(open_journal(book.folder, Now()))
     check_agreement(book.folder)
     assert set(contents(book.folder)) == before
     return bool(was_killed)
@@ -138,14 +138,14 @@ def test_a_kill_at_any_step_of_a_verdict_loses_nothing(tmp_path, monkeypatch, ve
 def test_settling_what_is_in_order_changes_nothing(tmp_path):
     folder = make_session(tmp_path).folder
     texts = {p: p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
-    assert settle(open_book(folder, Now())) == ""
+    assert recover_session(open_journal(folder, Now())) == ""
     assert texts == {p: p.read_bytes() for p in folder.path.rglob("*") if p.is_file()}
 
 
 def crash(data):
     """Return the book of a session that was killed in T01."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
-    book = Book(folder, Now())
+    book = Journal(folder, Now())
     book.note(Event.STARTED, terrain="S0", trials=2)
     book.note(Event.ACTIVATED)
     book.note(Event.TRIAL_STARTED, trial=1, attempt=1)
@@ -166,13 +166,16 @@ def crashed(tmp_path):
 
 def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
     source = sha256_of(leave_partial(crashed))
-    assert settle(crashed) == "T01 will be redone, its data are in rejected/T01a.*"
+    assert (
+        recover_session(crashed)
+        == "T01 will be redone, its data are in rejected/T01a.*"
+    )
     rejected = crashed.folder.rejected
     assert verify(rejected / "T01a.mcap").cycles == 201
     assert sha256_of(rejected / "T01a.partial") == source
     assert read_json(rejected / "T01a.json")["cycles"] == 201
     assert list(crashed.folder.trials.iterdir()) == []
-    assert (crashed.state.phase, crashed.state.running) == (Phase.CRASHED, None)
+    assert (crashed.state.phase, crashed.state.running) == (SessionPhase.CRASHED, None)
 
 
 def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
@@ -180,7 +183,7 @@ def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
     path.write_bytes(b"1.1")
     sidecar = {"trial": "T01", "attempt": 1, "displacement": 0.4, "verdict": ""}
     write_json(path.with_suffix(".json"), sidecar)
-    settle(crashed)
+    recover_session(crashed)
     facts = read_json(crashed.folder.rejected / "T01a.json")
     assert (facts["displacement"], facts["verdict"]) == (0.4, "reject")
     assert (crashed.folder.rejected / "T01a.mcap").read_bytes() == b"1.1"
@@ -190,7 +193,7 @@ def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
 def test_a_trial_of_which_nothing_is_left_is_a_rejected_attempt_too(crashed, content):
     if content is not None:
         (crashed.folder.trials / "T01.mcap.partial").write_bytes(content)
-    settle(crashed)
+    recover_session(crashed)
     assert read_json(crashed.folder.rejected / "T01a.json")["sha256"] == ""
     assert (crashed.folder.rejected / "T01a.partial").exists() == (content is not None)
     assert crashed.state.rejected == 1
@@ -201,9 +204,9 @@ def kill_in_settling(data, monkeypatch, step):
     crashed = crash(data)
     leave_partial(crashed)
     with killed_at(step, monkeypatch) as was_killed:
-        settle(crashed)
-    settle(open_book(crashed.folder, Now()))
-    book = open_book(crashed.folder, Now())
+        recover_session(crashed)
+    recover_session(open_journal(crashed.folder, Now()))
+    book = open_journal(crashed.folder, Now())
     assert (book.state.running, book.state.rejected) == (None, 1)
     rejected = crashed.folder.rejected
     assert verify(rejected / "T01a.mcap").cycles == 201
@@ -225,9 +228,9 @@ def test_a_torn_line_is_ended_before_the_next_one(crashed):
     path = crashed.folder.path / "events.jsonl"
     with path.open("ab") as file:
         file.write(b'{"event": "trial-rec')
-    book = open_book(crashed.folder, Now())
+    book = open_journal(crashed.folder, Now())
     book.note(Event.NOTED, text="after the kill")
     *_, torn, last = path.read_text().splitlines()
     assert torn == '{"event": "trial-rec'
     assert json.loads(last)["text"] == "after the kill"
-    assert open_book(crashed.folder, Now()).state == book.state
+    assert open_journal(crashed.folder, Now()).state == book.state

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from acquisition.clock import SystemClock
-from experiments.session.crash_recovery import settle
-from experiments.session.journal import open_book
+from experiments.session.crash_recovery import recover_session
+from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
-from experiments.session.states import Phase
+from experiments.session.states import SessionPhase
 from experiments.session.store import list_sessions
 from tests.experiments.program import digest, kept_and_sound, run_watched, traction
 from tests.experiments.run.test_resume import short
@@ -76,7 +76,7 @@ def survive(tmp_path, config, count, rng):
                 continue
             (folder,) = list_sessions(data)
             with session_lock(folder):
-                settle(open_book(folder, CLOCK))
+                recover_session(open_journal(folder, CLOCK))
             state = replay(folder.events())
             kept = [f"T{n:02d}" for n in sorted(state.kept)]
             assert kept == kept_and_sound(folder.path)
@@ -84,7 +84,10 @@ def survive(tmp_path, config, count, rng):
             now = {name: digest(folder.trials / f"{name}.mcap") for name in kept}
             assert now.items() >= safe.items()
             safe = now
-            if state.phase in {Phase.COMPLETE, Phase.PLANNED} or state.is_complete:
+            if (
+                state.phase in {SessionPhase.COMPLETE, SessionPhase.PLANNED}
+                or state.is_complete
+            ):
                 completed += state.is_complete
                 break
     return completed

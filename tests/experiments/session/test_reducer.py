@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.session.reducer import SessionState, apply, refusal, replay
-from experiments.session.states import OPEN, Event, Phase
+from experiments.session.states import OPEN, Event, SessionPhase
 
 START = {"event": "session-started", "terrain": "S0", "trials": 2}
 ACTIVE = {"event": "activated"}
@@ -64,11 +64,15 @@ def check_possible(state):
     # every attempt is kept, rejected or running
     assert sum(attempts.values()) == len(state.kept) + state.rejected + running
     assert state.running not in state.kept
-    is_unjudged = state.phase in {Phase.RECORDING, Phase.REVIEW, Phase.CRASHED}
+    is_unjudged = state.phase in {
+        SessionPhase.RECORDING,
+        SessionPhase.REVIEW,
+        SessionPhase.CRASHED,
+    }
     assert state.running is None or is_unjudged
-    assert (state.phase is Phase.PLANNED) == (not state.terrain)
+    assert (state.phase is SessionPhase.PLANNED) == (not state.terrain)
     assert state.ended == "" or state.phase not in OPEN
-    assert (state.phase is Phase.COMPLETE) <= state.is_complete
+    assert (state.phase is SessionPhase.COMPLETE) <= state.is_complete
     assert state.next_trial not in state.kept or state.redoing is not None
 
 
@@ -121,9 +125,9 @@ def test_a_session_is_complete_when_enough_trials_were_kept_and_it_has_ended():
     state = replay([*BEGIN, *attempt(1, "kept")])
     assert not state.is_complete
     state = replay([*BEGIN, *attempt(1, "kept"), *attempt(2, "kept")])
-    assert (state.is_complete, state.phase) == (True, Phase.READY)
+    assert (state.is_complete, state.phase) == (True, SessionPhase.READY)
     assert state.kept == (1, 2)
-    assert apply(state, END).phase is Phase.COMPLETE
+    assert apply(state, END).phase is SessionPhase.COMPLETE
 
 
 def test_a_rejected_trial_is_done_again_under_its_number():
@@ -156,7 +160,7 @@ def test_a_second_start_changes_nothing():
 
 def test_an_end_in_a_running_trial_is_a_crash():
     state = replay([*BEGIN, event("trial-started", 1), event("session-ended")])
-    assert (state.phase, state.running) == (Phase.CRASHED, 1)
+    assert (state.phase, state.running) == (SessionPhase.CRASHED, 1)
 
 
 def test_a_crashed_session_is_not_resumed_before_its_trial_was_put_away():
@@ -164,7 +168,7 @@ def test_a_crashed_session_is_not_resumed_before_its_trial_was_put_away():
     resumed = event("session-resumed")
     assert refusal(crashed, resumed) == "T01 has no verdict yet"
     state = apply(apply(crashed, event("trial-rejected", 1)), resumed)
-    assert (state.phase, state.openings) == (Phase.PREFLIGHT, 2)
+    assert (state.phase, state.openings) == (SessionPhase.PREFLIGHT, 2)
 
 
 def test_a_redo_records_one_trial_and_is_over():
@@ -176,7 +180,7 @@ def test_a_redo_records_one_trial_and_is_over():
     for entry in attempt(1, "kept"):
         state = apply(state, entry)
     assert (state.is_over, state.kept_attempt(1), state.rejected) == (True, 2, 1)
-    assert apply(state, END).phase is Phase.COMPLETE
+    assert apply(state, END).phase is SessionPhase.COMPLETE
 
 
 def test_a_redo_of_what_was_never_recorded_is_refused():
@@ -187,9 +191,17 @@ def test_a_redo_of_what_was_never_recorded_is_refused():
 def test_a_verdict_changes_what_is_kept_and_back():
     state = replay([*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END])
     state = apply(state, verdict(1, 1, "reject"))
-    assert (state.kept, state.rejected, state.phase) == ((2,), 1, Phase.UNFINISHED)
+    assert (state.kept, state.rejected, state.phase) == (
+        (2,),
+        1,
+        SessionPhase.UNFINISHED,
+    )
     state = apply(state, verdict(1, 1, "keep"))
-    assert (state.kept, state.rejected, state.phase) == ((2, 1), 0, Phase.COMPLETE)
+    assert (state.kept, state.rejected, state.phase) == (
+        (2, 1),
+        0,
+        SessionPhase.COMPLETE,
+    )
 
 
 def test_two_attempts_at_one_trial_are_never_kept_together():

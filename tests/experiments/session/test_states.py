@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.session.states import OPEN, TABLE, Event, Phase
+from experiments.session.states import OPEN, TABLE, Event, SessionPhase
 from tests.experiments.program import traction
 
 # (phase, event): where it leads; what is not here is refused.
@@ -51,7 +51,7 @@ LEADS = {
     ("crashed", "session-ended"): "unfinished complete",
     ("crashed", "session-closed"): "closed",
 }
-PAIRS = [(phase, event) for phase in Phase for event in Event]
+PAIRS = [(phase, event) for phase in SessionPhase for event in Event]
 
 
 @pytest.mark.parametrize(("phase", "event"), PAIRS)
@@ -67,7 +67,7 @@ def test_the_table_has_every_pair_once_and_nothing_else():
 
 
 def test_a_crash_can_be_found_in_every_open_phase_and_in_no_other():
-    found = {p for p in Phase if TABLE[p, Event.CRASH_FOUND].to}
+    found = {p for p in SessionPhase if TABLE[p, Event.CRASH_FOUND].to}
     assert found == OPEN
 
 

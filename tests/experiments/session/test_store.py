@@ -17,7 +17,7 @@ from experiments.session.store import (
     read_json,
     write_json,
 )
-from experiments.trial.header import EndWatch, TrialName
+from experiments.trial.header import EndDetector, TrialName
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 
@@ -127,7 +127,7 @@ def test_rejected_attempts_are_lettered_like_columns(attempt, name):
 
 
 def test_a_trial_ends_a_moment_after_the_container_was_crossed():
-    watch = EndWatch(0.45)
+    watch = EndDetector(0.45)
     assert watch.reason(5.0, 0.449) == ""
     assert watch.reason(6.0, 0.45) == ""
     assert watch.reason(6.39, 0.30) == ""  # even if the foot is lifted back
@@ -135,7 +135,7 @@ def test_a_trial_ends_a_moment_after_the_container_was_crossed():
 
 
 def test_a_trial_that_never_crosses_ends_at_the_time_limit():
-    watch = EndWatch(0.45)
+    watch = EndDetector(0.45)
     assert watch.reason(29.99, 0.2) == ""
     assert watch.reason(30.0, 0.2) == "time-limit"
 

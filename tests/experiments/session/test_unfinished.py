@@ -4,8 +4,8 @@ import pytest
 
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt
-from experiments.operator.terminal import TerminalKeys
-from experiments.run.resume_prompt import Choice, choose
+from experiments.operator.terminal import TerminalInput
+from experiments.run.resume_prompt import ResumeChoice, choose
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from experiments.session.unfinished import find_unfinished
@@ -108,7 +108,7 @@ def test_a_folder_that_cannot_be_read_is_left_out(tmp_path):
 # --- another run is asked for ---------------------------------------------------------
 
 
-class Early(TerminalKeys):
+class Early(TerminalInput):
     """A keyboard on which the question was answered before it was asked."""
 
     def __init__(self, descriptor):
@@ -130,10 +130,10 @@ def press(keys, found, terrain):
 @pytest.mark.parametrize(
     ("keys", "choice"),
     [
-        (b"1", Choice.RESUME),
-        (b"r", Choice.RESUME),
-        (b"2", Choice.CLOSE),
-        (b"x n", Choice.CLOSE),
+        (b"1", ResumeChoice.RESUME),
+        (b"r", ResumeChoice.RESUME),
+        (b"2", ResumeChoice.CLOSE),
+        (b"x n", ResumeChoice.CLOSE),
     ],
 )
 def test_a_key_says_what_becomes_of_the_unfinished_session(tmp_path, keys, choice):

@@ -3,7 +3,7 @@ import pytest
 
 from fakes.ground.container import FREE, Container
 from fakes.ground.plate import PLATES, Plate
-from fakes.plant.hand import LIFT, Hand, Phase
+from fakes.plant.hand import LIFT, Hand, HandPhase
 from fakes.plant.push import PACES, HandView, Pace
 from tests.fakes.scenes import float_for, make_plant, release, sole
 
@@ -33,7 +33,7 @@ def test_the_hand_puts_the_foot_down_and_lets_it_rest(plant):
     forces = []
     for _ in float_for(plant, 2.0, virtual_mass=0.3):
         forces.append(plant.is_touching)
-    assert plant.hand.phase is Phase.REST
+    assert plant.hand.phase is HandPhase.REST
     assert plant.is_touching
     assert forces.index(True) > 100  # it was carried first
     assert abs(sole(plant)[0]) < 5e-3
@@ -127,7 +127,7 @@ def test_a_hand_that_rests_pushes_no_more(plant):
     where = sole(plant)[0]
     for _ in float_for(plant, 1.0, virtual_mass=0.3):
         pass
-    assert plant.hand.phase is Phase.REST
+    assert plant.hand.phase is HandPhase.REST
     assert abs(sole(plant)[0] - where) < 1e-3
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.plant.joint_loads import JointLoads
-from fakes.plant.joint_state import JointState
+from fakes.plant.joints import JointLoads, JointState
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,

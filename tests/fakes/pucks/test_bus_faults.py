@@ -8,10 +8,10 @@ import pytest
 from acquisition.devices import SafetyMode
 from fakes.pucks.bus_faults import FOREIGN_IDS
 from fakes.pucks.event_queue import FRAME_NS
-from fakes.world.faults import mend_network, network_faults
+from fakes.world.faults import clear_network_faults, network_faults
 from tests.fakes.stepped import Rig
 from wam.bus.frames import decode_position, position_reply_id
-from wam.driver.safety_module import Level
+from wam.driver.safety_module import SafetyLevel
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
@@ -100,7 +100,7 @@ def test_a_flood_uses_its_share_of_the_bus(rig, faults, load):
 
 def test_a_flood_delays_replies_as_far_as_its_identifiers_win(rig, faults):
     def last_reply(chosen):
-        faults.mend()
+        faults.clear_faults()
         faults.flood(0.4, chosen)
         begin = rig.clock.t_ns
         rig.link.send(0x404, b"\x30")
@@ -124,7 +124,7 @@ def test_a_controller_that_is_off_neither_sends_nor_receives(rig, faults):
         rig.bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"\5"))
     with pytest.raises(can.CanOperationError, match="bus-off"):
         rig.bus.recv(0)
-    faults.mend()
+    faults.clear_faults()
     assert rig.bus.recv(0) is None  # what waited is gone
     assert ids(ask(rig)) == ALL
 
@@ -133,7 +133,7 @@ def test_mending_ends_every_fault_of_the_wire(rig, faults):
     faults.drop(THREE, None)
     faults.flood(0.9)
     ask(rig)
-    faults.mend()
+    faults.clear_faults()
     ask(rig)
     assert ids(ask(rig)) == ALL
 
@@ -167,8 +167,8 @@ def test_a_monitor_faults_and_can_be_cleared_once_it_is_mended(
     network_faults(rig.network)[name]()
     move()
     assert rig.network.safety_mode is mode
-    assert getattr(rig.network.pendant_word, monitor) is Level.FAULT
-    mend_network(rig.network)
+    assert getattr(rig.network.pendant_word, monitor) is SafetyLevel.FAULT
+    clear_network_faults(rig.network)
     rig.network.pendant("idle")
     rig.network.pendant("activate")
     move(40)  # pucks that lost their power are asleep, which is no lost heartbeat yet
@@ -187,7 +187,7 @@ def test_an_ill_puck_says_so_until_it_is_mended(rig, name, request_, ill, well):
 
     network_faults(rig.network)[name]()
     assert answer() == ill
-    mend_network(rig.network)
+    clear_network_faults(rig.network)
     assert answer() == well
 
 

@@ -1,8 +1,8 @@
-from fakes.pucks.event_queue import NEVER, Schedule
+from fakes.pucks.event_queue import NEVER, EventQueue
 
 
 def schedule_of(log):
-    schedule = Schedule(0)
+    schedule = EventQueue(0)
     schedule.on_alarm = lambda: (log.append("alarm"), schedule.set_alarm(NEVER))
     return schedule
 

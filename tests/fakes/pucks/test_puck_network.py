@@ -7,7 +7,7 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Motors
 from wam.bus.frames import encode_set, encode_torques
-from wam.driver.safety_module import Level, decode_pendant
+from wam.driver.safety_module import SafetyLevel, decode_pendant
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
@@ -324,10 +324,10 @@ def test_a_fault_bars_activation_until_shift_idle():
 @pytest.mark.parametrize(
     ("units", "level", "mode"),
     [
-        (4731, Level.SAFE, SafetyMode.ACTIVE),
-        (-4732, Level.WARNING, SafetyMode.ACTIVE),
-        (5204, Level.WARNING, SafetyMode.ACTIVE),
-        (-5205, Level.FAULT, SafetyMode.IDLE),
+        (4731, SafetyLevel.SAFE, SafetyMode.ACTIVE),
+        (-4732, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (5204, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (-5205, SafetyLevel.FAULT, SafetyMode.IDLE),
     ],
 )
 def test_the_module_judges_commanded_torque(units, level, mode):
@@ -343,7 +343,7 @@ def test_a_smaller_torque_puts_the_warning_out():
     host.activate()
     host.say(0x401, encode_torques((0, 0, 5000, 0)))
     host.say(0x401, encode_torques((0, 0, 0, 0)))
-    assert host.network.pendant_word.torque is Level.SAFE
+    assert host.network.pendant_word.torque is SafetyLevel.SAFE
 
 
 def test_limits_return_to_their_power_up_values():

@@ -6,11 +6,11 @@ import pytest
 from acquisition.devices import SafetyMode
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.speed_monitor import SpeedWatch
+from fakes.pucks.speed_monitor import SpeedMonitor
 from tests.fakes.scenes import MODEL, START_Q
 from tests.fakes.stepped import Motors
 from wam.bus.frames import encode_set
-from wam.driver.safety_module import Level, decode_pendant
+from wam.driver.safety_module import SafetyLevel, decode_pendant
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import Transmission
 
@@ -79,10 +79,10 @@ def joint(number, speed):
 @pytest.mark.parametrize(
     ("speed", "level", "mode"),
     [
-        (0.45, Level.SAFE, SafetyMode.ACTIVE),
-        (0.55, Level.WARNING, SafetyMode.ACTIVE),
-        (0.95, Level.WARNING, SafetyMode.ACTIVE),
-        (-1.05, Level.FAULT, SafetyMode.IDLE),
+        (0.45, SafetyLevel.SAFE, SafetyMode.ACTIVE),
+        (0.55, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (0.95, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (-1.05, SafetyLevel.FAULT, SafetyMode.IDLE),
     ],
 )
 def test_the_speed_of_elbow_and_forearm_is_judged(number, arm, speed, level, mode):
@@ -100,13 +100,13 @@ def test_speeds_of_elbow_and_forearm_add_up():
 def test_an_elbow_on_the_axis_of_joint_1_does_not_move():
     host = Host(q=np.zeros(7))
     host.move(joint(1, 4.0), 20)
-    assert host.velocity is Level.SAFE
+    assert host.velocity is SafetyLevel.SAFE
 
 
 def test_the_wrist_is_not_counted():
     host = Host()
     host.move([0, 0, 0, 0, 4.0, 4.0, 4.0], 20)
-    assert host.velocity is Level.SAFE
+    assert host.velocity is SafetyLevel.SAFE
 
 
 def test_a_slip_of_the_foot_at_430_mm_per_second_is_no_fault():
@@ -116,23 +116,23 @@ def test_a_slip_of_the_foot_at_430_mm_per_second_is_no_fault():
         slip = np.linalg.pinv(J) @ np.array([-0.43, 0.0, 0.0])
         assert host.move(slip, 1) == 1
         assert host.mode is SafetyMode.ACTIVE
-    assert host.velocity is not Level.FAULT
+    assert host.velocity is not SafetyLevel.FAULT
 
 
 def test_a_warning_goes_out_and_a_fault_stays_until_shift_idle():
     host = Host()
     host.move(joint(2, 1.2), 10)
-    assert host.velocity is Level.WARNING
+    assert host.velocity is SafetyLevel.WARNING
     host.move(joint(2, 0.0), 10)
-    assert host.velocity is Level.SAFE
+    assert host.velocity is SafetyLevel.SAFE
     host.move(joint(2, 2.0), 10)
     host.move(joint(2, 0.0), 10)
-    assert host.velocity is Level.FAULT
+    assert host.velocity is SafetyLevel.FAULT
     host.network.pendant("activate")
     assert host.mode is SafetyMode.IDLE
     host.network.pendant("idle")
     host.network.pendant("activate")
-    assert (host.velocity, host.mode) == (Level.SAFE, SafetyMode.ACTIVE)
+    assert (host.velocity, host.mode) == (SafetyLevel.SAFE, SafetyMode.ACTIVE)
 
 
 def test_a_velocity_fault_is_one_bit_of_the_word():
@@ -164,7 +164,7 @@ def test_a_fault_limit_of_zero_is_off():
     host = Host()
     host.tell(VL2, 0)
     host.move(joint(1, 6.0), 300)
-    assert (host.velocity, host.mode) == (Level.WARNING, SafetyMode.ACTIVE)
+    assert (host.velocity, host.mode) == (SafetyLevel.WARNING, SafetyMode.ACTIVE)
 
 
 def test_another_limit_is_obeyed():
@@ -200,7 +200,7 @@ def test_a_jump_of_the_positions_is_a_fault():
     host.move(np.zeros(7), 10)
     jump(host)
     assert host.move(np.zeros(7), 10) == 1
-    assert host.velocity is Level.FAULT
+    assert host.velocity is SafetyLevel.FAULT
 
 
 @pytest.mark.parametrize(("ignored", "left"), [(5, 0), (8, 3)])
@@ -210,7 +210,7 @@ def test_a_jump_costs_five_ignored_faults(ignored, left):
     host.tell(IFAULT, ignored)
     jump(host)
     host.move(np.zeros(7), 10)
-    assert (host.velocity, host.mode) == (Level.SAFE, SafetyMode.ACTIVE)
+    assert (host.velocity, host.mode) == (SafetyLevel.SAFE, SafetyMode.ACTIVE)
     assert host.ask(IFAULT) == left
 
 
@@ -241,7 +241,7 @@ def test_a_fault_while_idle_bars_the_activation():
 
 
 def test_speeds_begin_anew_after_a_stop():
-    watch = SpeedWatch((4096,) * 7)
+    watch = SpeedMonitor((4096,) * 7)
     watch.hear(0, {1: 0})
     watch.hear(CYCLE_NS, {1: 100_000})
     assert watch.joint_speed() > 100
@@ -253,14 +253,14 @@ def test_speeds_begin_anew_after_a_stop():
 @pytest.mark.parametrize(
     ("voltage", "level", "mode"),
     [
-        (48.0, Level.SAFE, SafetyMode.ACTIVE),
-        (36.0, Level.SAFE, SafetyMode.ACTIVE),
-        (35.9, Level.WARNING, SafetyMode.ACTIVE),
-        (54.1, Level.WARNING, SafetyMode.ACTIVE),
-        (30.0, Level.WARNING, SafetyMode.ACTIVE),
-        (57.0, Level.WARNING, SafetyMode.ACTIVE),
-        (29.9, Level.FAULT, SafetyMode.E_STOP),
-        (57.1, Level.FAULT, SafetyMode.E_STOP),
+        (48.0, SafetyLevel.SAFE, SafetyMode.ACTIVE),
+        (36.0, SafetyLevel.SAFE, SafetyMode.ACTIVE),
+        (35.9, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (54.1, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (30.0, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (57.0, SafetyLevel.WARNING, SafetyMode.ACTIVE),
+        (29.9, SafetyLevel.FAULT, SafetyMode.E_STOP),
+        (57.1, SafetyLevel.FAULT, SafetyMode.E_STOP),
     ],
 )
 def test_the_bus_voltage_is_judged(voltage, level, mode):

@@ -9,7 +9,12 @@ from acquisition.errors import LinkError
 from fakes.bus.adapter import CanPort
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from fakes.serving.puck_server import Home, PuckServer, Supported, build_home_server
+from fakes.serving.puck_server import (
+    HomePose,
+    PuckServer,
+    SupportedMotors,
+    build_home_server,
+)
 from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
 from tests.fakes.stepped import Motors, SteppedClock
 
@@ -142,7 +147,7 @@ def test_what_was_not_carried_is_told(hosts, clock):
 
 def test_an_arm_under_no_torque_is_carried():
     motors = Motors()
-    arm = Supported(motors)
+    arm = SupportedMotors(motors)
     arm.set_braking(is_braked=False, is_powered=True)
     arm.set_torques([0] * 7)
     assert motors.is_braked
@@ -153,7 +158,7 @@ def test_an_arm_under_no_torque_is_carried():
 
 def test_an_arm_without_power_is_carried():
     motors = Motors()
-    arm = Supported(motors)
+    arm = SupportedMotors(motors)
     arm.set_braking(is_braked=False, is_powered=False)
     arm.set_torques([5] * 7)
     assert motors.is_braked
@@ -164,7 +169,7 @@ def test_an_arm_without_power_is_carried():
     ("is_idle_first", "state"), [(True, "idle"), (False, "e-stop")]
 )
 def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
-    server = build_home_server(hosts, Home(TOOL, FRAME, None, is_idle_first), clock)
+    server = build_home_server(hosts, HomePose(TOOL, FRAME, None, is_idle_first), clock)
     assert server.state == state
     hosts.coming += [(1, b"\x05"), (8, b"\x05"), (10, b"\x2a")]
     let_pass(server, clock, MS)
@@ -174,7 +179,7 @@ def test_the_served_arm_starts_as_asked(hosts, clock, is_idle_first, state):
 
 
 def test_the_served_arm_stands_at_home(hosts, clock):
-    server = build_home_server(hosts, Home(TOOL, FRAME, None, True), clock)
+    server = build_home_server(hosts, HomePose(TOOL, FRAME, None, True), clock)
     hosts.coming += [(node, b"\x85\0\x02\0\0\0") for node in range(1, 8)]
     let_pass(server, clock, 800 * MS)  # longer than a puck takes to boot
     hosts.coming.append((4, b"\x42"))  # MECH

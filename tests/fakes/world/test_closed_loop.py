@@ -6,7 +6,7 @@ import pytest
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
 from fakes.plant.plant import PlantOptions
-from fakes.world.rig import FakeRig, Scene, solve_start
+from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
 from wam.bus.link import CanLink
 from wam.control.controller import FootController
@@ -34,7 +34,7 @@ class ClosedLoop:
 
     def __init__(self, tool, q, friction=0.05, virtual_mass=0.0):
         self.clock = SteppedClock()
-        scene = Scene("TF", "none", "tread", FRAME, START, seed=1)
+        scene = SimulatedScene("TF", "none", "tread", FRAME, START, seed=1)
         options = PlantOptions(friction=friction)
         self.rig = FakeRig(scene, CONSTANTS, tool, self.clock, options)
         self.rig.plant.q = q.copy()

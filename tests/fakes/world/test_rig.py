@@ -4,7 +4,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
-from fakes.plant.hand import Phase
+from fakes.plant.hand import HandPhase
 from fakes.plant.push import PACES
 from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
@@ -15,7 +15,7 @@ from fakes.randomness import (
     trial_generator,
     trial_generators,
 )
-from fakes.world.rig import Rehearsal, solve_start
+from fakes.world.rig import LocalSimulation, solve_start
 from ft_sensor.payload import TerrainFrame
 from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
 from wam.bus.frames import decode_force, decode_torque
@@ -51,7 +51,7 @@ def drive(seed):
     """Activate a rig, let the hand lift, and return joints and sensor bytes."""
     rig, clock = make_rig(seed)
     port = rig.open_port()
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     hand.prepare(1)
     hand.push()
     clock.sleep_until(clock.now_ns() + S // 20)
@@ -69,7 +69,7 @@ def test_the_same_seed_gives_the_same_rig_and_another_does_not():
 
 def test_every_trial_is_raked_anew_and_again_the_same(rig_and_clock):
     rig, _ = rig_and_clock
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
 
     def bed(trial):
         hand.prepare(trial)
@@ -84,7 +84,7 @@ def test_every_trial_is_raked_anew_and_again_the_same(rig_and_clock):
 def pushed(trials, pace=None):
     """Push in `trials` one after the other; return truth and errors of the last."""
     rig, clock = make_rig()
-    hand = Rehearsal(rig, pace)
+    hand = LocalSimulation(rig, pace)
     for trial in trials:
         hand.lift()
         hand.prepare(trial)
@@ -108,7 +108,7 @@ def test_the_hand_of_a_rehearsal_has_the_pace_it_was_given():
 
 def test_a_tare_takes_away_nothing_of_the_trial_and_leaves_nothing_of_the_last():
     rig, _ = make_rig()
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
 
     def mean():
         shown = [rig.errors.apply(k * CYCLE_NS, (0.0,) * 6)[:3] for k in range(1000)]
@@ -130,7 +130,7 @@ def test_a_tare_takes_away_nothing_of_the_trial_and_leaves_nothing_of_the_last()
 
 def test_the_pendant_is_pressed_through_the_rehearsal(rig_and_clock):
     rig, clock = rig_and_clock
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     assert rig.network.safety_mode is SafetyMode.IDLE
     hand.inject("estop")
     clock.sleep_until(clock.now_ns() + S // 10)
@@ -139,20 +139,20 @@ def test_the_pendant_is_pressed_through_the_rehearsal(rig_and_clock):
 
 def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
     rig, clock = rig_and_clock
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     hand.lift()
     assert not rig.plant.hand.is_done
-    assert rig.plant.hand.phase is Phase.CARRY
+    assert rig.plant.hand.phase is HandPhase.CARRY
     hand.push()
     clock.sleep_until(clock.now_ns() + CYCLE_NS)
-    assert rig.plant.hand.phase is Phase.PUSH
+    assert rig.plant.hand.phase is HandPhase.PUSH
 
 
 @pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
 def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
     rig, clock = rig_and_clock
     port = rig.open_port()
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
 
     def said():
         clock.sleep_until(clock.now_ns() + S // 20)
@@ -162,7 +162,7 @@ def test_a_silent_sensor_says_nothing_until_it_is_mended(rig_and_clock, fault):
     hand.inject(fault)
     said()  # what was on the wire already
     assert said() == b""
-    hand.mend()
+    hand.clear_faults()
     assert said()
 
 
@@ -196,16 +196,16 @@ def test_a_sensor_on_the_bus_feels_what_the_plant_says(rig_with_sensor_on_bus):
 @pytest.mark.parametrize("fault", ["ft-silent", "ft-stale"])
 def test_a_sensor_on_the_bus_falls_silent_too(rig_with_sensor_on_bus, fault):
     rig, clock = rig_with_sensor_on_bus
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     hand.inject(fault)
     assert ask_wrench(rig, clock) is None
-    hand.mend()
+    hand.clear_faults()
     assert ask_wrench(rig, clock) is not None
 
 
 def test_every_known_fault_can_be_injected(rig_and_clock):
     rig, _ = rig_and_clock
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     assert hand.fault_names
     for fault in hand.fault_names:
         hand.inject(fault)
@@ -214,7 +214,7 @@ def test_every_known_fault_can_be_injected(rig_and_clock):
 
 def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
     rig, clock = rig_and_clock
-    hand = Rehearsal(rig)
+    hand = LocalSimulation(rig)
     hand.push()
     clock.sleep_until(clock.now_ns() + 10 * CYCLE_NS)
     truth = hand.take_truth()
@@ -228,7 +228,7 @@ def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
 
 def test_parameters_of_the_ground_are_told_as_text(rig_and_clock):
     rig, _ = rig_and_clock
-    parameters = Rehearsal(rig).parameters()
+    parameters = LocalSimulation(rig).parameters()
     assert float(parameters["d50"]) == 0.019
     assert all(isinstance(value, str) for value in parameters.values())
 

@@ -1,7 +1,7 @@
 from itertools import pairwise
 
 from ft_sensor.reading import Reading, StreamTiming
-from ft_sensor.serial_line.timestamps import FrameDating
+from ft_sensor.serial_line.timestamps import SampleTimestamper
 
 MS = 1_000_000
 SHOWN = StreamTiming(1.25 * MS, 802_951, 1 << 32, 1000.0, 50 * MS, 37)
@@ -13,34 +13,34 @@ def reading(ticks, force):
 
 
 def test_non_finite_numbers_are_invalid():
-    dating = FrameDating(SHOWN)
+    timestamper = SampleTimestamper(SHOWN)
     frame = reading(5, float("nan"))
-    (sample,) = dating.date([frame], 10 * MS)
+    (sample,) = timestamper.date([frame], 10 * MS)
     assert not sample.is_valid
 
 
 def test_dates_rise_when_a_late_batch_reaches_back():
-    dating = FrameDating(SHOWN)
+    timestamper = SampleTimestamper(SHOWN)
     frames = [reading(1250 * k, k) for k in range(4)]
-    found = dating.date(frames[:1], 100 * MS)
-    found += dating.date(frames[1:], 101 * MS)
+    found = timestamper.date(frames[:1], 100 * MS)
+    found += timestamper.date(frames[1:], 101 * MS)
     assert all(before.t_ns < after.t_ns for before, after in pairwise(found))
 
 
 def test_a_jump_of_the_device_clock_does_not_move_the_dates():
-    dating = FrameDating(SHOWN)
+    timestamper = SampleTimestamper(SHOWN)
     frames = [
         reading(t_us, k)
         for k, t_us in enumerate([1000, 2250, 2_000_000_000, 2_000_001_250])
     ]
-    found = dating.date(frames, 100 * MS)
+    found = timestamper.date(frames, 100 * MS)
     assert found[-1].t_ns - found[0].t_ns == 2 * 1_250_000
 
 
 def test_wrap_inside_a_run_loses_nothing():
-    dating = FrameDating(SHOWN)
+    timestamper = SampleTimestamper(SHOWN)
     frames = [reading((2**32 - 2500 + 1250 * k) % 2**32, k) for k in range(5)]
-    found = dating.date(frames, 100 * MS)
+    found = timestamper.date(frames, 100 * MS)
     assert all(sample.is_valid for sample in found)
-    assert dating.lost == 0
+    assert timestamper.lost == 0
     assert found[-1].t_ns - found[0].t_ns == 4 * 1_250_000

@@ -172,7 +172,7 @@ class Bench:
     def started(self):
         self.arm.start()
         self.sensor.open()
-        self.arm.accompany(self.sensor)
+        self.arm.attach_device(self.sensor)
         self.rig.sent.clear()
         return self
 
@@ -224,7 +224,7 @@ def test_positions_come_as_early_with_the_sensor_as_without():
         bench.arm.start()
         if bench.network.options.has_sensor:
             bench.sensor.open()
-            bench.arm.accompany(bench.sensor)
+            bench.arm.attach_device(bench.sensor)
         reading = bench.arm.read(bench.clock.t_ns)
         return reading.arm_ns - reading.host_ns
 
@@ -299,7 +299,7 @@ def test_a_tare_is_told_to_the_sensor_and_its_first_reading_thrown_away():
     assert [data for _, _, data in bench.rig.sent[-2:]] == [b"\xb6\0\0\0\0\0", b"\x36"]
     assert bench.sensor.poll(0) == []
     bench.arm.start()
-    bench.arm.accompany(bench.sensor)
+    bench.arm.attach_device(bench.sensor)
     assert bench.run(2)[1][1][0].wrench == (0.0,) * 6
 
 

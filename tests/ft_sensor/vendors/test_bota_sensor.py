@@ -14,8 +14,7 @@ from fakes.sensor.bota import BotaOptions, bota_stream
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.port import FakeSerialPort
 from fakes.sensor.stream_faults import ByteFault
-from ft_sensor.serial_line.link import SerialLink
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.bota import BotaStatus
 from ft_sensor.vendors.bota_device import BotaDevice, BotaSettings
@@ -23,7 +22,7 @@ from tests.ft_sensor.sensor_bench import LOAD, MS, SteppedTime
 
 
 def sensor_on(port, clock, baudrate=460800, **settings) -> SerialSensor:
-    line = Line("/dev/sensor", baudrate, rate_check=0.25)
+    line = PortSettings("/dev/sensor", baudrate, rate_check=0.25)
     device = BotaDevice(line, BotaSettings(**settings))
     return SerialSensor(SerialLink(port), clock, device)
 
@@ -343,6 +342,6 @@ def test_settings_no_sensor_can_do_are_refused(wrong):
     settings = {"baudrate": 460800, "sinc": 64, "rate_check": 0.25} | wrong
     with pytest.raises(SettingsError):
         BotaDevice(
-            Line("/dev/sensor", settings["baudrate"], settings["rate_check"]),
+            PortSettings("/dev/sensor", settings["baudrate"], settings["rate_check"]),
             BotaSettings(sinc=settings["sinc"]),
         )

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from fakes.sensor.optoforce import SENSITIVITY, SERIAL_NUMBER
 from ft_sensor.serial_line.framing import FrameScanner
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors import optoforce
 from ft_sensor.vendors.optoforce import OptoForceFrame, encode_configuration
 from ft_sensor.vendors.optoforce_device import OptoForceDevice, OptoForceSettings
@@ -207,4 +207,6 @@ def test_a_sensor_without_serial_number_is_refused():
 def test_settings_no_sensor_can_do_are_refused(baudrate, settings):
     values = {"sensitivity": SENSITIVITY, "serial_number": SERIAL_NUMBER} | settings
     with pytest.raises(SettingsError):
-        OptoForceDevice(Line("/dev/sensor", baudrate), OptoForceSettings(**values))
+        OptoForceDevice(
+            PortSettings("/dev/sensor", baudrate), OptoForceSettings(**values)
+        )

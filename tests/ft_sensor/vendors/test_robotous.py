@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
 from ft_sensor.serial_line.framing import FrameScanner
-from ft_sensor.serial_line.port_settings import Line
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors import robotous
 from ft_sensor.vendors.robotous import RobotousFrame, encode_command
 from ft_sensor.vendors.robotous_device import RobotousDevice, RobotousSettings
@@ -171,7 +171,9 @@ def test_a_model_that_is_too_slow_is_refused():
 
 def test_a_new_sensor_is_told_to_speak_faster_and_its_power_to_be_cycled():
     bench = SensorBench("robotous", baudrate=115200)
-    driver = RobotousDevice(Line("/dev/sensor", 115200, 0.25), RobotousSettings())
+    driver = RobotousDevice(
+        PortSettings("/dev/sensor", 115200, 0.25), RobotousSettings()
+    )
     bench.sensor._device = driver
     with pytest.raises(DeviceFaultError, match="921600 baud from its next") as error:
         bench.sensor.open()
@@ -212,4 +214,4 @@ def test_a_loss_that_nobody_saw_is_found_by_the_arrival_times():
 )
 def test_settings_no_sensor_can_do_are_refused(line, settings):
     with pytest.raises(SettingsError):
-        RobotousDevice(Line("/dev/sensor", *line), RobotousSettings(**settings))
+        RobotousDevice(PortSettings("/dev/sensor", *line), RobotousSettings(**settings))

@@ -160,7 +160,7 @@ def test_a_storm_of_bad_checks_gives_no_sample(kind):
     bench.run(3 * MS)
     assert bench.run(50 * MS) == []
     assert bench.sensor.counters.bad_checks > 30
-    bench.device.faults.mend()
+    bench.device.faults.clear_faults()
     assert len(bench.run(50 * MS)) > 35
 
 

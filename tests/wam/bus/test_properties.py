@@ -5,7 +5,7 @@ import pytest
 from acquisition.errors import SettingsError
 from wam.bus.properties import (
     Device,
-    Role,
+    PuckRole,
     device_of,
     is_wide,
     names,
@@ -105,7 +105,7 @@ def test_32_bit_properties_leave_a_gap_behind_them():
     ("role", "stat", "expected"),
     [
         (0x0100, 2, Device.MOTOR),
-        (Role.BHAND, 2, Device.MOTOR),
+        (PuckRole.BHAND, 2, Device.MOTOR),
         (0x0002, 2, Device.SAFETY),
         (0x0006, 2, Device.SENSOR),
         (0x0100, 0, Device.MONITOR),

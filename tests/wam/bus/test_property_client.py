@@ -3,40 +3,40 @@ import pytest
 from acquisition.errors import LinkTimeoutError
 from tests.fakes.stepped import Rig
 from wam.bus.frames import Group
-from wam.bus.property_client import Dialogue
+from wam.bus.property_client import PropertyClient
 
 
 def test_a_question_is_answered_with_its_value():
     rig = Rig()
-    assert Dialogue(rig.link, rig.clock).ask(7, 90) == 6
+    assert PropertyClient(rig.link, rig.clock).ask(7, 90) == 6
     assert rig.sent[-1][1:] == (0x007, b"\x5a")
 
 
 def test_an_answer_to_another_question_is_not_taken():
     rig = Rig()
-    dialogue = Dialogue(rig.link, rig.clock)
+    properties = PropertyClient(rig.link, rig.clock)
     rig.link.send(1, b"\x56")  # IPNM of puck 1
     rig.link.send(2, b"\x44")  # CTS of puck 2
-    assert dialogue.ask(1, 68) == 4096
+    assert properties.ask(1, 68) == 4096
     rig.rest(1_000_000)
-    dialogue.drain()
-    assert dialogue.late_replies == 2
+    properties.drain()
+    assert properties.late_replies == 2
 
 
 def test_silence_is_no_value_after_the_time_given():
     rig = Rig()
     begin_ns = rig.clock.t_ns
-    assert Dialogue(rig.link, rig.clock).ask(20, 5, 1_000_000) is None
+    assert PropertyClient(rig.link, rig.clock).ask(20, 5, 1_000_000) is None
     assert rig.clock.t_ns - begin_ns == 1_000_000
 
 
 def test_silence_where_an_answer_is_needed_names_node_and_property():
     rig = Rig()
     with pytest.raises(LinkTimeoutError, match=r"Node 9 .* GET CTS \(68\)"):
-        Dialogue(rig.link, rig.clock).require(9, 68, "CTS")
+        PropertyClient(rig.link, rig.clock).require(9, 68, "CTS")
 
 
 def test_telling_a_group_uses_its_identifier():
     rig = Rig()
-    Dialogue(rig.link, rig.clock).tell_group(Group.ARM, 8, 0)
+    PropertyClient(rig.link, rig.clock).tell_group(Group.ARM, 8, 0)
     assert rig.sent[-1][1:] == (0x404, bytes.fromhex("88 00 00 00 00 00"))

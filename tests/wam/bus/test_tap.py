@@ -4,7 +4,7 @@ from acquisition.ipc.frame_tape import FrameTape
 from acquisition.ipc.layout import FRAME_DTYPE
 from acquisition.ipc.rings import Ring
 from tests.fakes.stepped import SteppedClock
-from wam.bus.tap import FrameTap
+from wam.bus.link import FrameTap
 
 NS_PER_S = 1_000_000_000
 

@@ -12,7 +12,7 @@ CYCLE_NS = 2_000_000
 FORCE, TORQUE = 0x50A, 0x50B
 
 
-class Listener:
+class SerialDialog:
     """Asks for the wrench and remembers what it was told."""
 
     def __init__(self):
@@ -33,14 +33,14 @@ def rig():
 
 @pytest.fixture
 def listener():
-    return Listener()
+    return SerialDialog()
 
 
 @pytest.fixture
 def arm(rig, listener):
     arm = WamArm(rig.link, rig.clock)
     arm.start()
-    arm.accompany(listener)
+    arm.attach_device(listener)
     rig.sent.clear()
     return arm
 

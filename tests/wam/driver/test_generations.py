@@ -8,7 +8,7 @@ from acquisition.errors import DeviceFaultError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import decode_torques
-from wam.bus.property_client import Dialogue
+from wam.bus.property_client import PropertyClient
 from wam.driver.arm import WamArm
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
@@ -114,12 +114,12 @@ def test_positions_are_defined(generation):
 )
 def test_a_property_that_moved_is_where_its_firmware_has_it(vers, ecmax):
     rig = Rig(NetworkOptions(vers=(vers,) * 7))
-    dialogue = Dialogue(rig.link, rig.clock)
-    answering = [n for n in (96, 100, 101) if dialogue.ask(1, n) is not None]
+    properties = PropertyClient(rig.link, rig.clock)
+    answering = [n for n in (96, 100, 101) if properties.ask(1, n) is not None]
     # Up to 124 ECMIN is 97; from 125 on ECMIN is one above ECMAX.
     assert ecmax in answering
     assert (96 in answering) is (vers < 125)
-    assert dialogue.ask(1, ecmax) == 0
+    assert properties.ask(1, ecmax) == 0
 
 
 def test_pucks_of_two_generations_work_together():

@@ -144,7 +144,7 @@ def test_a_bus_that_is_off_is_known_and_comes_back(bench):
     assert bench.cycle().fresh == 0
     assert bench.arm.is_bus_down
     assert bench.arm.counters.link_errors > 0
-    bench.faults.mend()
+    bench.faults.clear_faults()
     reading = bench.cycle()
     assert reading.is_complete
     assert bench.is_true(reading)
@@ -160,7 +160,7 @@ def test_idle_is_confirmed_when_the_bus_comes_back_in_time(bench):
 
     def coming_back(t_ns):
         if t_ns >= back_ns:
-            bench.faults.mend()
+            bench.faults.clear_faults()
         advance(t_ns)
 
     bench.rig.bus.advance = coming_back

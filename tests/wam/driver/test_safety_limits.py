@@ -6,7 +6,7 @@ from acquisition.errors import DeviceFaultError
 from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_set
 from wam.driver.arm import WamArm
-from wam.driver.safety_limits import SafetyLimits
+from wam.driver.safety_module import SafetyLimits
 from wam.driver.settings import ArmSettings
 
 RAISED = SafetyLimits(

@@ -4,10 +4,10 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.property_client import Dialogue
+from wam.bus.property_client import PropertyClient
 from wam.driver.safety_module import (
-    Button,
-    Level,
+    PendantButton,
+    SafetyLevel,
     SafetyModule,
     decode_mode,
     decode_pendant,
@@ -18,14 +18,14 @@ WORDS = [0x0D3F1249, 0x0E3F1249, 0x00794249, 0x0D3F124C, 0x0D3F1849]
 
 
 def client(rig):
-    return SafetyModule(Dialogue(rig.link, rig.clock), rig.clock, vers=200)
+    return SafetyModule(PropertyClient(rig.link, rig.clock), rig.clock, vers=200)
 
 
 def test_idle_without_fault_is_read_from_the_word():
     pendant = decode_pendant(0x0D3F1249)
     assert pendant.is_idle_lit
     assert not pendant.is_active_lit
-    assert (pendant.button, pendant.faults) == (Button.NONE, ())
+    assert (pendant.button, pendant.faults) == (PendantButton.NONE, ())
     assert pendant.segments == 0x3F
 
 
@@ -43,7 +43,7 @@ def test_each_monitor_has_its_field(word, fault):
 
 def test_a_warning_is_no_fault():
     pendant = decode_pendant(0x0D3F1251)
-    assert pendant.torque is Level.WARNING
+    assert pendant.torque is SafetyLevel.WARNING
     assert pendant.faults == ()
 
 

@@ -9,7 +9,7 @@ from acquisition.errors import PreflightError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import property_reply_id
-from wam.bus.properties import MAGNETIC_ENCODER, Role
+from wam.bus.properties import MAGNETIC_ENCODER, PuckRole
 from wam.driver.arm import WamArm
 
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)
@@ -120,9 +120,9 @@ def test_older_firmware_has_no_absolute_angle():
 
 def test_a_puck_without_a_magnetic_encoder_has_no_absolute_angle():
     rig = Rig(counts=HOME_COUNTS)
-    rig.network.set_property(3, "ROLE", int(Role.TATER))
+    rig.network.set_property(3, "ROLE", int(PuckRole.TATER))
     assert start(rig).pucks[2].mech is None
-    rig.network.set_property(3, "ROLE", MAGNETIC_ENCODER | Role.TATER)
+    rig.network.set_property(3, "ROLE", MAGNETIC_ENCODER | PuckRole.TATER)
     assert start(rig).pucks[2].mech is not None
 
 

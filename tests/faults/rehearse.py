@@ -11,12 +11,12 @@ import experiments.run.runner
 import experiments.run.session
 import fakes.world.rig
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Limits
+from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify
-from experiments.operator.prompts import AutoKeys, Prompt
-from fakes.world.rig import FakeRig, Rehearsal
+from experiments.operator.prompts import AutoOperator, Prompt
+from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
@@ -32,7 +32,7 @@ _PROMPTS = {
 
 
 @dataclass(slots=True)
-class Scene:
+class SimulatedScene:
     """What a fault can reach: the simulated devices and the loop's cycle."""
 
     rig: FakeRig
@@ -42,9 +42,9 @@ class Scene:
     struck_ns: int | None = None
     heard_ns: int = 0
     seen: list[tuple[int, str, ArmState]] = field(default_factory=list)
-    usual_limits: Limits | None = None
+    usual_limits: GuardLimits | None = None
 
-    def mend(self) -> None:
+    def clear_faults(self) -> None:
         """Give the guard its limits back."""
         if self.usual_limits is not None:
             self.cycle._limits, self.usual_limits = self.usual_limits, None
@@ -86,7 +86,7 @@ class Seen:
     """How it ended: what was said, what is on the disk, what the arm did."""
 
     done: Done
-    scene: Scene
+    scene: SimulatedScene
     folder: Path | None
     data: Path
 
@@ -102,14 +102,14 @@ class Seen:
         return [sidecar(path)["reason"] for path in paths]
 
 
-Strike = Callable[[Scene], None]
+Strike = Callable[[SimulatedScene], None]
 
 
-def run_with(strike: Strike, phase: str, config: Path, data: Path) -> Seen:
-    """Run a session of one trial in which `strike` comes once, in `phase`."""
+def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
+    """Run a session of one trial in which `inject` comes once, in `phase`."""
     with pytest.MonkeyPatch.context() as patch:
         scenes = _watch(patch)
-        _at(patch, phase, scenes, strike)
+        _at(patch, phase, scenes, inject)
         done = run_short(config, data, "TF", 1)
     found = [path for path in (data / "sessions").glob("2*") if path.is_dir()]
     return Seen(done, scenes[0], found[0] if found else None, data)
@@ -118,7 +118,7 @@ def run_with(strike: Strike, phase: str, config: Path, data: Path) -> Seen:
 def resume(data: Path) -> Done:
     """Go on with the session on a rig that is well again."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(AutoKeys, "answer", lambda _, asked: _press(asked))
+        patch.setattr(AutoOperator, "answer", lambda _, asked: _press(asked))
         return traction("resume", "--operator-script", "auto", "--data", data)
 
 
@@ -139,14 +139,14 @@ def _press(asked) -> str:
     return key if asked.since > wait else ""
 
 
-def _watch(patch: pytest.MonkeyPatch) -> list[Scene]:
+def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
     """Let every simulated rig, cycle and torque frame be seen."""
-    scenes: list[Scene] = []
+    scenes: list[SimulatedScene] = []
 
     class Rig(fakes.world.rig.FakeRig):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **named)
-            scenes.append(scene := Scene(self, patch))
+            scenes.append(scene := SimulatedScene(self, patch))
             bank = self.network._bank
             usual = bank.receive_torques
 
@@ -166,27 +166,27 @@ def _watch(patch: pytest.MonkeyPatch) -> list[Scene]:
         finally:
             scene.look()
 
-    usual_mend = Rehearsal.mend
+    usual_mend = LocalSimulation.clear_faults
 
-    def mend(rehearsal):
-        scenes[-1].mend()
-        usual_mend(rehearsal)
+    def clear_faults(simulation):
+        scenes[-1].clear_faults()
+        usual_mend(simulation)
 
-    patch.setattr(Rehearsal, "mend", mend)
+    patch.setattr(LocalSimulation, "clear_faults", clear_faults)
     patch.setattr(fakes.world.rig, "FakeRig", Rig)
     patch.setattr(Cycle, "__call__", call)
     return scenes
 
 
-def _at(patch, phase: str, scenes: list[Scene], strike: Strike) -> None:
-    """Let `strike` come once, in `phase`."""
+def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None:
+    """Let `inject` come once, in `phase`."""
 
     def strike_once() -> None:
         scene = scenes[0]
         if not scene.strikes:
             scene.strikes += 1
             scene.struck_ns = scene.rig._clock.now_ns()
-            strike(scene)
+            inject(scene)
 
     def answer(_, asked):
         prompt, since = _PROMPTS.get(phase, (None, 0.0))
@@ -196,7 +196,7 @@ def _at(patch, phase: str, scenes: list[Scene], strike: Strike) -> None:
             return "k" if phase == "end" else "" if is_first else _press(asked)
         return _press(asked) if phase != "end" or asked.prompt is not prompt else ""
 
-    patch.setattr(AutoKeys, "answer", answer)
+    patch.setattr(AutoOperator, "answer", answer)
     if phase == "preflight":
         _before(patch, experiments.run.session, "run_preflight", strike_once)
     if phase == "idle":
@@ -217,4 +217,4 @@ def _before(patch, module, name: str, first, idle: float = 0.0) -> None:
 
 def inject(name: str) -> Strike:
     """Return the strike that a rehearsal calls `name`."""
-    return lambda scene: Rehearsal(scene.rig).inject(name)
+    return lambda scene: LocalSimulation(scene.rig).inject(name)

@@ -1,10 +1,56 @@
-"""Spoken cues where a speech program is installed: fixed words, never waited for."""
+"""What a person with both hands on the arm hears: bells, and words where possible."""
+
+from __future__ import annotations
 
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from enum import Enum
+
+from experiments.operator.console import Console
+from experiments.settings.rig import OperatorSection
+
+
+class FeedbackSignal(Enum):
+    """A moment, with the number of bells and the words for it."""
+
+    START = (1, "recording")
+    TOO_FAST = (3, "slower")
+    DONE = (2, "done")
+
+
+class OperatorFeedback:
+    """Gives cues through the console's bell and a speech program."""
+
+    def __init__(
+        self, console: Console, speech: SpeechOutput | None, *, rings: bool
+    ) -> None:
+        self._console = console
+        self._speaker = speech
+        self._rings = rings
+
+    def give(self, cue: FeedbackSignal) -> None:
+        """Give one cue; never waits."""
+        bells, words = cue.value
+        if self._rings:
+            self._console.bell(bells)
+        if self._speaker is not None:
+            self._speaker.say(words)
+
+    def close(self) -> None:
+        """Be silent from here on; safe to repeat."""
+        if self._speaker is not None:
+            self._speaker.close()
+
+
+def build_cues(settings: OperatorSection, console: Console) -> OperatorFeedback:
+    """Return the cues as [operator] of rig.toml wants them."""
+    program = find_speech() if settings.speech else None
+    speech = SpeechOutput(program) if program is not None else None
+    return OperatorFeedback(console, speech, rings=settings.bell)
+
 
 _PROGRAMS = ("spd-say", "espeak-ng", "espeak", "say")
 _PATIENCE = 0.5  # for a program that was killed to be gone [s]
@@ -16,7 +62,7 @@ def find_speech(which: Callable[[str], str | None] = shutil.which) -> str | None
 
 
 @dataclass(slots=True)
-class Speaker:
+class SpeechOutput:
     """Says words through a program of its own, one at a time.
 
     Attributes:

@@ -10,7 +10,7 @@ from analysis.data.series import Array, Indices
 
 
 @dataclass(frozen=True, slots=True)
-class Rows:
+class SampleTable:
     """Kept samples of one or more trials.
 
     Attributes:
@@ -24,12 +24,12 @@ class Rows:
     F_t: Array
 
     @classmethod
-    def of(cls, trials: Sequence[PreparedTrial]) -> "Rows":
+    def of(cls, trials: Sequence[PreparedTrial]) -> "SampleTable":
         """Return the kept samples of `trials`, one after the other."""
         return cls.joined([cls(trial.F_n, trial.v_t, trial.F_t) for trial in trials])
 
     @classmethod
-    def joined(cls, parts: Sequence["Rows"]) -> "Rows":
+    def joined(cls, parts: Sequence["SampleTable"]) -> "SampleTable":
         """Return the rows of `parts`, one after the other."""
         empty = np.zeros(0)
         return cls(
@@ -43,9 +43,9 @@ class Rows:
         """Number of rows."""
         return int(self.F_t.size)
 
-    def take(self, indices: Indices) -> "Rows":
+    def take(self, indices: Indices) -> "SampleTable":
         """Return the rows at `indices`."""
-        return Rows(self.F_n[indices], self.v_t[indices], self.F_t[indices])
+        return SampleTable(self.F_n[indices], self.v_t[indices], self.F_t[indices])
 
     @property
     def inputs(self) -> Array:
@@ -54,7 +54,7 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Training:
+class TrainingSet:
     """What a model is fitted to; compared and hashed as the object it is.
 
     Attributes:
@@ -63,12 +63,12 @@ class Training:
         chosen: the rows that a Gaussian process is given.
     """
 
-    rows: Rows
+    rows: SampleTable
     lengths: tuple[int, ...]
     chosen: Indices
 
     @property
-    def subset(self) -> Rows:
+    def subset(self) -> SampleTable:
         """Return the chosen rows."""
         return self.rows.take(self.chosen)
 
