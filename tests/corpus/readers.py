@@ -56,7 +56,7 @@ _TIMING = StreamTiming(1_250_000.0, 803_000, _WRAP, 1000.0, 50_000_000, 37)
 
 
 def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None:
-    """Put a session with one hostile file into `folder` and look at it, then recover_session."""
+    """Put a session with one hostile file into `folder`, inspect and recover it."""
     path = folder / "sessions" / SESSION
     for below in ("trials", "rejected", "faults"):
         (path / below).mkdir(parents=True)

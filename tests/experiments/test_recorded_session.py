@@ -1,0 +1,58 @@
+"""What an earlier version recorded stays readable, and a seed stays what it was."""
+
+import json
+import tarfile
+from pathlib import Path
+
+import pytest
+
+from tests.experiments.cycle_digest import KEPT, digests_of, processor, record
+from tests.experiments.program import journal, only_session, traction
+
+RECORDED = Path(__file__).parents[1] / "data" / "recorded"
+# Two trials of three on TF; the configuration lies in the folder of the session.
+SESSION = RECORDED / "session-0.1.tar.xz"
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Return the data folder and the rig.toml of the recorded session."""
+    with tarfile.open(SESSION) as archive:
+        archive.extractall(tmp_path, filter="data")
+    folder = only_session(tmp_path)
+    (tmp_path / "rig.toml").write_bytes((folder / "config.toml").read_bytes())
+    (tmp_path / "matrix.toml").write_bytes((folder / "matrix.toml").read_bytes())
+    return tmp_path, tmp_path / "rig.toml"
+
+
+def test_one_seed_records_the_cycles_it_always_did(tmp_path):
+    kept = json.loads(KEPT.read_text())
+    if kept["processor"] != processor():
+        pytest.skip(f"the digests hold for a {kept['processor']} processor")
+    assert digests_of(record(tmp_path)) == kept["digests"]
+
+
+def test_a_session_of_version_0_1_is_counted(recorded):
+    data, config = recorded
+    done = traction("status", "--json", "--data", data, "--config", config)
+    assert done.code == 0
+    rows = [row for row in json.loads(done.out) if row["is_simulated"]]
+    assert [(row["terrain"], row["kept"]) for row in rows if row["kept"]] == [("TF", 2)]
+
+
+def test_a_session_of_version_0_1_is_reported(recorded):
+    data, config = recorded
+    done = traction("report", "S001", "--data", data, "--config", config)
+    assert done.code == 0, done.err
+    assert (only_session(data) / "report" / "index.html").stat().st_size > 100_000
+
+
+def test_a_session_of_version_0_1_is_resumed_and_completed(recorded):
+    data, config = recorded
+    done = traction(
+        *("resume", "S001", "--operator-script", "auto"),
+        *("--data", data, "--config", config),
+    )
+    assert done.code == 0, done.out + done.err
+    assert journal(only_session(data))[-1]["event"] == "session-ended"
+    assert (only_session(data) / "trials" / "T03.mcap").exists()
