@@ -1,1 +1,5 @@
-"""report."""
+"""The report page: sections, tables, figures in order, what-if variants.
+
+`page` writes the folder, `page_model` is what a page consists of, `gallery` collects
+the figures. Begin with `page`.
+"""

@@ -1,1 +1,4 @@
-"""Templates of the report."""
+"""Templates of the report page.
+
+`analysis.report.page` fills them.
+"""

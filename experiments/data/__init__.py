@@ -1,1 +1,4 @@
-"""Shipped defaults: rig.toml and matrix.toml."""
+"""Shipped defaults and texts: rig.toml, matrix.toml, messages.toml.
+
+`experiments.settings` and `experiments.messages` read them.
+"""

@@ -1,1 +1,5 @@
-"""bus."""
+"""The simulated bus: in this process, on a socket, on any python-can adapter.
+
+`in_process` is a `can.BusABC` on stepped time, `hub` and `client` the two ends of a
+socket, `adapter` any other bus.
+"""

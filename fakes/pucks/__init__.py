@@ -1,1 +1,5 @@
-"""pucks."""
+"""Simulated motor controllers and safety module, frame by frame.
+
+`network` is what a host sees, `bank` the seven motor pucks, `safety_module` the eighth
+voice, `wire` the time that frames take. Begin with `network`.
+"""

@@ -1,1 +1,5 @@
-"""vendors."""
+"""One make of sensor a module: its protocol, its start-up, its settings.
+
+Bota, Robotous and OptoForce on a serial line, Barrett on the arm's bus. A new make is a
+new module here and an entry in the registry.
+"""

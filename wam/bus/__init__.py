@@ -1,1 +1,6 @@
-"""bus."""
+"""CAN frames of the motor controllers (pucks), and the link that carries them.
+
+`frames` is the codec without I/O, `link` the door to python-can, `properties` and
+`property_client` the table of settings of a puck, `log` and `decoder` a bus log in
+words.
+"""

@@ -1,1 +1,6 @@
-"""control."""
+"""Joint torques from joint positions: the control law and its parts.
+
+`controller` adds gravity, the virtual mass at the foot, the lock of joint 7
+(`joint_lock`), soft walls before the stops (`soft_walls`) and moves in joint space
+(`joint_move`). Begin with `controller`.
+"""

@@ -1,1 +1,5 @@
-"""model."""
+"""The arm as a model: constants, kinematics, gravity, the tool on its wrist.
+
+`arm_model` is the door to Pinocchio, `constants` reads the table of the arm, `tool` the
+sensor and foot, `gravity` and `moments` what the arm weighs. Begin with `arm_model`.
+"""
