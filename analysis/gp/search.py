@@ -206,7 +206,7 @@ def _climb(
         if _is_below(intermediate_result.x * steps, -intermediate_result.fun, known):
             raise StopIteration
 
-    found = minimize(
+    optimum = minimize(
         downhill,
         np.clip(start, bounds[:, 0], bounds[:, 1]) / steps,
         jac=True,
@@ -215,8 +215,8 @@ def _climb(
         callback=look,
         options={"maxiter": 200, "gtol": 1e-5, "ftol": 2e-9},
     )
-    theta = tuple(float(value) for value in found.x * steps)
-    return Start(theta, -float(found.fun), int(found.nfev))
+    theta = tuple(float(value) for value in optimum.x * steps)
+    return Start(theta, -float(optimum.fun), int(optimum.nfev))
 
 
 def _finish(

@@ -18,6 +18,7 @@ import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
+from analysis.data.terrain_kinds import groups_of
 from analysis.study.jobs import run_tasks
 from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE
@@ -25,31 +26,13 @@ from analysis.study.study import Study, TerrainResult
 from analysis.terrains.confusion import Confusion, confusion_of
 
 WINDOWS = (50, 100, 200)  # kept samples: 0.5, 1 and 2 s of motion
+KEPT_PER_SECOND = 100  # kept samples of a second of motion
 NONE = "none"  # of the known terrains
 RARE = 0.01  # share of a terrain's own windows that strain it beyond the limit
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N
 _SPIKE = 10.0  # standard deviations beyond which a sample says no more
-_KINDS = {"S": "small", "B": "big", "T": "flat"}
 Predictor = Callable[[Array, Array], Prediction]
-CommandKind = Callable[[str], str]
-
-
-def kind_of(terrain: str) -> str:
-    """Return "small", "big" or "flat" by the paper's names; others are of their own."""
-    return _KINDS.get(terrain[:1], terrain)
-
-
-def surface_of(terrain: str) -> str:
-    """Return "flat" or "rocky"."""
-    return "flat" if kind_of(terrain) == "flat" else "rocky"
-
-
-LEVELS: Mapping[str, CommandKind] = {
-    "terrain": lambda terrain: terrain,
-    "stones": kind_of,
-    "surface": surface_of,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,25 +115,32 @@ class TerrainScores:
         """Return the terrain of the largest log density."""
         return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
 
-    def likeliest_kind(self, rows: slice, kind: CommandKind) -> str:
-        """Return the kind whose terrains have most of the posterior together."""
+    def likeliest_group(self, rows: slice, groups: Mapping[str, str]) -> str:
+        """Return the group whose terrains have most of the posterior together.
+
+        Args:
+            rows: the samples that decide.
+            groups: group by name of the terrain.
+        """
         total: dict[str, float] = {}
         for name, share in zip(self.terrains, self.posterior(rows), strict=True):
-            total[kind(name)] = total.get(kind(name), 0.0) + float(share)
+            group = groups[name]
+            total[group] = total.get(group, 0.0) + float(share)
         return max(total, key=lambda name: total[name])
 
 
 def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
     """Return how `trial` fits what every expert expects."""
-    found = [
+    predictions = [
         (expert.predict(trial.F_n, trial.v_t), expert.rho)
         for expert in experts.values()
     ]
     empty = np.zeros((trial.kept, 0))
-    density = [log_densities(trial, p, rho) for p, rho in found]
-    error = [np.abs(trial.F_t - p.mean) for p, _ in found]
+    density = [log_densities(trial, p, rho) for p, rho in predictions]
+    error = [np.abs(trial.F_t - p.mean) for p, _ in predictions]
     strain = [
-        ((trial.F_t - p.mean) / np.maximum(p.sd, _SMALLEST_SD)) ** 2 for p, _ in found
+        ((trial.F_t - p.mean) / np.maximum(p.sd, _SMALLEST_SD)) ** 2
+        for p, _ in predictions
     ]
     columns = [
         np.column_stack(values) if values else empty
@@ -198,6 +188,7 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     names = tuple(name for name in study.terrains if name in scored)
     if len(names) < 2:
         return None
+    groups = groups_of(study.kinds)
     density, error, limits = {}, {}, {}
     for size in WINDOWS:
         windows = [
@@ -207,12 +198,12 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
             for rows in scores.windows(size)
         ]
         density[size], error[size] = {}, {}
-        for level, kind in LEVELS.items():
+        for level, group in groups.items():
             density[size][level] = confusion_of(
-                [(kind(t), s.likeliest_kind(r, kind)) for t, s, r in windows]
+                [(group[t], s.likeliest_group(r, group)) for t, s, r in windows]
             )
             error[size][level] = confusion_of(
-                [(kind(t), kind(s.least_error(r))) for t, s, r in windows]
+                [(group[t], group[s.least_error(r)]) for t, s, r in windows]
             )
         limits[size] = {name: own_limit(scored[name], name, size) for name in names}
     return Identification(rho, density, error, limits)
@@ -258,8 +249,8 @@ def _score_folds(
     for name, result in study.terrains.items():
         for fold in result.folds:
             if model in fold.models:
-                found = experts.setdefault(fold.fold, {})
-                found[name] = Expert(fold.models[model].model.predict, rho[name])
+                of_fold = experts.setdefault(fold.fold, {})
+                of_fold[name] = Expert(fold.models[model].model.predict, rho[name])
     tasks = [
         ScoreTask(trial, experts[k])
         for name, result in study.terrains.items()
