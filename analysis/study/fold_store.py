@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.data.samples import SampleTable
-from analysis.gp import kernels, noise, sparse
+from analysis.gp import kernels, noise
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import Start
@@ -52,7 +52,6 @@ TYPES = {
         kernels.Sum,
         noise.ConstantNoise,
         noise.LogLinearNoise,
-        sparse.SparseProcess,
         tustin.TustinBounds,
         tustin.TustinFit,
         tustin.TustinForm,

@@ -26,7 +26,7 @@ def task(slice_trials):
         name: [prepare(series, PrepareOptions()) for series in slice_trials[name]]
         for name in ("S0", "TF")
     }
-    options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_all"))
+    options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_noise"))
     return plan_folds(trials, options)[0][0]
 
 
