@@ -14,8 +14,7 @@ from analysis.figures.style import (
     shade_table,
 )
 from analysis.findings.findings import StudyResults
-from analysis.terrains.confusion import Confusion
-from analysis.terrains.identify import KEPT_PER_SECOND
+from analysis.terrains.identify import KEPT_PER_SECOND, Confusion
 
 _SIDE = 2.25  # inches of one matrix of terrains
 _SMALL_SIDE = 1.55  # of a matrix of two or three kinds

@@ -9,8 +9,7 @@ from analysis.data.terrain_kinds import LEVELS
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.trends import TREND_UNITS, NoiseSummary, ResidualBand, Trend
-from analysis.terrains.confusion import Confusion
-from analysis.terrains.identify import Identification
+from analysis.terrains.identify import Confusion, Identification
 
 _DIGITS = 5  # of the surfaces in fits.json
 

@@ -21,7 +21,7 @@ from analysis.findings.trends import (
 from analysis.study.fits import to_csv, to_plain
 from analysis.study.models import GP_SE, GP_SE_NOISE, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from analysis.terrains.confusion import Confusion
+from analysis.terrains.identify import Confusion
 
 
 @pytest.fixture(scope="module")

@@ -15,16 +15,15 @@ from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 from analysis.terrains.database import load
 from analysis.terrains.export import database_of
-from analysis.terrains.identify import (
-    Confusion,
+from analysis.terrains.identify import Confusion, identify_study
+from analysis.terrains.recognition import recognise
+from analysis.terrains.scores import (
     Expert,
     TerrainScores,
-    identify_study,
     log_densities,
     neighbour_correlation,
     score_trial,
 )
-from analysis.terrains.recognition import recognise
 from analysis.terrains.table import Table
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
