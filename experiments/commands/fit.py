@@ -39,7 +39,8 @@ def run(args: argparse.Namespace) -> int:
     from analysis.study.models import FitOptions
     from analysis.study.study import StudyOptions, run_study
     from experiments.operator.console import Console
-    from experiments.report.sessions import REPORTED, fitting
+    from experiments.report.progress import fitting
+    from experiments.report.sessions import REPORTED
     from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
