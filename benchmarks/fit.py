@@ -24,7 +24,6 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
-from analysis.gp.sparse import fit_sparse
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
 from benchmarks.study_race import race
@@ -81,8 +80,8 @@ def duel(
     return statistics.median(spent[0]), statistics.median(spent[1])
 
 
-class PageSection(NamedTuple):
-    """One thing that is measured: ours, the other's, and how often.
+class SpeedComparison(NamedTuple):
+    """A fit measured beside the same fit by another library.
 
     Attributes:
         name: what is printed.
@@ -98,24 +97,23 @@ class PageSection(NamedTuple):
 
     def measured(self) -> dict[str, object]:
         """Return both times, their ratio and what was reached."""
-        mine, its = duel(self.ours, self.other, self.rounds)
+        ours, other = duel(self.ours, self.other, self.rounds)
         return {
             "part": self.name,
-            "ours_ms": 1e3 * mine,
-            "other_ms": 1e3 * its,
-            "ratio": its / mine,
+            "ours_ms": 1e3 * ours,
+            "other_ms": 1e3 * other,
+            "ratio": other / ours,
             "goal": _GOALS.get(self.name),
             "reached": self.ours(),
             "other_reached": self.other(),
         }
 
 
-def parts(rounds: int) -> list[PageSection]:
+def parts(rounds: int) -> list[SpeedComparison]:
     """Return what is measured of single fits."""
     rows = load_rows()
     X, y = chosen(rows)
     starts = {part: our_starts(part, X, y) for part in KERNELS}
-    sparse = f"all {rows.count} samples, sparse, beside {_POINTS} exact"
 
     def likelihood_of_theirs(part: str) -> float:
         model = fit_theirs(part, X, y, starts[part])
@@ -123,34 +121,28 @@ def parts(rounds: int) -> list[PageSection]:
 
     return [
         evaluation(X, y, 10 * rounds),
-        PageSection(
+        SpeedComparison(
             "SE fit",
             lambda: fit_gp(X, y).lml,
             lambda: likelihood_of_theirs("SE fit"),
             rounds,
         ),
-        PageSection(
+        SpeedComparison(
             "NN fit",
             lambda: fit_gp(X, y, Arcsine()).lml,
             lambda: likelihood_of_theirs("NN fit"),
             rounds,
         ),
-        PageSection(
+        SpeedComparison(
             "Tustin fit",
             lambda: fit_tustin(rows.F_n, rows.v_t, rows.F_t).sse,
             lambda: many_starts(rows),
             rounds,
         ),
-        PageSection(
-            sparse,
-            lambda: fit_sparse(rows.inputs, rows.F_t).lml,
-            lambda: fit_gp(X, y).lml,
-            rounds,
-        ),
     ]
 
 
-def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> PageSection:
+def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
     """Return one likelihood with its gradient, as a search asks for it."""
     theta = our_starts("SE fit", X, y)[0]
     likelihood = Likelihood((KERNELS["SE fit"], ConstantNoise()), X, y)
@@ -158,7 +150,7 @@ def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> PageSection:
         theirs("SE fit", theta, float(y.std())), alpha=1e-10, optimizer=None
     ).fit(X, y)
     at = model.kernel_.theta
-    return PageSection(
+    return SpeedComparison(
         "evaluation",
         lambda: likelihood(theta)[0],
         lambda: model.log_marginal_likelihood(

@@ -73,6 +73,11 @@ class RecordedTrial:
         return f"{trial.get('session', '?')}/{trial.get('trial', '?')}"
 
     @property
+    def stones(self) -> str:
+        """Size of the stones: "small", "big", "none"; empty where it was not kept."""
+        return self.metadata["trial"].get("stone_size", "")
+
+    @property
     def is_simulated(self) -> bool:
         """Whether the trial came from simulated devices."""
         return self.metadata["trial"].get("simulated") == "true"
@@ -96,7 +101,9 @@ class RecordedTrial:
                 slip is along what x_T leaves in the sole.
         """
         v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
-        return TractionSeries(self.terrain, self.name, self.t, v_t, F_n, F_t)
+        return TractionSeries(
+            self.terrain, self.name, self.t, v_t, F_n, F_t, self.stones
+        )
 
     def _on_sole(self) -> Array:
         """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""

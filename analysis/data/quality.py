@@ -60,13 +60,13 @@ def coverage(trials: Sequence[PreparedTrial]) -> CoverageGrid:
     return CoverageGrid(counts)
 
 
-def suggest(found: CoverageGrid) -> str:
+def suggest(grid: CoverageGrid) -> str:
     """Return how the next push should be, in words; empty when nothing is missing.
 
     Of the cells that a person can aim at, the emptiest one below 2 % of the samples.
     """
-    shares = found.shares
-    if not found.counts.sum():
+    shares = grid.shares
+    if not grid.counts.sum():
         return ""
     emptiest = min(_AIMS, key=lambda cell: shares[cell])
     if shares[emptiest] >= ENOUGH:

@@ -30,6 +30,8 @@ class TractionSeries:
         v_t: velocity of the sole along the slip direction [m/s], > 0 in slip.
         F_n: normal force [N], > 0 in compression.
         F_t: traction force [N], > 0 in slip.
+        stones: size of the stones as recorded or given: "small", "big" or "none";
+            empty where it is not known.
         dropped_rows: number of rows that were not finite.
         repeated_rows: number of rows that were there twice.
 
@@ -44,6 +46,7 @@ class TractionSeries:
     v_t: Array
     F_n: Array
     F_t: Array
+    stones: str = ""
     dropped_rows: int = field(init=False)
     repeated_rows: int = field(init=False)
 
@@ -90,9 +93,9 @@ def _check_name(terrain: str, name: str) -> None:
 def _check_shapes(columns: list[Array], name: str) -> None:
     shapes = [column.shape for column in columns]
     if any(len(shape) != 1 for shape in shapes) or len(set(shapes)) != 1:
-        found = ", ".join(f"{k} {s}" for k, s in zip(_COLUMNS, shapes, strict=True))
+        listed = ", ".join(f"{k} {s}" for k, s in zip(_COLUMNS, shapes, strict=True))
         raise SettingsError(
-            f"{name}: the columns differ in shape ({found}).",
+            f"{name}: the columns differ in shape ({listed}).",
             hint="All four must be one-dimensional and equally long.",
         )
 

@@ -8,12 +8,14 @@ import csv
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.series import Array, TractionSeries
+from analysis.data.terrain_kinds import STONE_SIZES
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")
 DEFAULT_TERRAIN = "table"
@@ -53,10 +55,30 @@ def parse_columns(text: str) -> dict[str, str]:
     return columns
 
 
+def parse_stones(text: str) -> dict[str, str]:
+    """Return the size of the stones by terrain from `Sand=none,Beach=small`.
+
+    Raises:
+        SettingsError: a part is not TERRAIN=SIZE, or there is no such size.
+    """
+    stones: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        terrain, equals, size = (piece.strip() for piece in part.rpartition("="))
+        if not (equals and terrain) or size not in STONE_SIZES:
+            raise SettingsError(
+                f"--stones {text}: {part!r} does not give the stones of a terrain.",
+                hint=f"The sizes are {', '.join(STONE_SIZES)}; write e.g. "
+                "--stones Sand=none,Beach=small",
+            )
+        stones[terrain] = size
+    return stones
+
+
 def load_tables(
     paths: Sequence[Path],
     columns: Mapping[str, str] | None = None,
     terrain: str | None = None,
+    stones: Mapping[str, str] | None = None,
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials in `paths` by terrain, in the order of the files.
 
@@ -64,20 +86,45 @@ def load_tables(
         paths: CSV files, one trial each, and npz files, any number of trials each.
         columns: name of each column of the analysis in a CSV; by default its own.
         terrain: terrain of every CSV; by default "table". An npz names its own.
+        stones: size of the stones by terrain: "small", "big" or "none"; where it is
+            not given, see `analysis.data.terrain_kinds.terrain_kind`.
 
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
+    columns = {name: name for name in COLUMNS} | dict(columns or {})
+    form = _TableForm(columns, terrain or DEFAULT_TERRAIN, stones or {})
     trials: dict[str, list[TractionSeries]] = {}
     for path in paths:
-        for series in _load(path, columns or {}, terrain or DEFAULT_TERRAIN):
+        for series in _load(path, form):
             trials.setdefault(series.terrain, []).append(series)
     if not trials:
         raise SettingsError("No table was given.", hint="Name at least one file.")
     return trials
 
 
-def _load(path: Path, columns: Mapping[str, str], terrain: str) -> list[TractionSeries]:
+@dataclass(frozen=True, slots=True)
+class _TableForm:
+    """How tables are read.
+
+    Attributes:
+        columns: name of each column of the analysis in a CSV.
+        terrain: terrain of every CSV.
+        stones: size of the stones by terrain, where it is given.
+    """
+
+    columns: Mapping[str, str]
+    terrain: str
+    stones: Mapping[str, str]
+
+    def series(self, terrain: str, name: str, table: Array) -> TractionSeries:
+        """Return a table (n, 4) of t, v_t, F_n, F_t as a trial."""
+        t, v_t, F_n, F_t = table.T
+        stones = self.stones.get(terrain, "")
+        return TractionSeries(terrain, name, t, v_t, F_n, F_t, stones)
+
+
+def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
@@ -90,10 +137,8 @@ def _load(path: Path, columns: Mapping[str, str], terrain: str) -> list[Traction
         raise _refusal(path, "the file is empty", "Check that it was copied whole.")
     _check_size(path, size)
     if start[:2] == b"PK":
-        return _load_npz(path)
-    return [
-        _load_csv(path, {name: columns.get(name, name) for name in COLUMNS}, terrain)
-    ]
+        return _load_npz(path, form)
+    return [_load_csv(path, form)]
 
 
 def _refusal(path: Path, reason: str, hint: str) -> SettingsError:
@@ -109,13 +154,13 @@ def _check_size(path: Path, size: int) -> None:
         )
 
 
-def _load_npz(path: Path) -> list[TractionSeries]:
+def _load_npz(path: Path, form: _TableForm) -> list[TractionSeries]:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
         _check_members(path, members)
         with np.load(path, allow_pickle=False) as arrays:
-            return [_from_array(path, key, arrays[key]) for key in arrays.files]
+            return [_from_array(path, key, arrays[key], form) for key in arrays.files]
     except _BROKEN_NPZ as error:
         raise _refusal(path, f"not a readable npz ({error})", _FORM) from error
 
@@ -124,8 +169,8 @@ def _check_members(path: Path, members: list[zipfile.ZipInfo]) -> None:
     _check_size(path, sum(member.file_size for member in members))
     strangers = [member.filename for member in members if not _is_trial(member)]
     if strangers or not members:
-        found = ", ".join(strangers[:5]) or "nothing"
-        raise _refusal(path, f"no table of trials (it holds {found:.200s})", _FORM)
+        others = ", ".join(strangers[:5]) or "nothing"
+        raise _refusal(path, f"no table of trials (it holds {others:.200s})", _FORM)
     if len(members) > MOST_TRIALS:
         raise _refusal(
             path, f"{len(members)} arrays, the limit is {MOST_TRIALS}", "Split it."
@@ -137,7 +182,9 @@ def _is_trial(member: zipfile.ZipInfo) -> bool:
     return member.filename.endswith(".npy") and bool(terrain and slash and trial)
 
 
-def _from_array(path: Path, key: str, array: np.ndarray) -> TractionSeries:
+def _from_array(
+    path: Path, key: str, array: np.ndarray, form: _TableForm
+) -> TractionSeries:
     if (
         array.ndim != 2
         or array.shape[1] != len(COLUMNS)
@@ -148,17 +195,15 @@ def _from_array(path: Path, key: str, array: np.ndarray) -> TractionSeries:
             f"array {key} has shape {array.shape} and type {array.dtype}",
             _FORM,
         )
-    t, v_t, F_n, F_t = np.asarray(array, dtype=np.float64).T
-    return TractionSeries(
-        key.rpartition("/")[0], f"{path.name}:{key}", t, v_t, F_n, F_t
-    )
+    table = np.asarray(array, dtype=np.float64)
+    return form.series(key.rpartition("/")[0], f"{path.name}:{key}", table)
 
 
-def _load_csv(path: Path, columns: Mapping[str, str], terrain: str) -> TractionSeries:
+def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
-            places = _places(path, header, columns)
+            places = _places(path, header, form.columns)
             rows = [line for line in file if line.strip()]
     except UnicodeDecodeError as error:
         raise _refusal(
@@ -170,18 +215,16 @@ def _load_csv(path: Path, columns: Mapping[str, str], terrain: str) -> TractionS
         ) from error
     if not rows:
         raise _refusal(path, "a header but no rows", "Check that it was copied whole.")
-    table = _numbers(path, rows, places)
-    t, v_t, F_n, F_t = table.T
-    return TractionSeries(terrain, path.name, t, v_t, F_n, F_t)
+    return form.series(form.terrain, path.name, _numbers(path, rows, places))
 
 
 def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[int]:
     missing = [column for column in columns.values() if column not in header]
     if missing:
-        found = ", ".join(header)
+        present = ", ".join(header)
         raise _refusal(
             path,
-            f"no column {', '.join(missing)}; it has {found[:300] or 'none'}",
+            f"no column {', '.join(missing)}; it has {present[:300] or 'none'}",
             "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
         )
     return [header.index(columns[name]) for name in COLUMNS]

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     Axes,
     Figure,
@@ -13,9 +14,8 @@ from analysis.figures.style import (
     shade_table,
 )
 from analysis.findings.findings import StudyResults
-from analysis.terrains.confusion import Confusion
+from analysis.terrains.identify import KEPT_PER_SECOND, Confusion
 
-_KEPT_PER_SECOND = 100
 _SIDE = 2.25  # inches of one matrix of terrains
 _SMALL_SIDE = 1.55  # of a matrix of two or three kinds
 _MANY = 5  # kinds from which a matrix is a large one
@@ -28,8 +28,8 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
     Above the log density's, below the paper's rule.
     """
 
-    def draw(found: StudyResults) -> Figure | None:
-        identification = found.identification
+    def draw(results: StudyResults) -> Figure | None:
+        identification = results.identification
         if identification is None or not identification.sizes:
             return None
         sizes = identification.sizes
@@ -43,7 +43,7 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
             for ax, size in zip(grid[row], sizes, strict=True):
                 confusion = getattr(identification, attribute)[size][level]
                 _draw_matrix(ax, confusion)
-                seconds = size / _KEPT_PER_SECOND
+                seconds = size / KEPT_PER_SECOND
                 ax.set_title(
                     f"{seconds:g} s, {rule}: {confusion.accuracy:.0%}",
                     loc="left",
@@ -55,6 +55,24 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
         return figure
 
     return draw
+
+
+def caption_confusion(level: str, results: StudyResults) -> str:
+    """State how many windows are recognised by either rule."""
+    identification = results.identification
+    if identification is None:
+        return ""
+    shares = [
+        f"{size / KEPT_PER_SECOND:g} s "
+        f"{identification.by_density[size][level].accuracy:.2f} "
+        f"({identification.by_error[size][level].accuracy:.2f})"
+        for size in identification.sizes
+    ]
+    return (
+        "Shares of the windows of each row in percent, by models that never saw the "
+        "trial. Above: the largest log density; below: the paper's rule, the smallest "
+        f"mean absolute error. Recognised (by the paper's rule): {', '.join(shares)}."
+    )
 
 
 def shares_of(confusion: Confusion) -> np.ndarray:
@@ -83,3 +101,22 @@ def _draw_matrix(ax: Axes, confusion: Confusion) -> None:
     name_ticks(ax, names, 0.5)
     ax.set_yticks(np.arange(len(names)) + 0.5, [plain(name) for name in names])
     ax.tick_params(labelsize=6.5, length=0)
+
+
+def _spec(level: str, key: str, title: str) -> FigureSpec:
+    return FigureSpec(
+        key,
+        title,
+        "Confusion matrices for windows of 0.5, 1 and 2 s: rows are the true kinds, "
+        "columns the answers, numbers are percent of the row; above by log density, "
+        "below by the smallest error.",
+        draw_confusion(level),
+        lambda results: caption_confusion(level, results),
+    )
+
+
+FIGURES = (
+    _spec("terrain", "confusion_terrains", "Telling terrains apart: each terrain"),
+    _spec("stones", "confusion_stones", "Telling terrains apart: size of stones"),
+    _spec("surface", "confusion_surface", "Telling terrains apart: flat or rocky"),
+)

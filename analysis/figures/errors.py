@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from analysis.data.terrain_kinds import FLAT
+from analysis.figures.spec import FigureSpec, ReportSection
 from analysis.figures.style import (
     ERROR_LABEL,
     MODEL_COLOURS,
@@ -16,27 +18,28 @@ from analysis.figures.style import (
     shade_table,
     terrain_colours,
 )
-from analysis.study.models import FITTERS, TITLES
-from analysis.study.study import Study
+from analysis.findings.findings import StudyResults
+from analysis.study.models import FITTERS, GP_SE, TITLES, TUSTIN
+from analysis.study.study import Study, TerrainResult
 
 _MOST_NARROW = 10  # terrains whose bars one column of a paper holds
 _MOST_BARS = 12  # terrains beyond which grouped bars cannot be told apart
 _MAP_COLUMNS = 2  # heat maps side by side
 
 
-def draw_errors(study: Study) -> Figure | None:
+def draw_errors(results: StudyResults) -> Figure | None:
     """Return Fig. 9: error per terrain and model, standard error over the folds."""
-    results = [r for r in study.terrains.values() if r.folds]
-    if not results:
+    terrains = [r for r in results.study.terrains.values() if r.folds]
+    if not terrains:
         return None
-    is_narrow = len(results) <= _MOST_NARROW
+    is_narrow = len(terrains) <= _MOST_NARROW
     figure = new_figure(3.1, ONE_COLUMN if is_narrow else WIDTH)
     ax = figure.subplots()
     width = 0.8 / len(FITTERS)
     for k, model in enumerate(FITTERS):
-        folds = [[e for e in r.maes(model) if e is not None] for r in results]
+        folds = [[e for e in r.maes(model) if e is not None] for r in terrains]
         ax.bar(
-            np.arange(len(results)) + (k - (len(FITTERS) - 1) / 2) * width,
+            np.arange(len(terrains)) + (k - (len(FITTERS) - 1) / 2) * width,
             [float(np.mean(errors)) if errors else 0.0 for errors in folds],
             width * 0.92,
             yerr=[_standard_error(errors) for errors in folds],
@@ -46,7 +49,7 @@ def draw_errors(study: Study) -> Figure | None:
             error_kw={"elinewidth": 0.7, "capsize": 1.2},
             label=TITLES[model],
         )
-    for k, result in enumerate(results):
+    for k, result in enumerate(terrains):
         ax.hlines(
             result.constant_mae or 0.0,
             k - 0.45,
@@ -56,7 +59,7 @@ def draw_errors(study: Study) -> Figure | None:
             linestyle=(0, (4, 2)),
             label="constant (median $F_t$)" if k == 0 else "",
         )
-    name_ticks(ax, [result.terrain for result in results])
+    name_ticks(ax, [result.terrain for result in terrains])
     ax.set_xlabel("terrain")
     ax.set_ylabel(ERROR_LABEL)
     ax.grid(visible=False, axis="x")
@@ -64,14 +67,42 @@ def draw_errors(study: Study) -> Figure | None:
     return figure
 
 
-def draw_cross_bars(study: Study) -> Figure | None:
+def caption_errors(results: StudyResults) -> str:
+    """State the range of the errors, and how far models differ."""
+    study = results.study
+    errors = {
+        (name, model): mae
+        for name, result in study.terrains.items()
+        for model in FITTERS
+        if (mae := result.mae(model)) is not None
+    }
+    if not errors:
+        return "No model could be fitted; the dashed lines are the constant's errors."
+    low, high = min(errors, key=errors.__getitem__), max(errors, key=errors.__getitem__)
+    text = (
+        f"Smallest error {errors[low]:.2f} N ({TITLES[low[1]]} on {low[0]}), largest "
+        f"{errors[high]:.2f} N ({TITLES[high[1]]} on {high[0]}). Whiskers are standard "
+        "errors over the trials left out."
+    )
+    gaps = [
+        abs(errors[name, TUSTIN] / errors[name, GP_SE] - 1.0)
+        for name in study.terrains
+        if {(name, TUSTIN), (name, GP_SE)} <= errors.keys() and errors[name, GP_SE] > 0
+    ]
+    if gaps:
+        text += f" Tustin and GP differ by at most {max(gaps):.0%} on any terrain."
+    return text
+
+
+def draw_cross_bars(results: StudyResults) -> Figure | None:
     """Return Fig. 10 as grouped bars: every model on every terrain."""
+    study = results.study
     if not 2 <= len(study.terrains) <= _MOST_BARS or not _has_models(study):
         return None
     figure = new_figure(2.1 * len(FITTERS) + 0.5)
     axes = figure.subplots(len(FITTERS), 1, sharex=True, sharey=True, squeeze=False)
     tested = list(study.terrains)
-    colours = terrain_colours(tested)
+    colours = terrain_colours(study.kinds)
     for ax, model in zip(axes[:, 0], FITTERS, strict=True):
         cross = study.cross(model)
         width = 0.84 / max(len(cross), 1)
@@ -104,8 +135,22 @@ def draw_cross_bars(study: Study) -> Figure | None:
     return figure
 
 
-def draw_cross_map(study: Study) -> Figure | None:
+def caption_cross(results: StudyResults) -> str:
+    """State how foreign models compare with a terrain's own."""
+    study = results.study
+    values = [
+        f"{TITLES[model]}: {_describe_ratios(study, model)}"
+        for model in FITTERS
+        if study.cross(model)
+    ]
+    return "Error of a foreign model over that of the terrain's own. " + " ".join(
+        values
+    )
+
+
+def draw_cross_map(results: StudyResults) -> Figure | None:
     """Return Fig. 10 as heat maps: rows are models, columns terrains tested on."""
+    study = results.study
     if len(study.terrains) < 2 or not _has_models(study):
         return None
     tested = list(study.terrains)
@@ -125,6 +170,11 @@ def draw_cross_map(study: Study) -> Figure | None:
     for ax in grid[:, 0]:
         ax.set_ylabel("model of terrain")
     return figure
+
+
+def caption_cross_map(_: StudyResults) -> str:
+    """Refer to the bars for the numbers."""
+    return "The numbers of the bars above; a terrain's own model in bold."
 
 
 def _draw_map(
@@ -163,3 +213,60 @@ def _standard_error(errors: list[float]) -> float:
     if len(errors) < 2:
         return 0.0
     return float(np.std(errors, ddof=1) / np.sqrt(len(errors)))
+
+
+def _describe_ratios(study: Study, model: str) -> str:
+    cross = study.cross(model)
+    groups: dict[str, list[float]] = {}
+    for source, errors in cross.items():
+        for tested, error in errors.items():
+            own = study.terrains[tested].mae(model)
+            if source != tested and error is not None and own:
+                relation = _relation(study.terrains[source], study.terrains[tested])
+                groups.setdefault(relation, []).append(error / own)
+    parts = [
+        f"{name} {min(ratios):.1f} to {max(ratios):.1f}"
+        for name, ratios in groups.items()
+    ]
+    return "; ".join(parts) + "." if parts else "no pair to compare."
+
+
+def _relation(source: TerrainResult, tested: TerrainResult) -> str:
+    if any(result.kind == result.terrain for result in (source, tested)):
+        return "one terrain's model on another"
+    model, ground = (
+        "plates" if result.kind == FLAT else "stones" for result in (source, tested)
+    )
+    other = "other " if model == ground else ""
+    return f"models of {model} on {other}{ground}"
+
+
+FIGURES = (
+    FigureSpec(
+        "fig9_errors",
+        "Fig. 9 Prediction error of each model on its own terrain",
+        "Bars of mean absolute error for every terrain and model, with the error of a "
+        "constant as a dashed line.",
+        draw_errors,
+        caption_errors,
+        ReportSection.PAPER,
+    ),
+    FigureSpec(
+        "fig10_cross_bars",
+        "Fig. 10 Every model on every terrain",
+        "Grouped bars of mean absolute error: groups are the terrains tested on, bars "
+        "the terrains of the models.",
+        draw_cross_bars,
+        caption_cross,
+        ReportSection.PAPER,
+    ),
+    FigureSpec(
+        "fig10_cross_map",
+        "Fig. 10 as a map",
+        "Heat maps of mean absolute error: rows are the terrains of the models, "
+        "columns the terrains tested on.",
+        draw_cross_map,
+        caption_cross_map,
+        ReportSection.PAPER,
+    ),
+)

@@ -1,10 +1,11 @@
 """How the rig behaved: timing, sensor, locked joint, temperatures, trial by trial."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from analysis.data.series import Array
+from analysis.figures.spec import FigureSpec, ReportSection
 from analysis.figures.style import (
     Axes,
     Figure,
@@ -18,14 +19,14 @@ from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
 _WARNING_MRAD = 20.0  # motion of joint 7 that the guard warns of
 
 
-def draw_timing(found: StudyResults) -> Figure | None:
+def draw_timing(results: StudyResults) -> Figure | None:
     """Return histograms of the period and of the age of the force samples."""
-    if not found.rig:
+    if not results.rig:
         return None
     figure = new_figure(2.3)
     left, right = figure.subplots(1, 2)
-    periods = np.sum([trial.periods for trial in found.rig], axis=0)
-    skews = np.sum([trial.skews for trial in found.rig], axis=0)
+    periods = np.sum([trial.periods for trial in results.rig], axis=0)
+    skews = np.sum([trial.skews for trial in results.rig], axis=0)
     # the last bin holds all longer periods
     edges = np.append(PERIOD_EDGES[:-1], PERIOD_EDGES[-2] + 0.2)
     _draw_histogram(left, periods, edges)
@@ -38,13 +39,26 @@ def draw_timing(found: StudyResults) -> Figure | None:
     return figure
 
 
-def draw_rig(found: StudyResults) -> Figure | None:
+def caption_timing(results: StudyResults) -> str:
+    """State the longest period and the usual age of a force sample."""
+    longest = max(trial.longest_gap for trial in results.rig)
+    missed = sum(trial.missed for trial in results.rig)
+    cycles = sum(trial.cycles for trial in results.rig)
+    skews = [trial.skew[1] for trial in results.rig]
+    return (
+        f"{cycles} cycles, {missed} missed, longest period {longest:.2f} ms. When the "
+        f"joints have answered, the force sample is {np.median(skews):.2f} ms old "
+        f"(median over trials; {min(skews):.2f} to {max(skews):.2f} ms)."
+    )
+
+
+def draw_rig(results: StudyResults) -> Figure | None:
     """Return tare bracket, joint 7, temperatures and load bias of every trial."""
-    if not found.rig:
+    if not results.rig:
         return None
     figure = new_figure(4.2)
     axes = figure.subplots(2, 2, sharex=True)
-    terrains = list(found.study.terrains)
+    kinds = results.study.kinds
     panels: Sequence[tuple[str, Callable[[RigTrial], float | None]]] = (
         ("change of tare [N]", lambda trial: trial.tare_bracket),
         ("motion of joint 7 [mrad]", lambda trial: trial.joint7),
@@ -55,7 +69,7 @@ def draw_rig(found: StudyResults) -> Figure | None:
         ("$F_n$ above the set load [N]", lambda trial: trial.load_bias),
     )
     for ax, (label, measure) in zip(axes.flat, panels, strict=True):
-        _draw_by_trial(ax, found.rig, terrains, measure)
+        _draw_by_trial(ax, results.rig, kinds, measure)
         ax.set_ylabel(label)
     axes[0, 0].set_ylim(bottom=0.0)
     low, high = axes[1, 0].get_ylim()
@@ -64,19 +78,33 @@ def draw_rig(found: StudyResults) -> Figure | None:
     axes[0, 1].set_ylim(bottom=0.0)
     axes[1, 1].axhline(0.0, color="#808080", lw=0.6)
     for ax in axes[1]:
-        name_ticks(ax, terrains)
+        name_ticks(ax, list(kinds))
         ax.set_xlabel("terrain, trials from left to right")
     return figure
+
+
+def caption_rig(results: StudyResults) -> str:
+    """State the largest motion of joint 7 and the largest change of tare."""
+    joint7 = max(results.rig, key=lambda trial: trial.joint7)
+    parts = [f"Joint 7 moved at most {joint7.joint7:.1f} mrad ({joint7.name})"]
+    brackets = [t.tare_bracket for t in results.rig if t.tare_bracket is not None]
+    if brackets:
+        parts.append(f"the tare changed by at most {max(brackets):.2f} N to the next")
+    return (
+        f"{'; '.join(parts)}. Dashed: motion of joint 7 that is warned of. Change of "
+        "tare: to the next trial's. Load: median F_n of the moving foot less the "
+        "weight of the virtual mass."
+    )
 
 
 def _draw_by_trial(
     ax: Axes,
     rig: Sequence[RigTrial],
-    terrains: list[str],
+    kinds: Mapping[str, str],
     measure: Callable[[RigTrial], float | None],
 ) -> None:
-    colours = terrain_colours(terrains)
-    for place, terrain in enumerate(terrains):
+    colours = terrain_colours(kinds)
+    for place, terrain in enumerate(kinds):
         values = [measure(trial) for trial in rig if trial.terrain == terrain]
         spread = (np.arange(len(values)) + 0.5) / len(values) - 0.5
         pairs = [(x, y) for x, y in zip(spread, values, strict=True) if y is not None]
@@ -95,3 +123,25 @@ def _draw_histogram(ax: Axes, counts: Array, edges: Array) -> None:
         low, high = float(edges[filled[0]]), float(edges[filled[-1] + 1])
         margin = 0.1 * (high - low) + 0.5
         ax.set_xlim(low - margin, high + margin)
+
+
+FIGURES = (
+    FigureSpec(
+        "timing",
+        "Period of the loop and age of the force samples",
+        "Histograms over all cycles, logarithmic counts: left the period, right how "
+        "much later the joints are than the force sample.",
+        draw_timing,
+        caption_timing,
+        ReportSection.HEALTH,
+    ),
+    FigureSpec(
+        "rig",
+        "Tare, joint 7, temperatures and load, trial by trial",
+        "Four panels with one dot per trial: change of tare to the next trial, motion "
+        "of the locked joint, warmest puck or motor, load above what was set.",
+        draw_rig,
+        caption_rig,
+        ReportSection.HEALTH,
+    ),
+)

@@ -12,19 +12,13 @@ from analysis.data.series import Array
 from analysis.study.models import FittedModel
 from analysis.study.study import Study, TerrainResult
 
-EXCERPT = 3.5  # s shown of a trial
+WINDOW = 3.5  # s shown of a trial
 LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn
-SMALL, BIG, FLAT = "small stones", "big stones", "flat plate"
-CLASSES = {
-    **dict.fromkeys(("S0", "S10", "S15"), SMALL),
-    **dict.fromkeys(("B0", "B10", "B15"), BIG),
-    **dict.fromkeys(("TF", "Tf"), FLAT),
-}
 
 _MOST_POINTS = 1500  # drawn per panel
 _CURVE_POINTS = 120
-_STEP = 0.1  # s between the excerpts compared
-_BEFORE, _AFTER = 0.3, 0.6  # s around a slip that an excerpt should hold
+_STEP = 0.1  # s between the windows compared
+_BEFORE, _AFTER = 0.3, 0.6  # s around a slip that a window should hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +26,16 @@ class TimeWindow:
     """A stretch of one trial.
 
     Attributes:
+        title: of its terrain, with the kind.
         terrain: its terrain.
         trial: number of the trial, from 1.
-        t: time from the start of the excerpt [s], shape (n,).
+        t: time from the start of the window [s], shape (n,).
         v_t: smoothed velocity [m/s], shape (n,).
         F_t: smoothed traction force [N], shape (n,).
-        slips: the slips inside, times from the start of the excerpt.
+        slips: the slips inside, times from the start of the window.
     """
 
+    title: str
     terrain: str
     trial: int
     t: Array
@@ -53,7 +49,9 @@ class Panel:
     """One fitted model with its terrain's samples, for curves over v_t.
 
     Attributes:
+        title: of its terrain, with the kind.
         terrain: its terrain.
+        kind: of its terrain.
         fold: number of the fold drawn, from 1.
         data: samples of the terrain, thinned evenly for drawing.
         v: velocities of the curves [m/s], shape (m,).
@@ -62,7 +60,9 @@ class Panel:
         sds: standard deviations [N], noise included, shape (3, m).
     """
 
+    title: str
     terrain: str
+    kind: str
     fold: int
     data: SampleTable
     v: Array
@@ -75,29 +75,24 @@ class Panel:
         return np.argmin(np.abs(self.data.F_n[:, None] - self.loads), axis=1)
 
 
-def terrain_class(terrain: str) -> str:
-    """Return the kind of ground of one of the paper's terrains, else its own name."""
-    return CLASSES.get(terrain, terrain)
-
-
 def representatives(study: Study, most: int = 4) -> list[TerrainResult]:
-    """Return the first terrain of every class that has kept samples."""
+    """Return the first terrain of every kind that has kept samples."""
     first: dict[str, TerrainResult] = {}
-    for name, result in study.terrains.items():
+    for result in study.terrains.values():
         if result.kept:
-            first.setdefault(terrain_class(name), result)
+            first.setdefault(result.kind, result)
     return list(first.values())[:most]
 
 
-def excerpts(study: Study) -> list[TimeWindow]:
-    """Return one telling stretch per class of terrain."""
-    return [best_window(result) for result in representatives(study)]
+def time_windows(study: Study) -> list[TimeWindow]:
+    """Return the stretch to show of one terrain per kind."""
+    return [busiest_window(result) for result in representatives(study)]
 
 
-def best_window(result: TerrainResult) -> TimeWindow:
+def busiest_window(result: TerrainResult) -> TimeWindow:
     """Return the stretch with the most slips and bounces, else with the most motion."""
     candidates = [
-        (_worth(trial.smooth, slips, start), k, start)
+        (_events_and_motion(trial.smooth, slips, start), k, start)
         for k, (trial, slips) in enumerate(
             zip(result.trials, result.slips, strict=True)
         )
@@ -105,8 +100,9 @@ def best_window(result: TerrainResult) -> TimeWindow:
     ]
     _, k, start = max(candidates)
     smooth = result.trials[k].smooth
-    rows = (smooth.t >= start) & (smooth.t <= start + EXCERPT)
+    rows = (smooth.t >= start) & (smooth.t <= start + WINDOW)
     return TimeWindow(
+        title=result.title,
         terrain=result.terrain,
         trial=k + 1,
         t=smooth.t[rows] - start,
@@ -138,38 +134,40 @@ def force_range(panels: Sequence[Panel]) -> tuple[float, float]:
 
 
 def _starts(smooth: Smoothed) -> Array:
-    last = max(float(smooth.t[-1]) - EXCERPT, float(smooth.t[0]))
+    last = max(float(smooth.t[-1]) - WINDOW, float(smooth.t[0]))
     return np.arange(float(smooth.t[0]), last + _STEP / 2, _STEP)
 
 
 def _is_inside(slip: Slip, start: float) -> bool:
-    return start + _BEFORE <= slip.onset and slip.end + _AFTER <= start + EXCERPT
+    return start + _BEFORE <= slip.onset and slip.end + _AFTER <= start + WINDOW
 
 
-def _worth(
+def _events_and_motion(
     smooth: Smoothed, slips: Sequence[Slip], start: float
 ) -> tuple[float, float]:
     inside = [slip for slip in slips if _is_inside(slip, start)]
-    rows = slice(*np.searchsorted(smooth.t, [start, start + EXCERPT]))
+    rows = slice(*np.searchsorted(smooth.t, [start, start + WINDOW]))
     moving = float(np.mean(smooth.v_t[rows] > 0)) if rows.stop > rows.start else 0.0
     return len(inside) + 0.5 * sum(slip.has_bounce for slip in inside), moving
 
 
 def _panel(result: TerrainResult, model: str) -> Panel:
     fold = next(fold for fold in result.folds if model in fold.models)
-    everything = SampleTable.of(result.trials)
-    step = max(1, -(-everything.count // _MOST_POINTS))
-    loads = np.quantile(everything.F_n, LOADS)
-    span = float(everything.v_t.min()), float(everything.v_t.max())
+    samples = SampleTable.of(result.trials)
+    step = max(1, -(-samples.count // _MOST_POINTS))
+    loads = np.quantile(samples.F_n, LOADS)
+    span = float(samples.v_t.min()), float(samples.v_t.max())
     # dense at the slow end, where models bend, and fine enough at the fast one
     v = np.union1d(
         np.geomspace(*span, _CURVE_POINTS), np.linspace(*span, _CURVE_POINTS)
     )
     curves = [_curve(fold.models[model].model, load, v) for load in loads]
     return Panel(
+        title=result.title,
         terrain=result.terrain,
+        kind=result.kind,
         fold=fold.fold + 1,
-        data=everything.take(np.arange(0, everything.count, step)),
+        data=samples.take(np.arange(0, samples.count, step)),
         v=v,
         loads=loads,
         means=np.array([mean for mean, _ in curves]),

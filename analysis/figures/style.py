@@ -7,7 +7,7 @@ shared between them and no screen is needed.
 
 import io
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +20,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from analysis.figures.selection import BIG, FLAT, SMALL, terrain_class
+from analysis.data.terrain_kinds import BIG, FLAT, SMALL
 
 __all__ = [
     "ONE_COLUMN",
@@ -61,7 +61,7 @@ MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 _DPI = 160
 _MARK = 6.0  # points of the watermark per inch of the figure's width
-_CLASS_COLOURS = {
+_KIND_COLOURS = {
     SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
     BIG: ("#7f2704", "#d9690f", "#fdb97d"),
     FLAT: ("#4d4d4d", "#b3b3b3", "#d9d9d9"),
@@ -172,23 +172,20 @@ def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
     return Picture(key, png.getvalue(), pdf.getvalue())
 
 
-def terrain_colours(terrains: list[str]) -> dict[str, str]:
-    """Return a colour for every terrain; one family of shades per class."""
+def terrain_colours(kinds: Mapping[str, str]) -> dict[str, str]:
+    """Return a colour for every terrain; one family of shades per kind.
+
+    Args:
+        kinds: kind by name of the terrain.
+    """
     used: dict[str, int] = {}
     colours = {}
-    for terrain in terrains:
-        kind = terrain_class(terrain)
-        family = _CLASS_COLOURS.get(kind, _OTHER_COLOURS)
-        kind = kind if kind in _CLASS_COLOURS else ""
-        colours[terrain] = family[used.get(kind, 0) % len(family)]
-        used[kind] = used.get(kind, 0) + 1
+    for terrain, kind in kinds.items():
+        family = _KIND_COLOURS.get(kind, _OTHER_COLOURS)
+        shades = kind if kind in _KIND_COLOURS else ""  # all others share one family
+        colours[terrain] = family[used.get(shades, 0) % len(family)]
+        used[shades] = used.get(shades, 0) + 1
     return colours
-
-
-def titled(terrain: str) -> str:
-    """Return the title of a terrain's panel, with its class."""
-    kind = terrain_class(terrain)
-    return plain(terrain if kind == terrain else f"{terrain}: {kind}")
 
 
 def plain(text: str) -> str:

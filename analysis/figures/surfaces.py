@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.data.series import Array
+from analysis.figures.selection import representatives
+from analysis.figures.spec import FigureSpec, ReportSection
 from analysis.figures.style import (
     LOAD_LABEL,
     SPEED_LABEL,
@@ -15,7 +17,7 @@ from analysis.figures.style import (
     Figure,
     LogNorm,
     panel_grid,
-    titled,
+    plain,
 )
 from analysis.findings.findings import StudyResults
 from analysis.findings.surfaces import Surface, common_range
@@ -27,39 +29,65 @@ _ROW = 1.75  # inches
 _MAP = "cividis"  # the same to every kind of colour sight
 
 
-def draw_mean(found: StudyResults) -> Figure | None:
+def draw_mean(results: StudyResults) -> Figure | None:
     """Return Fig. 7: the mean of the Gaussian process over (v_t, F_n)."""
-    if not found.surfaces:
+    if not results.surfaces:
         return None
-    low, high = common_range([surface.mean for surface in found.surfaces])
+    low, high = common_range([surface.mean for surface in results.surfaces])
     levels = np.linspace(low, high if high > low else low + 1.0, _LEVELS)
-    means = [surface.mean for surface in found.surfaces]
-    return _draw(found, means, levels, "mean of $F_t$ [N]")
+    means = [surface.mean for surface in results.surfaces]
+    return _draw(results, means, levels, "mean of $F_t$ [N]")
 
 
-def draw_variance(found: StudyResults) -> Figure | None:
+def caption_mean(results: StudyResults) -> str:
+    """State how far the means reach."""
+    values = [
+        f"{surface.terrain} {surface.mean.min():.1f} to {surface.mean.max():.1f} N"
+        for surface in _representative(results)
+    ]
+    return (
+        "First fold of each terrain, the same colours everywhere; dots are samples, "
+        f"away from them the process falls back to its mean. {'; '.join(values)}."
+    )
+
+
+def draw_variance(results: StudyResults) -> Figure | None:
     """Return Fig. 8: its variance with the noise, colours on a logarithmic scale."""
-    if not found.surfaces:
+    if not results.surfaces:
         return None
-    low, high = common_range([surface.variance for surface in found.surfaces])
+    low, high = common_range([surface.variance for surface in results.surfaces])
     low = max(low, 1e-9)
     levels = np.geomspace(low, max(high, 1.01 * low), _LEVELS)
-    variances = [np.maximum(surface.variance, low) for surface in found.surfaces]
+    variances = [np.maximum(surface.variance, low) for surface in results.surfaces]
     norm = LogNorm(levels[0], levels[-1])
-    return _draw(found, variances, levels, "variance of $F_t$ [N²]", norm=norm)
+    return _draw(results, variances, levels, "variance of $F_t$ [N²]", norm=norm)
 
 
-def draw_coverage(found: StudyResults) -> Figure | None:
+def caption_variance(results: StudyResults) -> str:
+    """State the variances of one terrain per kind."""
+    values = [
+        f"{surface.terrain} {float(np.median(surface.variance)):.2g} N²"
+        for surface in _representative(results)
+    ]
+    return (
+        "Variance of a measurement, noise included; logarithmic colours. Medians over "
+        f"the map: {'; '.join(values)}."
+    )
+
+
+def draw_coverage(results: StudyResults) -> Figure | None:
     """Return how many samples lie in every cell of velocity and load."""
-    if not found.coverage:
+    if not results.coverage:
         return None
-    figure, axes = panel_grid(len(found.coverage), _ROW)
-    most = max(float(part.counts.max()) for part in found.coverage)
+    figure, axes = panel_grid(len(results.coverage), _ROW)
+    most = max(float(cells.counts.max()) for cells in results.coverage)
     norm = LogNorm(1.0, max(most, 2.0))
-    for ax, part in zip(axes, found.coverage, strict=True):
-        counts = np.ma.masked_less(part.counts, 1.0)
-        ax.pcolormesh(found.edges.v_t, found.edges.F_n, counts, norm=norm, cmap=_MAP)
-        ax.set_title(titled(part.terrain), loc="left")
+    for ax, cells in zip(axes, results.coverage, strict=True):
+        counts = np.ma.masked_less(cells.counts, 1.0)
+        ax.pcolormesh(
+            results.edges.v_t, results.edges.F_n, counts, norm=norm, cmap=_MAP
+        )
+        ax.set_title(plain(results.study.terrains[cells.terrain].title), loc="left")
         ax.grid(visible=False)
     _name_axes(figure)
     figure.colorbar(
@@ -68,38 +96,50 @@ def draw_coverage(found: StudyResults) -> Figure | None:
     return figure
 
 
-def _draw(
-    found: StudyResults,
-    values: Sequence[Array],
-    levels: Array,
-    label: str,
-    norm: LogNorm | None = None,
-) -> Figure:
-    figure, axes = panel_grid(len(values), _ROW)
-    for ax, surface, value in zip(axes, found.surfaces, values, strict=True):
-        ax.contourf(found.axes.v_t, found.axes.F_n, value, levels, cmap=_MAP, norm=norm)
-        _dot(ax, surface)
-        ax.set_title(titled(surface.terrain), loc="left")
-        ax.grid(visible=False)
-    axes[0].set_xlim(found.axes.v_t[0], found.axes.v_t[-1])
-    axes[0].set_ylim(found.axes.F_n[0], found.axes.F_n[-1])
-    _name_axes(figure)
-    ticks = levels[:: max(1, _LEVELS // 6)]
-    bar = figure.colorbar(
-        axes[0].collections[0], ax=axes, label=label, pad=0.01, ticks=ticks
+def caption_coverage(results: StudyResults) -> str:
+    """State what the coverage map leaves out."""
+    outside = sum(cells.outside for cells in results.coverage)
+    total = outside + sum(float(cells.counts.sum()) for cells in results.coverage)
+    return (
+        f"Where the models have seen samples; white cells hold none. {outside} of "
+        f"{total:.0f} samples lie beyond the axis of load."
     )
-    bar.ax.minorticks_off()
-    bar.ax.set_yticks(ticks, told_apart(ticks.tolist()))
-    return figure
 
 
-def told_apart(values: Sequence[float]) -> list[str]:
+def distinct_labels(values: Sequence[float]) -> list[str]:
     """Return different numbers in so few digits, two at least, that all differ."""
     for digits in range(2, _MOST_DIGITS):
         texts = [f"{value:.{digits}g}" for value in values]
         if len(set(texts)) == len(set(values)):
             return texts
     return [repr(float(value)) for value in values]
+
+
+def _draw(
+    results: StudyResults,
+    values: Sequence[Array],
+    levels: Array,
+    label: str,
+    norm: LogNorm | None = None,
+) -> Figure:
+    figure, axes = panel_grid(len(values), _ROW)
+    for ax, surface, value in zip(axes, results.surfaces, values, strict=True):
+        ax.contourf(
+            results.axes.v_t, results.axes.F_n, value, levels, cmap=_MAP, norm=norm
+        )
+        _dot(ax, surface)
+        ax.set_title(plain(results.study.terrains[surface.terrain].title), loc="left")
+        ax.grid(visible=False)
+    axes[0].set_xlim(results.axes.v_t[0], results.axes.v_t[-1])
+    axes[0].set_ylim(results.axes.F_n[0], results.axes.F_n[-1])
+    _name_axes(figure)
+    ticks = levels[:: max(1, _LEVELS // 6)]
+    bar = figure.colorbar(
+        axes[0].collections[0], ax=axes, label=label, pad=0.01, ticks=ticks
+    )
+    bar.ax.minorticks_off()
+    bar.ax.set_yticks(ticks, distinct_labels(ticks.tolist()))
+    return figure
 
 
 def _dot(ax: Axes, surface: Surface) -> None:
@@ -119,3 +159,39 @@ def _dot(ax: Axes, surface: Surface) -> None:
 def _name_axes(figure: Figure) -> None:
     figure.supxlabel(SPEED_LABEL, fontsize=8)
     figure.supylabel(LOAD_LABEL, fontsize=8)
+
+
+def _representative(results: StudyResults) -> list[Surface]:
+    """Return the surfaces of one terrain per kind."""
+    names = {result.terrain for result in representatives(results.study)}
+    return [surface for surface in results.surfaces if surface.terrain in names]
+
+
+FIGURES = (
+    FigureSpec(
+        "fig7_gp_mean",
+        "Fig. 7 Mean of the Gaussian process over velocity and load",
+        "Filled contours of predicted traction force over slip velocity and normal "
+        "force, one panel per terrain, with the samples as dots.",
+        draw_mean,
+        caption_mean,
+        ReportSection.PAPER,
+    ),
+    FigureSpec(
+        "fig8_gp_variance",
+        "Fig. 8 Variance of the Gaussian process over velocity and load",
+        "Filled contours of predictive variance over slip velocity and normal force, "
+        "one panel per terrain; plates are far below stones.",
+        draw_variance,
+        caption_variance,
+        ReportSection.PAPER,
+    ),
+    FigureSpec(
+        "coverage",
+        "Coverage of velocity and load",
+        "Number of kept samples in cells of slip velocity and normal force, one panel "
+        "per terrain, logarithmic colours.",
+        draw_coverage,
+        caption_coverage,
+    ),
+)

@@ -5,6 +5,7 @@ import numpy as np
 from analysis.data.prepare import Smoothed
 from analysis.data.series import Array
 from analysis.figures.selection import representatives
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     FORCE_LABEL,
     ONE_COLUMN,
@@ -15,7 +16,6 @@ from analysis.figures.style import (
     panel_grid,
     plain,
     terrain_colours,
-    titled,
 )
 from analysis.findings.findings import StudyResults
 from analysis.findings.trends import MEAN_FORCE, Trend
@@ -26,14 +26,14 @@ _MOST_POINTS = 400  # of a curve
 _GAP = 0.08  # of a cell between two trials
 
 
-def draw_trials(found: StudyResults) -> Figure | None:
+def draw_trials(results: StudyResults) -> Figure | None:
     """Return small multiples: F_t over the way of every trial, a row per terrain."""
-    results = list(found.study.terrains.values())
-    figure = new_figure(0.95 * len(results) + 0.7)
-    axes = figure.subplots(len(results), 1, sharex=True, sharey=True, squeeze=False)
-    most = min(max(len(result.trials) for result in results), _MOST_TRIALS)
-    colours = terrain_colours([result.terrain for result in results])
-    for ax, result in zip(axes[:, 0], results, strict=True):
+    terrains = list(results.study.terrains.values())
+    figure = new_figure(0.95 * len(terrains) + 0.7)
+    axes = figure.subplots(len(terrains), 1, sharex=True, sharey=True, squeeze=False)
+    most = min(max(len(result.trials) for result in terrains), _MOST_TRIALS)
+    colours = terrain_colours(results.study.kinds)
+    for ax, result in zip(axes[:, 0], terrains, strict=True):
         for k, trial in enumerate(result.trials[:most]):
             way, force = _thinned(trial.smooth)
             reach = max(float(way.max()), 1e-9)
@@ -43,9 +43,9 @@ def draw_trials(found: StudyResults) -> Figure | None:
                 lw=0.6,
                 color=colours[result.terrain],
             )
-        ax.set_title(titled(result.terrain), loc="left", pad=2.0)
+        ax.set_title(plain(result.title), loc="left", pad=2.0)
         ax.grid(visible=False, axis="x")
-    lowest, highest = force_limits(results)
+    lowest, highest = force_limits(terrains)
     axes[0, 0].set_ylim(lowest, highest)
     axes[0, 0].set_xlim(0.5, most + 0.5)
     axes[-1, 0].set_xticks(range(1, most + 1))
@@ -54,11 +54,20 @@ def draw_trials(found: StudyResults) -> Figure | None:
     return figure
 
 
-def draw_trends(found: StudyResults) -> Figure | None:
+def caption_trials(results: StudyResults) -> str:
+    """State how many trials are shown."""
+    count = sum(len(result.trials) for result in results.study.terrains.values())
+    return (
+        f"Smoothed traction of {count} trials, each from the far end to the near one; "
+        "one scale for all terrains."
+    )
+
+
+def draw_trends(results: StudyResults) -> Figure | None:
     """Return the mean F_t of every trial with its line: wear of the terrain."""
     shown = {
         name: trends[MEAN_FORCE]
-        for name, trends in found.trends.items()
+        for name, trends in results.trends.items()
         if trends[MEAN_FORCE].means.size
     }
     if not shown:
@@ -66,7 +75,7 @@ def draw_trends(found: StudyResults) -> Figure | None:
     figure, axes = panel_grid(len(shown), 1.6)
     for ax, (name, trend) in zip(axes, shown.items(), strict=True):
         _draw_trend(ax, trend)
-        ax.set_title(titled(name), loc="left")
+        ax.set_title(plain(results.study.terrains[name].title), loc="left")
     means = np.concatenate([trend.means for trend in shown.values()])
     low, high = min(0.0, float(means.min())), float(means.max())
     axes[0].set_ylim(low, high + 0.25 * (high - low or 1.0))  # room for the words
@@ -78,9 +87,28 @@ def draw_trends(found: StudyResults) -> Figure | None:
     return figure
 
 
-def draw_stick_slip(found: StudyResults) -> Figure | None:
-    """Return force over displacement of one trial per class of terrain."""
-    chosen = representatives(found.study)
+def caption_trends(results: StudyResults) -> str:
+    """State which terrains change from the first trial to the last."""
+    changing = [
+        f"{name} ({trend.slope:+.3f} ± {trend.slope_error:.3f} N per trial)"
+        for name, trends in results.trends.items()
+        if (trend := trends[MEAN_FORCE]).is_significant
+    ]
+    return (
+        "Mean over the kept samples of each trial, in the order of recording; dashed: "
+        "least-squares line, its slope with standard error. "
+        + (
+            f"More than two standard errors: {', '.join(changing)}. By chance alone, "
+            "about one terrain in thirteen shows such a slope in ten trials."
+            if changing
+            else "No slope exceeds two standard errors: no wear is seen."
+        )
+    )
+
+
+def draw_stick_slip(results: StudyResults) -> Figure | None:
+    """Return force over displacement of one trial per kind of terrain."""
+    chosen = representatives(results.study)
     if not chosen:
         return None
     figure = new_figure(
@@ -97,13 +125,31 @@ def draw_stick_slip(found: StudyResults) -> Figure | None:
                 1e3 * start, 1e3 * stop, color="#F0E442", alpha=0.55, lw=0, label=label
             )
         ax.plot(1e3 * way, smooth.F_t, color="#0072B2", lw=0.8)
-        ax.set_title(f"{titled(result.terrain)}, trial {number + 1}", loc="left")
+        ax.set_title(f"{plain(result.title)}, trial {number + 1}", loc="left")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside upper right")
     axes[-1, 0].set_xlabel("displacement of the sole [mm]")
     figure.supylabel(FORCE_LABEL, fontsize=8)
     return figure
+
+
+def caption_stick_slip(results: StudyResults) -> str:
+    """State how long slips are."""
+    values = []
+    for result in representatives(results.study):
+        slips = [slip.length for trial in result.slips for slip in trial]
+        if slips:
+            values.append(
+                f"{result.terrain}: {len(slips)} slips, median "
+                f"{1e3 * float(np.median(slips)):.0f} mm"
+            )
+        else:
+            values.append(f"{result.terrain}: no slip")
+    return (
+        "The trial with most slips of one terrain per class: force builds up over "
+        f"millimetres and breaks down in a slip (shaded). {'; '.join(values)}."
+    )
 
 
 def way_of(smooth: Smoothed) -> Array:
@@ -118,11 +164,11 @@ def most_slips(result: TerrainResult) -> int:
     return counts.index(max(counts))
 
 
-def force_limits(results: list[TerrainResult]) -> tuple[float, float]:
+def force_limits(terrains: list[TerrainResult]) -> tuple[float, float]:
     """Return limits of F_t [N] that hold all but a few spikes of all trials."""
     ends = [
         np.quantile(trial.smooth.F_t, (0.001, 0.999))
-        for result in results
+        for result in terrains
         for trial in result.trials
     ]
     low, high = min(float(e[0]) for e in ends), max(float(e[1]) for e in ends)
@@ -151,3 +197,30 @@ def _draw_trend(ax: Axes, trend: Trend) -> None:
         fontsize=6.5,
         fontweight="bold" if trend.is_significant else "normal",
     )
+
+
+FIGURES = (
+    FigureSpec(
+        "trials",
+        "All trials side by side",
+        "Small curves of traction force over the way of each trial, one row per "
+        "terrain.",
+        draw_trials,
+        caption_trials,
+    ),
+    FigureSpec(
+        "trends",
+        "From the first trial to the last",
+        "Mean traction of every trial in order, with a straight line per terrain.",
+        draw_trends,
+        caption_trends,
+    ),
+    FigureSpec(
+        "stick_slip",
+        "Sticking and slipping: force over displacement",
+        "Traction force over the displacement of the sole for one trial per class of "
+        "terrain; slips are shaded.",
+        draw_stick_slip,
+        caption_stick_slip,
+    ),
+)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     MODEL_COLOURS,
     MODEL_MARKERS,
@@ -12,10 +13,9 @@ from analysis.figures.style import (
     new_figure,
     panel_grid,
     plain,
-    titled,
 )
 from analysis.findings.findings import RESIDUAL_MODELS, StudyResults
-from analysis.study.models import TITLES
+from analysis.study.models import GP_SE, TITLES
 from analysis.study.study import TerrainResult, mean_of
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
@@ -23,10 +23,12 @@ _FIRST, _SECOND = "#0072B2", "#D55E00"
 _ROW = 0.32  # inches of one terrain's gain
 
 
-def draw_calibration(found: StudyResults) -> Figure | None:
+def draw_calibration(results: StudyResults) -> Figure | None:
     """Return the share of held-out samples inside the 50, 90 and 95 % bands."""
-    results = [r for r in found.study.terrains.values() if r.folds]
-    models = [m for m in found.study.options.fit.models if any(map(_has(m), results))]
+    terrains = [r for r in results.study.terrains.values() if r.folds]
+    models = [
+        m for m in results.study.options.fit.models if any(map(_has(m), terrains))
+    ]
     if not models:
         return None
     figure = new_figure(4.6)
@@ -35,10 +37,10 @@ def draw_calibration(found: StudyResults) -> Figure | None:
     for ax, (key, nominal) in zip(axes, BANDS, strict=True):
         ax.axhline(nominal, color="black", lw=1.0, ls=(0, (4, 2)))
         for k, model in enumerate(models):
-            place = np.arange(len(results)) + (k - (len(models) - 1) / 2) * width
+            place = np.arange(len(terrains)) + (k - (len(models) - 1) / 2) * width
             ax.plot(
                 place,
-                [coverage_of(result, model, key) for result in results],
+                [coverage_of(result, model, key) for result in terrains],
                 MODEL_MARKERS[k % len(MODEL_MARKERS)],
                 color=MODEL_COLOURS[k % len(MODEL_COLOURS)],
                 ms=4.5,
@@ -47,33 +49,51 @@ def draw_calibration(found: StudyResults) -> Figure | None:
         ax.set_ylabel(f"inside {nominal:.0%} band")
         ax.set_ylim(max(0.0, nominal - 0.3), min(1.02, nominal + 0.3))
         ax.grid(visible=False, axis="x")
-    name_ticks(axes[-1], [result.terrain for result in results])
+    name_ticks(axes[-1], [result.terrain for result in terrains])
     axes[-1].set_xlabel("terrain")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 
-def coverage_of(result: TerrainResult, model: str, key: str) -> float:
-    """Return the mean over trials of a coverage; NaN where there is none."""
-    value = mean_of(result.scores(model, key))
-    return float("nan") if value is None else value
+def caption_calibration(results: StudyResults) -> str:
+    """State how far the bands are from their nominal coverage."""
+    shares = [
+        (nominal, name, model, share)
+        for key, nominal in BANDS
+        for name, result in results.study.terrains.items()
+        for model in results.study.options.fit.models
+        if not np.isnan(share := coverage_of(result, model, key))
+    ]
+    parts = []
+    for _, nominal in BANDS:
+        of_band = [entry for entry in shares if entry[0] == nominal]
+        low = min(of_band, key=lambda entry: entry[3])
+        high = max(of_band, key=lambda entry: entry[3])
+        parts.append(
+            f"{nominal:.0%} band: {low[3]:.0%} ({low[1]}, {TITLES[low[2]]}) to "
+            f"{high[3]:.0%} ({high[1]}, {TITLES[high[2]]})"
+        )
+    return (
+        "Share of held-out samples inside the central band, mean over trials; dashed: "
+        f"what the band promises. {'; '.join(parts)}."
+    )
 
 
-def draw_noise(found: StudyResults) -> Figure | None:
+def draw_noise(results: StudyResults) -> Figure | None:
     """Return what the chosen noise gains in log density, and what was chosen."""
-    if not found.noise:
+    if not results.noise:
         return None
-    count = len(found.noise)
+    count = len(results.noise)
     figure = new_figure(_ROW * count + 0.7, ONE_COLUMN)
     ax = figure.subplots()
     ax.axvline(0.0, color="#808080", lw=0.8)
-    gains = [-summary.paired.difference for summary in found.noise]
-    errors = [summary.paired.standard_error or 0.0 for summary in found.noise]
+    gains = [-summary.paired.difference for summary in results.noise]
+    errors = [summary.paired.standard_error or 0.0 for summary in results.noise]
     ax.errorbar(
         gains, range(count), xerr=errors, fmt="o", ms=4, capsize=2.5, color=_FIRST
     )
-    for k, summary in enumerate(found.noise):
+    for k, summary in enumerate(results.noise):
         chosen = [f"{name} {n}" for name, n in summary.counts.items() if n]
         numbers = f"{summary.before:.3f} to {summary.after:.3f} log N"
         ax.annotate(
@@ -86,15 +106,31 @@ def draw_noise(found: StudyResults) -> Figure | None:
             fontsize=6.5,
         )
     ax.set_ylim(count - 0.5, -0.5)
-    ax.set_yticks(range(count), [plain(summary.terrain) for summary in found.noise])
+    ax.set_yticks(range(count), [plain(summary.terrain) for summary in results.noise])
     ax.set_xlabel("gain in log density by chosen noise [log N]")
     ax.grid(visible=False, axis="y")
     return figure
 
 
-def draw_residuals(found: StudyResults) -> Figure | None:
+def caption_noise(results: StudyResults) -> str:
+    """State where input-dependent noise helps."""
+    better = [
+        f"{s.terrain} {-s.paired.difference:.3f} (p = {s.paired.p:.2g})"
+        for s in results.noise
+        if s.paired.difference < 0
+    ]
+    return (
+        "Constant noise against noise chosen among the training trials of each fold: "
+        "constant, log-linear in F_n and v_t, or that with heavy tails (Student's t). "
+        "On the right: how many folds chose what, and NLPD before and after on trials "
+        "left out; whiskers: standard error over trials. "
+        + (f"Gain: {', '.join(better)}." if better else "It brings nothing here.")
+    )
+
+
+def draw_residuals(results: StudyResults) -> Figure | None:
     """Return quantiles of measured minus predicted F_t over velocity."""
-    shown = {name: bands for name, bands in found.residuals.items() if bands}
+    shown = {name: bands for name, bands in results.residuals.items() if bands}
     if not shown:
         return None
     figure, axes = panel_grid(len(shown), 1.6)
@@ -109,7 +145,7 @@ def draw_residuals(found: StudyResults) -> Figure | None:
             ax.plot(band.v, middle, style, color=colour, lw=1.6, label=TITLES[model])
             for edge in (low, high):
                 ax.plot(band.v, edge, style, color=colour, lw=0.8)
-        ax.set_title(titled(name), loc="left")
+        ax.set_title(plain(results.study.terrains[name].title), loc="left")
     figure.supxlabel(SPEED_LABEL, fontsize=8)
     figure.supylabel("measured − predicted $F_t$ [N]", fontsize=8)
     handles, labels = axes[0].get_legend_handles_labels()
@@ -117,5 +153,57 @@ def draw_residuals(found: StudyResults) -> Figure | None:
     return figure
 
 
+def caption_residuals(results: StudyResults) -> str:
+    """State bias and spread of the residuals."""
+    values = [
+        f"{name} {bands[GP_SE].bias:+.2f} ± {bands[GP_SE].sd:.2f} N"
+        for name, bands in results.residuals.items()
+        if GP_SE in bands
+    ]
+    return (
+        "Median (thick), 5 and 95 % quantiles (thin) of measured minus predicted force "
+        "on trials left out, in ten bins of velocity."
+        + (
+            f" Mean and standard deviation, GP (SE): {'; '.join(values)}."
+            if values
+            else ""
+        )
+    )
+
+
+def coverage_of(result: TerrainResult, model: str, key: str) -> float:
+    """Return the mean over trials of a coverage; NaN where there is none."""
+    value = mean_of(result.scores(model, key))
+    return float("nan") if value is None else value
+
+
 def _has(model: str):  # noqa: ANN202
     return lambda result: bool(result.models(model))
+
+
+FIGURES = (
+    FigureSpec(
+        "calibration",
+        "Calibration: do the bands hold what they promise?",
+        "Share of held-out samples inside the 50, 90 and 95 percent band for every "
+        "terrain and model, with the promised share as a dashed line.",
+        draw_calibration,
+        caption_calibration,
+    ),
+    FigureSpec(
+        "noise",
+        "Noise that depends on the inputs",
+        "Gain in log predictive density by chosen noise for every terrain with its "
+        "standard error, and the number of folds per choice.",
+        draw_noise,
+        caption_noise,
+    ),
+    FigureSpec(
+        "residuals",
+        "What the models leave unexplained",
+        "Quantiles of measured minus predicted force over slip velocity for Tustin and "
+        "Gaussian process, one panel per terrain.",
+        draw_residuals,
+        caption_residuals,
+    ),
+)

@@ -5,31 +5,31 @@ from typing import Any
 
 import numpy as np
 
+from analysis.data.terrain_kinds import LEVELS
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.trends import TREND_UNITS, NoiseSummary, ResidualBand, Trend
-from analysis.terrains.confusion import Confusion
-from analysis.terrains.identify import LEVELS, Identification
+from analysis.terrains.identify import Confusion, Identification
 
 _DIGITS = 5  # of the surfaces in fits.json
 
 
-def plain_findings(found: StudyResults) -> dict[str, Any]:
+def plain_findings(results: StudyResults) -> dict[str, Any]:
     """Return the findings as plain values for fits.json, with units."""
     return {
-        "identification": _identification(found.identification),
-        "noise": {summary.terrain: _noise(summary) for summary in found.noise},
+        "identification": _identification(results.identification),
+        "noise": {summary.terrain: _noise(summary) for summary in results.noise},
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
-            for name, trends in found.trends.items()
+            for name, trends in results.trends.items()
         },
         "residuals": {
             name: {model: _residuals(band) for model, band in bands.items()}
-            for name, bands in found.residuals.items()
+            for name, bands in results.residuals.items()
         },
-        "surfaces": _surfaces(found),
-        "coverage": _coverage(found),
-        "rig": [trial.numbers() for trial in found.rig],
+        "surfaces": _surfaces(results),
+        "coverage": _coverage(results),
+        "rig": [trial.numbers() for trial in results.rig],
         "units": {
             "nlpd_constant": "log N",
             "nlpd_chosen": "log N",
@@ -44,15 +44,15 @@ def plain_findings(found: StudyResults) -> dict[str, Any]:
     }
 
 
-def findings_rows(found: StudyResults) -> list[tuple[str, str, str, str, float, str]]:
+def findings_rows(results: StudyResults) -> list[tuple[str, str, str, str, float, str]]:
     """Return the findings for fits.csv: terrain, model, fold, quantity, value, unit."""
     rows: list[tuple[str, str, str, str, float, str]] = []
-    for s in found.noise:
+    for s in results.noise:
         rows += [
             (s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
             (s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
         ]
-    for name, trends in found.trends.items():
+    for name, trends in results.trends.items():
         for key, trend in trends.items():
             values = {"slope per trial": trend.slope, "slope error": trend.slope_error}
             values["spread of trial means"] = trend.spread
@@ -61,19 +61,22 @@ def findings_rows(found: StudyResults) -> list[tuple[str, str, str, str, float, 
                 for what, value in values.items()
                 if value is not None
             ]
-    for name, bands in found.residuals.items():
+    for name, bands in results.residuals.items():
         for model, band in bands.items():
             rows.append((name, model, "", "residual bias", band.bias, "N"))
             rows.append((name, model, "", "residual sd", band.sd, "N"))
-    return rows + _recognised(found.identification) + _rig_rows(found.rig)
+    return rows + _recognised(results.identification) + _rig_rows(results.rig)
 
 
 def _recognised(
-    found: Identification | None,
+    identification: Identification | None,
 ) -> list[tuple[str, str, str, str, float, str]]:
-    if found is None:
+    if identification is None:
         return []
-    rules = {"log density": found.by_density, "smallest error": found.by_error}
+    rules = {
+        "log density": identification.by_density,
+        "smallest error": identification.by_error,
+    }
     return [
         ("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
         for rule, sizes in rules.items()
@@ -112,36 +115,36 @@ def _residuals(band: ResidualBand) -> dict[str, Any]:
     }
 
 
-def _surfaces(found: StudyResults) -> dict[str, Any]:
+def _surfaces(results: StudyResults) -> dict[str, Any]:
     return {
-        "F_n": _short(found.axes.F_n),
-        "v_t": _short(found.axes.v_t),
+        "F_n": _short(results.axes.F_n),
+        "v_t": _short(results.axes.v_t),
         "terrains": {
             s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
-            for s in found.surfaces
+            for s in results.surfaces
         },
     }
 
 
-def _coverage(found: StudyResults) -> dict[str, Any]:
+def _coverage(results: StudyResults) -> dict[str, Any]:
     return {
-        "F_n_edges": _short(found.edges.F_n),
-        "v_t_edges": _short(found.edges.v_t),
+        "F_n_edges": _short(results.edges.F_n),
+        "v_t_edges": _short(results.edges.v_t),
         "terrains": {
             c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
-            for c in found.coverage
+            for c in results.coverage
         },
     }
 
 
-def _identification(found: Identification | None) -> dict[str, Any] | None:
-    if found is None:
+def _identification(identification: Identification | None) -> dict[str, Any] | None:
+    if identification is None:
         return None
     return {
-        "windows_samples": list(found.by_density),
-        "by_density": _confusions(found.by_density),
-        "by_error": _confusions(found.by_error),
-        "neighbour_correlation": dict(found.rho),
+        "windows_samples": list(identification.by_density),
+        "by_density": _confusions(identification.by_density),
+        "by_error": _confusions(identification.by_error),
+        "neighbour_correlation": dict(identification.rho),
     }
 
 

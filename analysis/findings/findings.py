@@ -57,15 +57,15 @@ class StudyResults:
     rig: Sequence[RigTrial]
 
 
-def find(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
+def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
     """Return what follows from a study; models are only asked, nothing is fitted."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # small matrices: more threads lose time
-        return _find(study, rig)
+        return _compute(study, rig)
 
 
-def _find(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
+def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
     results, axes, edges = study.terrains, surface_axes(study), cell_edges(study)
     return StudyResults(
         study=study,

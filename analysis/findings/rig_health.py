@@ -126,7 +126,7 @@ def health_of(trial: RecordedTrial, next_tare: Array | None) -> RigTrial:
     bracket = None if next_tare is None else float(np.linalg.norm(next_tare - tare))
     is_moving = np.abs(np.nan_to_num(trial.traction[:, 0])) > _MOVING
     is_saturated = (trial.cycles["flags"] & int(Flag.FT_SATURATED)) != 0
-    facts = trial.metadata["provenance"]
+    provenance = trial.metadata["provenance"]
     return RigTrial(
         terrain=trial.terrain,
         name=trial.name,
@@ -140,10 +140,10 @@ def health_of(trial: RecordedTrial, next_tare: Array | None) -> RigTrial:
         tare=_three(tare),
         tare_bracket=bracket,
         joint7=float(np.abs(q7 - q7[0]).max() * 1e3),
-        puck_degc=_row(facts.get("pucks:temperature_degc", "")),
-        motor_degc=_row(facts.get("pucks:motor_temperature_degc", "")),
+        puck_degc=_row(provenance.get("pucks:temperature_degc", "")),
+        motor_degc=_row(provenance.get("pucks:motor_temperature_degc", "")),
         largest_F_t=float(np.abs(trial.traction[:, 1]).max()),
-        measurable_F_t=_measurable(facts.get("ft_sensor:ranges", ""), trial),
+        measurable_F_t=_measurable(provenance.get("ft_sensor:ranges", ""), trial),
         saturated=float(np.mean(is_saturated)),
         floor=_floor(trial),
         load_bias=_load_bias(trial, is_moving),
@@ -210,7 +210,7 @@ def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
 
 
 def _row(text: str) -> tuple[float, ...]:
-    """Return the numbers in a row of facts; a word in the place of one is left out."""
+    """Return the numbers in a metadata value; any other word is left out."""
     numbers: list[float] = []
     for part in text.split():
         with suppress(ValueError):

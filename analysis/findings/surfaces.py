@@ -73,12 +73,12 @@ def surfaces(study: Study, model: str, axes: SurfaceAxes) -> list[Surface]:
     """Return the surface of the first fold of `model` for every terrain with one."""
     v, load = (grid.ravel() for grid in np.meshgrid(axes.v_t, axes.F_n))
     shape = (axes.F_n.size, axes.v_t.size)
-    found = []
+    grids = []
     for result in study.terrains.values():
         folds = result.models(model)
         if folds:
             prediction = folds[0].model.predict(load, v)
-            found.append(
+            grids.append(
                 Surface(
                     terrain=result.terrain,
                     data=SampleTable.of(result.trials),
@@ -86,7 +86,7 @@ def surfaces(study: Study, model: str, axes: SurfaceAxes) -> list[Surface]:
                     variance=(prediction.sd**2).reshape(shape),
                 )
             )
-    return found
+    return grids
 
 
 def coverages(study: Study, edges: SurfaceAxes) -> list[CoverageMap]:

@@ -159,8 +159,8 @@ class NoiseSummary:
 
 def noise_summaries(study: Study) -> list[NoiseSummary]:
     """Return one summary per terrain that has both models; none if not fitted."""
-    found = (_summary(result) for result in study.terrains.values())
-    return [summary for summary in found if summary is not None]
+    summaries = (_summary(result) for result in study.terrains.values())
+    return [summary for summary in summaries if summary is not None]
 
 
 def _summary(result: TerrainResult) -> NoiseSummary | None:

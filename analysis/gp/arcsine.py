@@ -74,16 +74,6 @@ class Arcsine(Composable):
         """Return what gives K and its contraction for any theta."""
         return _ArcsineOver(self, X, X_other)
 
-    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
-        """Return sum_i w_i dk(x_i, x_i)/dtheta, shape (p,)."""
-        U, A = self.rows(theta, X)
-        of_sf = 2.0 * float(w @ self.diagonal(theta, X))
-        # d asin(p/A)/dp = c / (A sqrt(A^2 - p^2))
-        root = np.sqrt(self.c * (2.0 * A - self.c))
-        share = np.divide(self.c, A * root, out=np.zeros_like(A), where=root > 0)
-        of_shape = np.exp(2.0 * theta[0]) * ((U**2).T @ (w * share))
-        return np.concatenate([[of_sf], -2.0 * of_shape[1:], [of_shape[0]]])
-
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
 

@@ -49,10 +49,6 @@ class Kernel(Protocol):
         """Return what gives K, shape (n, m), and its contraction for any theta."""
         ...
 
-    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
-        """Return sum_i w_i dk(x_i, x_i)/dtheta_k, shape (p,)."""
-        ...
-
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return points that a search may start with, each of shape (p,)."""
         ...
@@ -106,12 +102,6 @@ class SquaredExponential(Composable):
     def over(self, X: Array, X_other: Array) -> Evaluator:
         """Return what gives K and its contraction for any theta."""
         return _SquaredExponentialOver(X, X_other)
-
-    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
-        """Return 2 sf^2 sum_i w_i for sf and nothing for the lengths."""
-        slope = np.zeros(theta.size)
-        slope[0] = 2.0 * float(w @ self.diagonal(theta, X))
-        return slope
 
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return sf = sd(y)/2 with every pair of lengths."""
@@ -221,12 +211,6 @@ class Sum(_Pair):
 
         return at
 
-    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
-        """Return the slopes of both parts, shape (p,)."""
-        a, b = self._split(theta)
-        left = self.left.diagonal_slope(a, X, w)
-        return np.concatenate([left, self.right.diagonal_slope(b, X, w)])
-
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return those of both side by side, the right ones with longer lengths."""
         return _side_by_side(
@@ -258,13 +242,6 @@ class Product(_Pair):
             )
 
         return at
-
-    def diagonal_slope(self, theta: Array, X: Array, w: Array) -> Array:
-        """Return the slopes of both parts, weighed by the other's variance."""
-        a, b = self._split(theta)
-        left = self.left.diagonal_slope(a, X, w * self.right.diagonal(b, X))
-        right = self.right.diagonal_slope(b, X, w * self.left.diagonal(a, X))
-        return np.concatenate([left, right])
 
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return those of both; the right part is dimensionless with sf = 1."""

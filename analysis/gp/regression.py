@@ -131,7 +131,7 @@ def fit_gp(
     Raises:
         SettingsError: fewer than 20 rows, or outputs that do not vary.
     """
-    check_outputs(y)
+    _check_outputs(y)
     kernel = kernel or SquaredExponential(inputs.shape[1])
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
@@ -156,7 +156,7 @@ def fit_gp(
     )
 
 
-def check_outputs(y: Array) -> None:
+def _check_outputs(y: Array) -> None:
     """Raise SettingsError if `y` has fewer than 20 rows or does not vary."""
     if y.size < MINIMUM_ROWS or np.ptp(y) == 0:
         span = float(np.ptp(y)) if y.size else 0.0

@@ -47,7 +47,7 @@ class Start(NamedTuple):
 
     Attributes:
         theta: hyperparameters at its end: a top, or just below the top of another.
-        lml: log marginal likelihood there, or a bound on it, priors included.
+        lml: log marginal likelihood there, priors included.
         evaluations: how often the likelihood was evaluated.
     """
 
@@ -61,7 +61,7 @@ class Optimum(NamedTuple):
 
     Attributes:
         theta: hyperparameters of largest likelihood.
-        lml: log marginal likelihood there, or a bound on it, priors included.
+        lml: log marginal likelihood there, priors included.
         starts: where every start ended.
         began: where it began.
         at_bound: hyperparameters at the edge of the search.
@@ -79,7 +79,7 @@ def maximise(
     objective: Objective,
     X: Array,
     sd_y: float,
-    scores: StartScores | None = None,
+    scores: StartScores,
 ) -> Optimum:
     """Return the hyperparameters of largest likelihood.
 
@@ -88,13 +88,13 @@ def maximise(
         objective: theta -> likelihood and its slope; may raise SettingsError.
         X: inputs, shape (n, d); they set the scale of starts and bounds.
         sd_y: standard deviation of the outputs.
-        scores: what starts are chosen by, by default the objective itself.
+        scores: what starts are chosen by.
     """
     kernel, noise = model
     sd_x = spread(X)
     bounds = np.vstack([kernel.bounds(sd_y, sd_x), noise.bounds(sd_y)])
     steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
-    rough, exact = scores or (lambda theta: objective(theta)[0],) * 2
+    rough, exact = scores
     offered = [
         np.concatenate([point, noise.start(sd_y)])
         for point in kernel.design(sd_y, sd_x)
@@ -206,7 +206,7 @@ def _climb(
         if _is_below(intermediate_result.x * steps, -intermediate_result.fun, known):
             raise StopIteration
 
-    found = minimize(
+    optimum = minimize(
         downhill,
         np.clip(start, bounds[:, 0], bounds[:, 1]) / steps,
         jac=True,
@@ -215,8 +215,8 @@ def _climb(
         callback=look,
         options={"maxiter": 200, "gtol": 1e-5, "ftol": 2e-9},
     )
-    theta = tuple(float(value) for value in found.x * steps)
-    return Start(theta, -float(found.fun), int(found.nfev))
+    theta = tuple(float(value) for value in optimum.x * steps)
+    return Start(theta, -float(optimum.fun), int(optimum.nfev))
 
 
 def _finish(

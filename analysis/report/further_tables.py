@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 
+from analysis.data.terrain_kinds import LEVELS
+from analysis.figures.spec import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
-from analysis.report.page_model import ReportSection, ReportTable
+from analysis.report.page_model import ReportTable
 from analysis.study.metrics import PairedComparison, compare
 from analysis.study.models import TITLES
 from analysis.study.study import Study, TerrainResult, mean_of
-from analysis.terrains.identify import LEVELS
+from analysis.terrains.identify import KEPT_PER_SECOND
 
-_KEPT_PER_SECOND = 100
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (
     "RMSE [N]",
@@ -23,15 +24,15 @@ _HEADS = (
 )
 
 
-def beyond_tables(found: StudyResults) -> list[ReportTable]:
+def beyond_tables(results: StudyResults) -> list[ReportTable]:
     """Return the tables beyond the paper's; one without rows is left out."""
-    study = found.study
+    study = results.study
     tables = [
         uncertainty(study),
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
-        noise_table(found),
-        *recognition_tables(found),
-        trend_table(found),
+        noise_table(results),
+        *recognition_tables(results),
+        trend_table(results),
     ]
     return [table for table in tables if table.rows]
 
@@ -91,7 +92,7 @@ def paired_cell(paired: PairedComparison | None) -> str:
     return f"{paired.difference:+.3f}{error} (p {paired.p:.2g})"
 
 
-def noise_table(found: StudyResults) -> ReportTable:
+def noise_table(results: StudyResults) -> ReportTable:
     """Return which noise was chosen per terrain, and NLPD before and after."""
     rows = [
         [
@@ -101,7 +102,7 @@ def noise_table(found: StudyResults) -> ReportTable:
             f"{s.after:.3f}",
             paired_cell(s.paired),
         ]
-        for s in found.noise
+        for s in results.noise
     ]
     return ReportTable(
         name="Noise chosen",
@@ -111,15 +112,15 @@ def noise_table(found: StudyResults) -> ReportTable:
     )
 
 
-def recognition_tables(found: StudyResults) -> list[ReportTable]:
+def recognition_tables(results: StudyResults) -> list[ReportTable]:
     """Return how well windows of motion tell the terrains apart; none for one."""
-    identification = found.identification
+    identification = results.identification
     if identification is None:
         return []
     rules = (identification.by_density, identification.by_error)
     rows = [
         (
-            f"{size / _KEPT_PER_SECOND:g} s",
+            f"{size / KEPT_PER_SECOND:g} s",
             *(
                 f"{rule[size][level].accuracy:.2f}"
                 for rule in rules
@@ -146,10 +147,10 @@ def recognition_tables(found: StudyResults) -> list[ReportTable]:
     ]
 
 
-def trend_table(found: StudyResults) -> ReportTable:
+def trend_table(results: StudyResults) -> ReportTable:
     """Return repeatability and first-to-last trend of every terrain."""
     rows = []
-    for name, trends in found.trends.items():
+    for name, trends in results.trends.items():
         force, load, ratio = (
             trends[key] for key in (MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO)
         )

@@ -12,12 +12,13 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from analysis.figures.spec import ReportSection
 from analysis.findings.as_numbers import findings_rows, plain_findings
-from analysis.findings.findings import StudyResults, find
+from analysis.findings.findings import StudyResults, compute_results
 from analysis.findings.rig_health import RigTrial
 from analysis.report.further_tables import beyond_tables
 from analysis.report.gallery import report_figures
-from analysis.report.page_model import ReportFigure, ReportSection, ReportTable
+from analysis.report.page_model import ReportFigure, ReportTable
 from analysis.report.paper_tables import (
     choices,
     parameters,
@@ -80,16 +81,16 @@ class PageSection:
     """One section of the page with everything in it.
 
     Attributes:
-        section: which one.
-        sentences: what it says first.
+        heading: which one.
+        sentences: what stands first.
         tables: its tables, before the figures.
-        exhibits: its figures.
+        figures: its figures.
     """
 
-    section: ReportSection
+    heading: ReportSection
     sentences: Sequence[str]
     tables: Sequence[ReportTable]
-    report_figures: Sequence[ReportFigure]
+    figures: Sequence[ReportFigure]
 
 
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
@@ -101,18 +102,18 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    found = find(study, context.rig)
-    fits = json.dumps(all_numbers(found, context), allow_nan=False, indent=1)
+    results = compute_results(study, context.rig)
+    fits = json.dumps(all_numbers(results, context), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
-    table = to_csv(study, findings_rows(found))
+    table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
-    shown = report_figures(found, _processes(study))
-    for exhibit in shown:
-        picture = exhibit.picture
+    shown = report_figures(results, _processes(study))
+    for figure in shown:
+        picture = figure.picture
         write_atomic(out_dir / "figures" / f"{picture.key}.png", picture.png)
         write_atomic(out_dir / "figures" / f"{picture.key}.pdf", picture.pdf)
     page = out_dir / "report" / "index.html"
-    write_atomic(page, render_page(found, shown, context).encode())
+    write_atomic(page, render_page(results, shown, context).encode())
     return page
 
 
@@ -123,17 +124,17 @@ def _processes(study: Study) -> int:
     return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)
 
 
-def all_numbers(found: StudyResults, context: ReportContext) -> dict[str, Any]:
+def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]:
     """Return everything that the report shows as plain values, for fits.json."""
     tables = [
         asdict(table) | {"section": table.section.value} for table in context.tables
     ]
-    further = {"findings": plain_findings(found), "tables": tables, **context.facts}
-    return to_fits(found.study) | to_plain(further)
+    further = {"findings": plain_findings(results), "tables": tables, **context.facts}
+    return to_fits(results.study) | to_plain(further)
 
 
 def render_page(
-    found: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
+    results: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> str:
     """Return the page as HTML; every text is escaped, every picture embedded."""
     environment = Environment(
@@ -145,37 +146,37 @@ def render_page(
     )
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
     environment.filters["unbroken"] = lambda text: text.replace(" ± ", "\u00a0±\u00a0")
-    study = found.study
+    study = results.study
     return environment.get_template("report.html.j2").render(
         context=context,
-        parts=parts(found, shown, context),
+        sections=sections(results, shown, context),
         warnings=[*context.warnings, *study.warnings],
         notes=[*study.notes, *([] if context.rig else [_NO_RIG])],
     )
 
 
-def parts(
-    found: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
+def sections(
+    results: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> list[PageSection]:
     """Return the sections that have something to show, in the order of the page."""
-    study = found.study
+    study = results.study
     tables = [
         summary(study),
         parameters(study),
         table_one(study),
-        *beyond_tables(found),
+        *beyond_tables(results),
         velocity_shares(study),
-        *rig_tables(found),
+        *rig_tables(results),
         choices(study, is_foreign=context.is_foreign),
         *context.tables,
     ]
     every = [
         PageSection(
-            section,
-            verdicts(study) if section is ReportSection.SUMMARY else (),
-            [table for table in tables if table.section is section],
-            [exhibit for exhibit in shown if exhibit.section is section],
+            heading,
+            verdicts(study) if heading is ReportSection.SUMMARY else (),
+            [table for table in tables if table.section is heading],
+            [figure for figure in shown if figure.section is heading],
         )
-        for section in ReportSection
+        for heading in ReportSection
     ]
-    return [part for part in every if part.tables or part.report_figures]
+    return [section for section in every if section.tables or section.figures]

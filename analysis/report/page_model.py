@@ -1,27 +1,10 @@
-"""The parts of a report: its sections, and the tables and figures they hold."""
+"""What stands on the page of a report: tables and figures, each in its section."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
+from analysis.figures.spec import ReportSection
 from analysis.figures.style import Picture
-
-
-class ReportSection(Enum):
-    """A part of the report; the value is its heading, the order that of the page."""
-
-    SUMMARY = "Summary"
-    CHANGED = "Under another choice"
-    PAPER = "The paper's table and figures"
-    BEYOND = "Beyond the paper"
-    HEALTH = "Rig health"
-    REACH = "What this rig could have seen"
-    ORIGIN = "Choices and provenance"
-
-    @property
-    def anchor(self) -> str:
-        """Name of the section in links."""
-        return self.name.lower()
 
 
 @dataclass(frozen=True, slots=True)

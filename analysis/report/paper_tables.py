@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from analysis.report.page_model import ReportSection, ReportTable
+from analysis.figures.spec import ReportSection
+from analysis.report.page_model import ReportTable
 from analysis.study.fits import flag_counts, tustin_medians
 from analysis.study.models import FITTERS, TITLES, TUSTIN
 from analysis.study.study import LIFTED_WARNING, Study, TerrainResult

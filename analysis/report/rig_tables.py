@@ -4,16 +4,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from analysis.figures.spec import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import RigTrial
-from analysis.report.page_model import ReportSection, ReportTable
+from analysis.report.page_model import ReportTable
 
 _SATURATED = 1e-9  # share of cycles
 
 
-def rig_tables(found: StudyResults) -> list[ReportTable]:
+def rig_tables(results: StudyResults) -> list[ReportTable]:
     """Return rig health by trial and its reach by terrain; none without a rig."""
-    return [health(found.rig), reach(found)] if found.rig else []
+    return [health(results.rig), reach(results)] if results.rig else []
 
 
 def health(rig: Sequence[RigTrial]) -> ReportTable:
@@ -56,31 +57,31 @@ def health(rig: Sequence[RigTrial]) -> ReportTable:
     )
 
 
-def reach(found: StudyResults) -> ReportTable:
+def reach(results: StudyResults) -> ReportTable:
     """Return for every terrain what the rig could have seen, beside the errors."""
     rows = []
-    for name, result in found.study.terrains.items():
-        mine = [trial for trial in found.rig if trial.terrain == name]
-        if not mine:
+    for name, result in results.study.terrains.items():
+        trials = [trial for trial in results.rig if trial.terrain == name]
+        if not trials:
             continue
         errors = [
             mae
-            for model in found.study.options.fit.models
+            for model in results.study.options.fit.models
             if (mae := result.mae(model)) is not None
         ]
-        floor = _median(mine, lambda trial: trial.floor)
+        floor = _median(trials, lambda trial: trial.floor)
         ratio = min(errors) / floor if errors and floor else None
         rows.append(
             (
                 name,
-                _largest(mine),
-                _number(_median(mine, lambda trial: trial.measurable_F_t), 0),
+                _largest(trials),
+                _number(_median(trials, lambda trial: trial.measurable_F_t), 0),
                 _number(floor),
-                _number(_median(mine, lambda trial: trial.tare_bracket)),
+                _number(_median(trials, lambda trial: trial.tare_bracket)),
                 _number(min(errors, default=None)),
                 _number(ratio, 1),
-                _number(_median(mine, lambda trial: trial.load_bias)),
-                _number(_median(mine, lambda trial: trial.drag)),
+                _number(_median(trials, lambda trial: trial.load_bias)),
+                _number(_median(trials, lambda trial: trial.drag)),
             )
         )
     return ReportTable(

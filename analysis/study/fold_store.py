@@ -3,15 +3,25 @@
 An interrupted study resumes where it stopped, and a study repeated with one choice
 changed repeats only what that choice touches. A file that is damaged, foreign or of
 another version counts as not there.
+
+Values become JSON and come back exactly: dataclasses, named tuples, arrays, numbers.
+Nothing is ever unpickled: a type is found by name in a table of the types that may
+appear, and its fields must be exactly its own.
 """
 
+import base64
 import hashlib
 import json
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from analysis.data.samples import SampleTable
-from analysis.gp import kernels, noise, sparse
+from analysis.gp import kernels, noise
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import Start
@@ -20,11 +30,13 @@ from analysis.study.crossval import FoldResult, FoldTask, ModelFold
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
-from analysis.study.serialise import decode, encode
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
 from analysis.tustin import model as tustin
 from analysis.tustin.identifiability import Interval, Profiles
 
+Types = Mapping[str, type]
+
+_DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 VERSION = 3  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
@@ -52,7 +64,6 @@ TYPES = {
         kernels.Sum,
         noise.ConstantNoise,
         noise.LogLinearNoise,
-        sparse.SparseProcess,
         tustin.TustinBounds,
         tustin.TustinFit,
         tustin.TustinForm,
@@ -102,3 +113,87 @@ def task_key(task: Any) -> str:  # noqa: ANN401
 def _digest(plain: Any) -> str:  # noqa: ANN401
     text = json.dumps(plain, sort_keys=True, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def encode(value: Any) -> Any:  # noqa: ANN401, PLR0911
+    """Return `value` as what JSON can hold; floats keep every bit.
+
+    Raises:
+        TypeError: a value of a kind that has no plain form.
+    """
+    if isinstance(value, np.ndarray):
+        return _encode_array(value)
+    if isinstance(value, np.generic):
+        return encode(value.item())
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else {"number": repr(value)}
+    names = _field_names(type(value))
+    if names is not None:
+        inside = {name: encode(getattr(value, name)) for name in names}
+        return {"type": type(value).__name__, "fields": inside}
+    if isinstance(value, list | tuple):
+        return [encode(item) for item in value]
+    if isinstance(value, Mapping):
+        return {"items": [[encode(k), encode(v)] for k, v in value.items()]}
+    raise TypeError(f"{type(value).__name__} has no plain form")
+
+
+def decode(plain: Any, types: Types) -> Any:  # noqa: ANN401
+    """Return the value of `encode`, with tuples for lists.
+
+    Args:
+        plain: what `encode` made, or anything else.
+        types: every type that may appear, by name.
+
+    Raises:
+        ValueError: not the plain form of such a value.
+    """
+    if isinstance(plain, list):
+        return tuple(decode(item, types) for item in plain)
+    if not isinstance(plain, dict):
+        return plain
+    try:
+        return _decode_tagged(plain, types)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"no plain form: {error!r}") from error
+
+
+def _decode_tagged(plain: dict[str, Any], types: Types) -> Any:  # noqa: ANN401
+    match plain:
+        case {"array": data, "dtype": kind, "shape": shape}:
+            return _decode_array(data, kind, shape)
+        case {"number": "inf" | "-inf" | "nan" as text}:
+            return float(text)
+        case {"items": items}:
+            return {decode(k, types): decode(v, types) for k, v in items}
+        case {"type": name, "fields": inside}:
+            kind = types[name]
+            if set(inside) != set(_field_names(kind) or ()):
+                raise ValueError(f"{name} has other fields")
+            return kind(**{key: decode(item, types) for key, item in inside.items()})
+    raise ValueError("an object of no known form")
+
+
+def _encode_array(array: np.ndarray) -> dict[str, Any]:
+    kind = array.dtype.name
+    if kind not in _DTYPES:
+        raise TypeError(f"an array of {kind} has no plain form")
+    data = np.ascontiguousarray(array, dtype=_DTYPES[kind]).tobytes()
+    text = base64.b64encode(data).decode("ascii")
+    return {"array": text, "dtype": kind, "shape": list(array.shape)}
+
+
+def _decode_array(data: str, kind: str, shape: list[int]) -> np.ndarray:
+    raw = base64.b64decode(data, validate=True)
+    flat = np.frombuffer(raw, dtype=_DTYPES[kind])
+    if any(side < 0 for side in shape) or math.prod(shape) != flat.size:
+        raise ValueError(f"{flat.size} numbers for an array of shape {shape}")
+    return flat.astype(kind).reshape(shape)
+
+
+def _field_names(kind: type) -> tuple[str, ...] | None:
+    if is_dataclass(kind):
+        return tuple(item.name for item in fields(kind))
+    return getattr(kind, "_fields", None)

@@ -80,20 +80,20 @@ def run_tasks(
         SettingsError: the scheduler does not answer.
     """
     where = workers if isinstance(workers, Workers) else Workers(workers)
-    found = {} if store is None else _found(store, tasks)
-    left = [(k, task) for k, task in enumerate(tasks) if k not in found]
-    if progress is not None and found:
-        progress(len(found), len(tasks))
+    results = {} if store is None else _stored(store, tasks)
+    left = [(k, task) for k, task in enumerate(tasks) if k not in results]
+    if progress is not None and results:
+        progress(len(results), len(tasks))
     for k, result in _stream(function, left, where):
-        found[k] = result
+        results[k] = result
         if store is not None:
             store.put(tasks[k], result)
         if progress is not None:
-            progress(len(found), len(tasks))
-    return [found[k] for k in range(len(tasks))]
+            progress(len(results), len(tasks))
+    return [results[k] for k in range(len(tasks))]
 
 
-def _found(store: Store, tasks: Sequence[Any]) -> dict[int, Any]:
+def _stored(store: Store, tasks: Sequence[Any]) -> dict[int, Any]:
     results = ((k, store.get(task)) for k, task in enumerate(tasks))
     return {k: result for k, result in results if result is not None}
 

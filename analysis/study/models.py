@@ -1,7 +1,7 @@
 """The models of a study by name, each fitted to the same rows.
 
-The five of Fig. 9 are the default; two more go beyond the paper: noise chosen per
-terrain, and all samples through a sparse process.
+The five of Fig. 9 are the default; one more goes beyond the paper: the noise of a
+Gaussian process chosen per fold.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +18,6 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
 from analysis.gp.regression import GaussianProcess, fit_gp
-from analysis.gp.sparse import INDUCING, SparseProcess, fit_sparse
 from analysis.study.metrics import Prediction
 from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
 from analysis.tustin.model import TustinBounds, TustinFit, TustinForm, fit_tustin
@@ -29,7 +28,6 @@ GP_NN = "gp_nn"
 GP_SE_TUSTIN = "gp_se_tustin"
 GP_NN_TUSTIN = "gp_nn_tustin"
 GP_SE_NOISE = "gp_se_noise"
-GP_SE_ALL = "gp_se_all"
 TITLES = {
     TUSTIN: "Tustin",
     GP_SE: "GP (SE)",
@@ -37,7 +35,6 @@ TITLES = {
     GP_SE_TUSTIN: "GP (SE, Tustin mean)",
     GP_NN_TUSTIN: "GP (NN, Tustin mean)",
     GP_SE_NOISE: "GP (SE, noise chosen)",
-    GP_SE_ALL: "GP (SE, all samples)",
 }
 
 
@@ -52,7 +49,6 @@ class FitOptions:
         models: names of the models, by default the five of Fig. 9.
         form: variant and loss of the Tustin fit.
         is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
-        inducing: inducing points of the process of all samples.
         draws: mixtures of trials for the intervals of Tustin parameters; 0 for none.
 
     Raises:
@@ -65,15 +61,14 @@ class FitOptions:
     models: tuple[str, ...] = (TUSTIN, GP_SE, GP_NN, GP_SE_TUSTIN, GP_NN_TUSTIN)
     form: TustinForm = field(default_factory=TustinForm)
     is_nn_as_printed: bool = False
-    inducing: int = INDUCING
     draws: int = 200
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.models if name not in TITLES]
-        if unknown or min(self.gp_points, self.inducing) < 1:
+        if unknown or self.gp_points < 1:
             raise SettingsError(
                 f"No study of {', '.join(unknown) or 'the models'} with "
-                f"{self.gp_points} points, {self.inducing} of them inducing.",
+                f"{self.gp_points} points.",
                 hint=f"The models are {', '.join(TITLES)}; give at least one point.",
             )
 
@@ -135,7 +130,7 @@ class GpModel:
         choice: how its noise was chosen.
     """
 
-    process: GaussianProcess | SparseProcess
+    process: GaussianProcess
     curve: TustinFit | None = None
     tails: TailedNoise | None = None
     choice: NoiseChoice | None = None
@@ -143,8 +138,7 @@ class GpModel:
     @property
     def flags(self) -> tuple[str, ...]:
         """Hyperparameters at the edge of the search; a long length = input unused."""
-        is_sparse = isinstance(self.process, SparseProcess)  # needs its jitter always
-        jitter = ("jitter added",) if self.process.jitter and not is_sparse else ()
+        jitter = ("jitter added",) if self.process.jitter else ()
         return tuple(f"{name} at bound" for name in self.process.at_bound) + jitter
 
     def mean(self, F_n: Array, v_t: Array) -> Array:
@@ -216,11 +210,6 @@ def _fit_with_chosen_noise(training: TrainingSet, options: FitOptions) -> Fitted
     return GpModel(process, tails=tails, choice=choice)
 
 
-def _fit_all_samples(training: TrainingSet, options: FitOptions) -> FittedModel:
-    rows = training.rows
-    return GpModel(fit_sparse(rows.inputs, rows.F_t, inducing=options.inducing))
-
-
 def _nn(options: FitOptions) -> Arcsine:
     return Arcsine(as_printed=options.is_nn_as_printed)
 
@@ -240,7 +229,6 @@ FITTERS: Mapping[str, Fitter] = {
 # beyond the paper, where FitOptions.models asks for them
 BEYOND: Mapping[str, Fitter] = {
     GP_SE_NOISE: _fit_with_chosen_noise,
-    GP_SE_ALL: _fit_all_samples,
 }
 
 

@@ -58,8 +58,8 @@ class TailedNoise(NamedTuple):
             return -float(np.mean(log_density(outside.F_t, tails.applied_to(normal))))
 
         bounds = np.log(np.array([_NU, _SPREAD]))
-        found = minimize(cost, np.log([6.0, 1.0]), method="L-BFGS-B", bounds=bounds)
-        return cls(float(np.exp(found.x[0])), float(np.exp(found.x[1])))
+        optimum = minimize(cost, np.log([6.0, 1.0]), method="L-BFGS-B", bounds=bounds)
+        return cls(float(np.exp(optimum.x[0])), float(np.exp(optimum.x[1])))
 
     def applied_to(self, normal: Prediction) -> Prediction:
         """Return a normal prediction with these tails in its place."""

@@ -10,6 +10,7 @@ from analysis.data.events import Slip, find_slips
 from analysis.data.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
+from analysis.data.terrain_kinds import kind_title, terrain_kind
 from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
@@ -42,6 +43,7 @@ class TerrainResult:
 
     Attributes:
         terrain: its name.
+        kind: "small", "big", "flat", or its own name where that is not known.
         trials: its prepared trials.
         slips: the slips of every trial.
         folds: its folds; a trial without kept samples has none.
@@ -49,10 +51,18 @@ class TerrainResult:
     """
 
     terrain: str
+    kind: str
     trials: tuple[PreparedTrial, ...]
     slips: tuple[tuple[Slip, ...], ...]
     folds: tuple[FoldResult, ...]
     whole: PooledTustinFit
+
+    @property
+    def title(self) -> str:
+        """Its name and its kind in words, e.g. "S0: small stones"."""
+        if self.kind == self.terrain:
+            return self.terrain
+        return f"{self.terrain}: {kind_title(self.kind)}"
 
     def per_trial(
         self, model: str, measure: Callable[[ModelFold], float]
@@ -115,6 +125,11 @@ class Study:
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
 
+    @property
+    def kinds(self) -> dict[str, str]:
+        """Kind of every terrain, by its name."""
+        return {name: result.kind for name, result in self.terrains.items()}
+
     def cross(self, model: str) -> dict[str, dict[str, float | None]]:
         """Return the mean absolute errors [N]: model's terrain -> tested terrain."""
         return {
@@ -166,6 +181,7 @@ def run_study(
     results = {
         terrain: TerrainResult(
             terrain=terrain,
+            kind=terrain_kind(terrain, [series.stones for series in trials[terrain]]),
             trials=kept,
             slips=tuple(find_slips(trial.smooth) for trial in kept),
             folds=tuple(fold for fold in folds if fold.terrain == terrain),
@@ -178,7 +194,8 @@ def run_study(
         for result in results.values()
         for warning in _warnings(result, options.prepare.container_travel is not None)
     )
-    return Study(simulated, options, results, tuple(notes), warnings)
+    contradictions = tuple(_contradictions(trials))
+    return Study(simulated, options, results, tuple(notes), contradictions + warnings)
 
 
 def _in_turn(
@@ -214,6 +231,20 @@ def mean_of(values: Sequence[float | None]) -> float | None:
 def _cross_mae(result: TerrainResult, model: str, tested: str) -> float | None:
     errors = [e for fold in result.models(model) for e in fold.cross[tested]]
     return mean_of(errors)
+
+
+def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]:
+    """Return a warning for every terrain whose trials state different stones."""
+    stated = {
+        terrain: sorted({series.stones for series in recorded if series.stones})
+        for terrain, recorded in trials.items()
+    }
+    return [
+        f"{terrain}: its trials state different stones ({', '.join(sizes)}). It "
+        "counts as a kind of its own."
+        for terrain, sizes in stated.items()
+        if len(sizes) > 1
+    ]
 
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:

@@ -105,13 +105,13 @@ class KnownTerrain:
         return 0.5 * math.erfc((mean - required) / (math.sqrt(2.0) * max(sd, 1e-9)))
 
     def _table(self, model: str) -> Table:
-        found = self.tables.get(model or self.default)
-        if found is None:
+        table = self.tables.get(model or self.default)
+        if table is None:
             raise SettingsError(
                 f"{self.name}: there is no model {model!r}.",
                 hint=f"Models: {', '.join(self.tables)}.",
             )
-        return found
+        return table
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from analysis.study.jobs import Store, Workers, run_tasks
 from analysis.study.models import BEYOND, FITTERS, GP_SE, TITLES, FitOptions
 from analysis.study.study import Study
 from analysis.terrains.database import FORMAT, VERSION
-from analysis.terrains.identify import Identification, kind_of
+from analysis.terrains.identify import Identification
 
 POINTS = 48  # of each axis
 _REACH = 99.8  # percentile of F_n up to which the tables reach, with a margin
@@ -63,19 +63,19 @@ def tabulate(task: TableTask) -> dict[str, Any]:
             model = fit(training, task.options)
         except TractionError:
             continue
-        found = model.predict(F_n, v_t)
+        prediction = model.predict(F_n, v_t)
         models[name] = {
             "title": TITLES[name],
             "parameters": model.describe(),
-            "mean": _rounded(found.mean, task.axes),
-            "sd": _rounded(found.sd, task.axes),
+            "mean": _rounded(prediction.mean, task.axes),
+            "sd": _rounded(prediction.sd, task.axes),
         }
     return models
 
 
 def database_of(
     study: Study,
-    found: Identification | None,
+    identification: Identification | None,
     made_utc: str,
     workers: Workers | int | None = None,
     store: Store | None = None,
@@ -84,7 +84,7 @@ def database_of(
 
     Args:
         study: the trials and how models are fitted.
-        found: how well they can be told apart; gives correlations and limits.
+        identification: how well they can be told apart; gives correlations and limits.
         made_utc: when.
         workers: where the models are fitted.
         store: results of earlier runs.
@@ -105,7 +105,11 @@ def database_of(
         "units": {"F_n": "N", "v_t": "m/s", "mean": "N", "sd": "N"},
         "axes": {"F_n": axes[0].tolist(), "v_t": axes[1].tolist()},
         "terrains": {
-            task.terrain: _facts(task, found) | {"models": fitted}
+            task.terrain: {
+                "kind": study.kinds[task.terrain],
+                **_record(task, identification),
+                "models": fitted,
+            }
             for task, fitted in zip(tasks, tables, strict=True)
             if default in fitted
         },
@@ -134,14 +138,15 @@ def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
     ]
 
 
-def _facts(task: TableTask, found: Identification | None) -> dict[str, Any]:
+def _record(task: TableTask, identification: Identification | None) -> dict[str, Any]:
     """Return what the database says of a terrain besides its models."""
     return {
-        "kind": kind_of(task.terrain),
         "trials": len(task.trials),
         "samples": sum(rows.count for rows in task.trials),
-        "rho": 0.0 if found is None else round(found.rho[task.terrain], 4),
-        "limits": _limits(found, task.terrain),
+        "rho": 0.0
+        if identification is None
+        else round(identification.rho[task.terrain], 4),
+        "limits": _limits(identification, task.terrain),
     }
 
 
@@ -156,12 +161,12 @@ def _axes(
     return np.round(np.linspace(least, most, POINTS), 6), np.round(v_t, 8)
 
 
-def _limits(found: Identification | None, terrain: str) -> Mapping[str, float]:
-    if found is None:
+def _limits(identification: Identification | None, terrain: str) -> Mapping[str, float]:
+    if identification is None:
         return {}
     return {
         str(size): round(limits[terrain], 4)
-        for size, limits in found.limits.items()
+        for size, limits in identification.limits.items()
         if terrain in limits and np.isfinite(limits[terrain])
     }
 

@@ -1,162 +1,63 @@
-"""Which terrain is this? Log densities of windows under every terrain's model.
+"""How well the terrains of a study can be told apart, by models that never saw a trial.
 
-Neighbouring samples repeat each other, so a sample is judged by what it adds: with the
-standardised residual z_i = (y_i - m_i) / s_i and its correlation rho from one sample to
-the next
-
-    ll = sum_i log N(z_i; rho z_{i-1}, 1 - rho^2) - log s_i
-
-(a first-order process; after a gap, and at first, log N(z_i; 0, 1)). Single terms are
-held above a floor, which keeps one spike from deciding. The posterior is the softmax of
-ll / tau: what is left of the correlation makes plain sums overconfident.
+Windows of motion are attributed to a terrain by two rules: the largest log density of
+`analysis.terrains.scores`, and the smallest mean absolute error, which is the paper's.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
-from analysis.data.series import Array
+from analysis.data.terrain_kinds import groups_of
 from analysis.study.jobs import run_tasks
-from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE
 from analysis.study.study import Study, TerrainResult
-from analysis.terrains.confusion import Confusion, confusion_of
+from analysis.terrains.scores import (
+    Expert,
+    Predictor,
+    TerrainScores,
+    neighbour_correlation,
+    score_trial,
+)
 
 WINDOWS = (50, 100, 200)  # kept samples: 0.5, 1 and 2 s of motion
-NONE = "none"  # of the known terrains
+KEPT_PER_SECOND = 100  # kept samples of a second of motion
 RARE = 0.01  # share of a terrain's own windows that strain it beyond the limit
-TAU = 10.0  # samples that count as one
-_SMALLEST_SD = 1e-6  # N
-_SPIKE = 10.0  # standard deviations beyond which a sample says no more
-_KINDS = {"S": "small", "B": "big", "T": "flat"}
-Predictor = Callable[[Array, Array], Prediction]
-CommandKind = Callable[[str], str]
-
-
-def kind_of(terrain: str) -> str:
-    """Return "small", "big" or "flat" by the paper's names; others are of their own."""
-    return _KINDS.get(terrain[:1], terrain)
-
-
-def surface_of(terrain: str) -> str:
-    """Return "flat" or "rocky"."""
-    return "flat" if kind_of(terrain) == "flat" else "rocky"
-
-
-LEVELS: Mapping[str, CommandKind] = {
-    "terrain": lambda terrain: terrain,
-    "stones": kind_of,
-    "surface": surface_of,
-}
 
 
 @dataclass(frozen=True, slots=True)
-class Expert:
-    """What one terrain would say.
+class Confusion:
+    """How often a window of one kind was taken for which.
 
     Attributes:
-        predict: F_t of given (F_n, v_t).
-        rho: correlation of its standardised residual from one sample to the next.
+        names: kinds, m of them.
+        counts: windows, rows the truth, columns the answer, shape (m, m).
     """
 
-    predict: Predictor
-    rho: float
+    names: tuple[str, ...]
+    counts: np.ndarray
+
+    @property
+    def accuracy(self) -> float:
+        """Mean over the kinds of the share that was recognised; NaN without windows."""
+        totals = self.counts.sum(axis=1)
+        present = totals > 0
+        if not present.any():
+            return float("nan")
+        return float((self.counts.diagonal()[present] / totals[present]).mean())
 
 
-def log_densities(trial: PreparedTrial, prediction: Prediction, rho: float) -> Array:
-    """Return the log density of every kept sample given the one before, shape (n,)."""
-    sd = np.maximum(prediction.sd, _SMALLEST_SD)
-    z = (trial.F_t - prediction.mean) / sd
-    before = np.where(_is_next(trial), rho, 0.0)
-    spread = 1.0 - before**2
-    innovation = z.copy()
-    innovation[1:] -= before[1:] * z[:-1]
-    squares = np.minimum(innovation**2 / spread, _SPIKE**2)
-    return -0.5 * (squares + np.log(2.0 * np.pi * spread)) - np.log(sd)
-
-
-def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Prediction]]) -> float:
-    """Return rho of trials under their own terrain's models, 0 to 0.99."""
-    products = squares = 0.0
-    for trial, prediction in pairs:
-        z = (trial.F_t - prediction.mean) / np.maximum(prediction.sd, _SMALLEST_SD)
-        is_next = _is_next(trial)[1:]
-        products += float((z[1:] * z[:-1])[is_next].sum())
-        squares += float((z[:-1] ** 2)[is_next].sum())
-    return min(max(products / squares, 0.0), 0.99) if squares > 0.0 else 0.0
-
-
-def _is_next(trial: PreparedTrial) -> np.ndarray:
-    """Return which kept samples follow the one before without a gap, shape (n,)."""
-    steps = np.diff(trial.indices)
-    usual = int(steps.min()) if steps.size else 1
-    return np.concatenate([[False], steps == usual])[: trial.kept]
-
-
-@dataclass(frozen=True, slots=True)
-class TerrainScores:
-    """How a trial fits each terrain, sample by sample.
-
-    Attributes:
-        terrains: names, m of them.
-        log_density: of every kept sample, shape (n, m).
-        error: absolute error of every kept sample [N], shape (n, m).
-        strain: squared error over the predicted variance, shape (n, m); 1 on average
-            where the model is right.
-    """
-
-    terrains: tuple[str, ...]
-    log_density: Array
-    error: Array
-    strain: Array
-
-    def windows(self, size: int) -> "list[slice]":
-        """Return consecutive windows of `size` kept samples; a rest is left out."""
-        return [
-            slice(k, k + size) for k in range(0, len(self.log_density) - size + 1, size)
-        ]
-
-    def posterior(self, rows: slice) -> Array:
-        """Return the probability of each terrain after the samples `rows`, (m,)."""
-        total = self.log_density[rows].sum(axis=0) / TAU
-        weight = np.exp(total - total.max())
-        return weight / weight.sum()
-
-    def least_error(self, rows: slice) -> str:
-        """Return the terrain whose model is nearest on average: the paper's rule."""
-        return self.terrains[int(self.error[rows].mean(axis=0).argmin())]
-
-    def likeliest(self, rows: slice) -> str:
-        """Return the terrain of the largest log density."""
-        return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
-
-    def likeliest_kind(self, rows: slice, kind: CommandKind) -> str:
-        """Return the kind whose terrains have most of the posterior together."""
-        total: dict[str, float] = {}
-        for name, share in zip(self.terrains, self.posterior(rows), strict=True):
-            total[kind(name)] = total.get(kind(name), 0.0) + float(share)
-        return max(total, key=lambda name: total[name])
-
-
-def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
-    """Return how `trial` fits what every expert expects."""
-    found = [
-        (expert.predict(trial.F_n, trial.v_t), expert.rho)
-        for expert in experts.values()
-    ]
-    empty = np.zeros((trial.kept, 0))
-    density = [log_densities(trial, p, rho) for p, rho in found]
-    error = [np.abs(trial.F_t - p.mean) for p, _ in found]
-    strain = [
-        ((trial.F_t - p.mean) / np.maximum(p.sd, _SMALLEST_SD)) ** 2 for p, _ in found
-    ]
-    columns = [
-        np.column_stack(values) if values else empty
-        for values in (density, error, strain)
-    ]
-    return TerrainScores(tuple(experts), *columns)
+def confusion_of(pairs: Sequence[tuple[str, str]]) -> Confusion:
+    """Return how often each truth got each answer, by (truth, answer) pairs."""
+    names = tuple(
+        dict.fromkeys(name for pair in zip(*pairs, strict=True) for name in pair)
+    )
+    counts = np.zeros((len(names), len(names)), np.int64)
+    for truth, answer in pairs:
+        counts[names.index(truth), names.index(answer)] += 1
+    return Confusion(names, counts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,6 +99,7 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     names = tuple(name for name in study.terrains if name in scored)
     if len(names) < 2:
         return None
+    groups = groups_of(study.kinds)
     density, error, limits = {}, {}, {}
     for size in WINDOWS:
         windows = [
@@ -207,12 +109,12 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
             for rows in scores.windows(size)
         ]
         density[size], error[size] = {}, {}
-        for level, kind in LEVELS.items():
+        for level, group in groups.items():
             density[size][level] = confusion_of(
-                [(kind(t), s.likeliest_kind(r, kind)) for t, s, r in windows]
+                [(group[t], s.likeliest_group(r, group)) for t, s, r in windows]
             )
             error[size][level] = confusion_of(
-                [(kind(t), kind(s.least_error(r))) for t, s, r in windows]
+                [(group[t], group[s.least_error(r)]) for t, s, r in windows]
             )
         limits[size] = {name: own_limit(scored[name], name, size) for name in names}
     return Identification(rho, density, error, limits)
@@ -258,8 +160,8 @@ def _score_folds(
     for name, result in study.terrains.items():
         for fold in result.folds:
             if model in fold.models:
-                found = experts.setdefault(fold.fold, {})
-                found[name] = Expert(fold.models[model].model.predict, rho[name])
+                of_fold = experts.setdefault(fold.fold, {})
+                of_fold[name] = Expert(fold.models[model].model.predict, rho[name])
     tasks = [
         ScoreTask(trial, experts[k])
         for name, result in study.terrains.items()

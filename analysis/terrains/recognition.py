@@ -4,7 +4,9 @@ from dataclasses import dataclass
 
 from analysis.data.prepare import PreparedTrial
 from analysis.terrains.database import KnownTerrain, TerrainDatabase
-from analysis.terrains.identify import NONE, Expert, TerrainScores, score_trial
+from analysis.terrains.scores import Expert, TerrainScores, score_trial
+
+NONE = "none"  # of the known terrains
 
 
 @dataclass(frozen=True, slots=True)

@@ -160,7 +160,7 @@ def polish(problem: Problem, start: Array) -> Point:
         point, slope = problem.project(q)
         return point.sse / scale, slope / scale
 
-    found = minimize(
+    optimum = minimize(
         objective,
         start,
         jac=True,
@@ -168,4 +168,4 @@ def polish(problem: Problem, start: Array) -> Point:
         bounds=problem.box.logarithmic,
         options={"maxiter": 200, "ftol": 1e-13, "gtol": 1e-9},
     )
-    return problem.project(np.asarray(found.x))[0]
+    return problem.project(np.asarray(optimum.x))[0]

@@ -1,12 +1,12 @@
 """Groups A, B and C of the bands, and E7: what the models of a study show."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.data.prepare import PreparedTrial
 from analysis.data.series import Array
+from analysis.data.terrain_kinds import FLAT
 from analysis.study.crossval import ModelFold
 from analysis.study.models import GP_SE, TUSTIN, TustinModel
 from analysis.study.study import Study, TerrainResult
@@ -33,15 +33,15 @@ class _Errors:
         return self.mean(terrain, tested) / self.mean(tested, tested)
 
 
-def model_measures(study: Study, plates: Sequence[str]) -> dict[str, list[float]]:
+def model_measures(study: Study) -> dict[str, list[float]]:
     """Return the values of A1 to C4 and E7, by id.
 
     Args:
-        study: of all terrains, with Tustin and GP-SE models.
-        plates: names of the flat terrains; all others are stones.
+        study: of all terrains, with Tustin and GP-SE models. Flat terrains are plates,
+            all others stones.
     """
-    flats = [name for name in study.terrains if name in plates]
-    stones = [name for name in study.terrains if name not in plates]
+    flats = [name for name, kind in study.kinds.items() if kind == FLAT]
+    stones = [name for name, kind in study.kinds.items() if kind != FLAT]
     if not (flats and stones):
         return {}
     errors = {model: _errors_of(study, model) for model in _MODELS}
@@ -134,8 +134,8 @@ def _is_worse(errors: _Errors, name: str, tested: str) -> bool:
     count = min(len(foreign), len(own))
     if count < 2 or foreign[:count] == own[:count]:
         return False
-    found = wilcoxon(foreign[:count], own[:count], alternative="greater")
-    return bool(found.pvalue < _SIGNIFICANT)  # pyright: ignore[reportAttributeAccessIssue]
+    test = wilcoxon(foreign[:count], own[:count], alternative="greater")
+    return bool(test.pvalue < _SIGNIFICANT)  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _chosen(errors: _Errors, stones: list[str]) -> dict[str, list[float]]:

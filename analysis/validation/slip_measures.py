@@ -34,7 +34,7 @@ class GroundTrials:
     @property
     def slips_per_trial(self) -> float:
         """Mean number of slips."""
-        return float(np.mean([len(found) for found in self.slips]))
+        return float(np.mean([len(of_trial) for of_trial in self.slips]))
 
     def kept(self, column: str) -> Array:
         """Return a column of the kept samples of all trials."""
@@ -49,7 +49,7 @@ def slip_measures(grounds: Mapping[str, GroundTrials]) -> dict[str, list[float]]
     """Return the values of D1 to F2 but E7, by id."""
     stones = [g for g in grounds.values() if not g.is_plate]
     plates = [g for g in grounds.values() if g.is_plate]
-    pooled = [slip for g in stones for found in g.slips for slip in found]
+    pooled = [slip for g in stones for of_trial in g.slips for slip in of_trial]
     return {
         "D1": [g.slips_per_trial for g in stones],
         "D2": [g.slips_per_trial for g in plates],

@@ -22,6 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
     )
     parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
+    parser.add_argument(
+        "--stones",
+        metavar="NAME=SIZE,..",
+        help="stones of a terrain: small, big or none for a plate",
+    )
     add_seed(parser)
 
 
@@ -29,17 +34,19 @@ def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition.clock import SystemClock
     from analysis.data.prepare import PrepareOptions
-    from analysis.data.tables import load_tables, parse_columns
+    from analysis.data.tables import load_tables, parse_columns, parse_stones
     from analysis.report.page import ReportContext, write_report
     from analysis.study.models import FitOptions
     from analysis.study.study import StudyOptions, run_study
     from experiments.operator.console import Console
-    from experiments.report.sessions import REPORTED, fitting
+    from experiments.report.progress import fitting
+    from experiments.report.sessions import REPORTED
     from experiments.session.store import iso_utc
 
     console = Console(color=not args.no_color)
     columns = parse_columns(args.columns) if args.columns else None
-    trials = load_tables(args.files, columns, args.terrain)
+    stones = parse_stones(args.stones) if args.stones else None
+    trials = load_tables(args.files, columns, args.terrain, stones)
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     fit = FitOptions(seed=args.seed, models=REPORTED)

@@ -1,7 +1,6 @@
 """From sessions to a report: which trials, what is said about them."""
 
-from collections.abc import Generator, Iterable, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +18,7 @@ from analysis.terrains.export import database_of
 from analysis.terrains.identify import identify_study
 from experiments.messages import CATALOGUE
 from experiments.operator.console import Console
-from experiments.operator.progress import ProgressLine
+from experiments.report.progress import fitting
 from experiments.report.tables import report_tables
 from experiments.report.truth_errors import truth_tables
 from experiments.session.store import (
@@ -160,16 +159,6 @@ def study_sessions(
             series, options, is_simulated, progress, ResultStore(data / FOLDS)
         )
     return StudySession(study, trials, problems)
-
-
-@contextmanager
-def fitting(console: Console) -> Generator[ProgressLine]:
-    """Show the progress of the fits inside the block."""
-    progress = ProgressLine(console, SystemClock(), "fits")
-    try:
-        yield progress
-    finally:
-        progress.end()
 
 
 def repeated(

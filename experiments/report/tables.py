@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import cast
 
 from analysis.data.load import RecordedTrial
-from analysis.report.page_model import ReportSection, ReportTable
+from analysis.figures.spec import ReportSection
+from analysis.report.page_model import ReportTable
 from experiments.session.store import SessionFolder, read_json
 
 _ROW = (

@@ -10,7 +10,8 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import moving_average
-from analysis.report.page_model import ReportSection, ReportTable
+from analysis.figures.spec import ReportSection
+from analysis.report.page_model import ReportTable
 from analysis.study.study import Study, TerrainResult
 
 _FEWEST = 50  # cycles, or a truth file is none of this trial

@@ -14,6 +14,7 @@ import numpy as np
 from acquisition.errors import SessionError
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions
+from analysis.data.terrain_kinds import FLAT
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
 from analysis.validation.bands import Band, BandResult, hold_against_bands
@@ -41,7 +42,7 @@ class AcceptancePlan:
     Attributes:
         config: a rig.toml; None = as shipped.
         terrains: names of the terrains, in the matrix's order.
-        plates: those of them without stones.
+        plates: those of them without stones by the matrix; kept with the results.
         travel: length of the shortest container [m].
         trials: of each.
         seed: of everything random.
@@ -104,8 +105,8 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
     )
     study = run_study(series, options, simulated=True)
     measures = {
-        **(model_measures(study, plan.plates) if is_whole else {}),
-        **slip_measures(_grounds(study, trials, plan.plates)),
+        **(model_measures(study) if is_whole else {}),
+        **slip_measures(_grounds(study, trials)),
     }
     found = [*hold_against_bands(measures), *_truth(trials)]
     if is_whole:
@@ -170,11 +171,11 @@ def _load(plan: AcceptancePlan, data: Path) -> dict[str, list[RecordedTrial]]:
 
 
 def _grounds(
-    study: Study, trials: dict[str, list[RecordedTrial]], plates: Sequence[str]
+    study: Study, trials: dict[str, list[RecordedTrial]]
 ) -> dict[str, GroundTrials]:
     return {
         name: GroundTrials(
-            is_plate=name in plates,
+            is_plate=result.kind == FLAT,
             series=tuple(trial.series() for trial in trials[name]),
             prepared=result.trials,
             slips=result.slips,

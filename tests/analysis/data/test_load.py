@@ -54,10 +54,10 @@ def make_cycles(count=100):
     return records
 
 
-def write(path, cycles=None, *, finish=True, drop=(), **attachments):
+def write(path, cycles=None, *, finish=True, drop=(), facts=(), **attachments):
     texts = ATTACHMENTS | attachments
     header = TrialHeader(
-        trial={"session": "S001", "trial": "T01", "simulated": "true"},
+        trial={"session": "S001", "trial": "T01", "simulated": "true", **dict(facts)},
         utc_offset_ns=1_700_000_000_000_000_000,
         offset_uncertainty_ns=10,
         provenance={},
@@ -78,6 +78,14 @@ def write(path, cycles=None, *, finish=True, drop=(), **attachments):
 @pytest.fixture(scope="module")
 def trial(tmp_path_factory):
     return load_trial(write(tmp_path_factory.mktemp("load") / "T01.mcap"))
+
+
+@pytest.mark.parametrize(
+    ("facts", "stones"), [({"stone_size": "none"}, "none"), ({}, "")]
+)
+def test_the_stones_are_those_of_the_recording(tmp_path, facts, stones):
+    trial = load_trial(write(tmp_path / "T01.mcap", facts=facts))
+    assert trial.series().stones == trial.series("sole").stones == stones
 
 
 def test_the_sole_is_where_the_joints_put_it(trial):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data import tables
-from analysis.data.tables import load_tables, parse_columns
+from analysis.data.tables import load_tables, parse_columns, parse_stones
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
 
@@ -137,6 +137,20 @@ def test_npz_that_unpacks_beyond_the_limit_is_refused_unopened(tmp_path, monkeyp
 def test_columns_that_name_nothing_are_refused(text):
     with pytest.raises(SettingsError, match="does not name a column"):
         parse_columns(text)
+
+
+def test_stones_are_given_by_terrain_and_otherwise_unknown(tmp_path):
+    path = tmp_path / "a.npz"
+    np.savez(path, **{"Sand/00": rows(), "Beach/00": rows(), "moon/00": rows()})
+    trials = load_tables([path], stones=parse_stones("Sand=none, Beach=small"))
+    stones = {name: series.stones for name, (series,) in trials.items()}
+    assert stones == {"Sand": "none", "Beach": "small", "moon": ""}
+
+
+@pytest.mark.parametrize("text", ["Sand", "Sand=", "=none", "Sand=gravel"])
+def test_stones_of_no_size_are_refused(text):
+    with pytest.raises(SettingsError, match="does not give the stones"):
+        parse_stones(text)
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)

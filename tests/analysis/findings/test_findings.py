@@ -10,7 +10,7 @@ import pytest
 from analysis.figures.confusion import shares_of
 from analysis.figures.trials import way_of
 from analysis.findings.as_numbers import findings_rows, plain_findings
-from analysis.findings.findings import find
+from analysis.findings.findings import compute_results
 from analysis.findings.surfaces import cell_edges, coverages
 from analysis.findings.trends import (
     fit_trend,
@@ -21,12 +21,12 @@ from analysis.findings.trends import (
 from analysis.study.fits import to_csv, to_plain
 from analysis.study.models import GP_SE, GP_SE_NOISE, FitOptions
 from analysis.study.study import StudyOptions, run_study
-from analysis.terrains.confusion import Confusion
+from analysis.terrains.identify import Confusion
 
 
 @pytest.fixture(scope="module")
-def found(small_study):
-    return find(small_study)
+def results(small_study):
+    return compute_results(small_study)
 
 
 def test_a_trends_slope_and_error_are_those_of_regression():
@@ -74,16 +74,16 @@ def test_residuals_average_to_their_bias(small_study):
 
 
 def test_a_coverage_map_counts_every_sample_once(small_study):
-    for part in coverages(small_study, cell_edges(small_study)):
-        kept = small_study.terrains[part.terrain].kept
-        assert part.counts.sum() + part.outside == kept
+    for cells in coverages(small_study, cell_edges(small_study)):
+        kept = small_study.terrains[cells.terrain].kept
+        assert cells.counts.sum() + cells.outside == kept
 
 
-def test_surfaces_are_what_the_model_predicts(found, small_study):
-    surface = found.surfaces[0]
+def test_surfaces_are_what_the_model_predicts(results, small_study):
+    surface = results.surfaces[0]
     model = small_study.terrains[surface.terrain].models(GP_SE)[0].model
     i, j = 7, 30
-    one = model.predict(found.axes.F_n[[i]], found.axes.v_t[[j]])
+    one = model.predict(results.axes.F_n[[i]], results.axes.v_t[[j]])
     assert surface.mean[i, j] == pytest.approx(one.mean[0])
     assert surface.variance[i, j] == pytest.approx(one.sd[0] ** 2)
 
@@ -111,10 +111,10 @@ def test_chosen_noise_is_counted_and_compared(make_series, moving):
     assert summary.paired.difference == pytest.approx(difference)
 
 
-def test_findings_are_valid_json_and_lines_of_the_csv(found, small_study):
-    plain = json.loads(json.dumps(to_plain(plain_findings(found)), allow_nan=False))
+def test_findings_are_valid_json_and_lines_of_the_csv(results, small_study):
+    plain = json.loads(json.dumps(to_plain(plain_findings(results)), allow_nan=False))
     slope = plain["trends"]["S0"]["F_t"]["slope"]
-    text = to_csv(small_study, findings_rows(found))
+    text = to_csv(small_study, findings_rows(results))
     rows = [
         row
         for row in csv.DictReader(io.StringIO(text))

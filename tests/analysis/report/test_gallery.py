@@ -1,9 +1,10 @@
 import pytest
 
+from analysis.figures.spec import ReportSection
 from analysis.figures.style import styled
-from analysis.figures.surfaces import told_apart
-from analysis.findings.findings import find
-from analysis.report.gallery import _RECIPES
+from analysis.figures.surfaces import distinct_labels
+from analysis.findings.findings import compute_results
+from analysis.report.gallery import FIGURES
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -15,7 +16,7 @@ def findings(small_study, slice_trials):
     """Return what is shown of three terrains, and of one alone."""
     options = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
     alone = run_study({"TF": slice_trials["TF"]}, options, simulated=True)
-    return {"three": find(small_study), "one": find(alone)}
+    return {"three": compute_results(small_study), "one": compute_results(alone)}
 
 
 def is_whole(figure):
@@ -36,13 +37,21 @@ def is_whole(figure):
 @pytest.mark.parametrize(("count", "figures"), [("three", 17), ("one", 12)])
 def test_nothing_of_a_figure_is_cut(findings, count, figures):
     with styled():
-        drawn = {recipe.key: recipe.draw(findings[count]) for recipe in _RECIPES}
+        drawn = {spec.key: spec.draw(findings[count]) for spec in FIGURES}
         shown = {key: figure for key, figure in drawn.items() if figure is not None}
         assert len(shown) >= figures
         assert [key for key, figure in shown.items() if not is_whole(figure)] == []
 
 
-def test_numbers_that_differ_are_told_apart():
-    assert told_apart([0.171, 0.174, 0.21]) == ["0.171", "0.174", "0.21"]
-    assert told_apart([1.0, 2.0]) == ["1", "2"]
-    assert told_apart([1.0, 1.0]) == ["1", "1"]
+def test_numbers_that_differ_have_distinct_labels():
+    assert distinct_labels([0.171, 0.174, 0.21]) == ["0.171", "0.174", "0.21"]
+    assert distinct_labels([1.0, 2.0]) == ["1", "2"]
+    assert distinct_labels([1.0, 1.0]) == ["1", "1"]
+
+
+def test_figures_of_one_section_stand_together_and_keys_are_unique():
+    keys = [spec.key for spec in FIGURES]
+    assert len(keys) == len(set(keys)) == 20
+    sections = [spec.section for spec in FIGURES]
+    places = [list(ReportSection).index(section) for section in sections]
+    assert places == sorted(places)

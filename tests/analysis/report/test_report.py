@@ -7,9 +7,9 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.figures.curves import draw_excerpts
 from analysis.figures.errors import draw_cross_map, draw_errors
-from analysis.figures.selection import best_window
+from analysis.figures.selection import busiest_window
 from analysis.figures.style import render, styled
-from analysis.findings.findings import find
+from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
 from analysis.report.paper_tables import choices, summary, table_one, verdicts
 from analysis.study.atomic_files import write_atomic
@@ -110,7 +110,7 @@ def hostile_study(make_series, moving):
 
 
 def test_markup_in_names_stays_text(hostile_study):
-    page = Page(render_page(find(hostile_study), [], context(title=HOSTILE)))
+    page = Page(render_page(compute_results(hostile_study), [], context(title=HOSTILE)))
     assert not page.attributes("script")
     assert page.text.count(HOSTILE) > 3
     assert "LIVE" in page.text
@@ -121,7 +121,7 @@ def test_mathematics_in_names_stays_text(hostile_study, draw):
     from matplotlib.text import Text
 
     with styled():
-        figure = draw(hostile_study)
+        figure = draw(compute_results(hostile_study))
         figure.draw_without_rendering()
     texts = [text.get_text() for text in figure.findobj(Text)]
     assert any(r"<script>\$x_1</b>&" in text for text in texts)
@@ -145,9 +145,10 @@ def test_a_study_without_kept_samples_still_has_a_report(make_series, tmp_path):
 
 
 def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study):
+    results = compute_results(small_study)
     with styled():
         first, second, unmarked = (
-            render("a", draw_errors(small_study), is_simulated)
+            render("a", draw_errors(results), is_simulated)
             for is_simulated in (True, True, False)
         )
     assert first == second
@@ -155,8 +156,8 @@ def test_figures_are_the_same_bytes_every_time_but_for_the_watermark(small_study
 
 
 def test_excerpt_holds_slips_where_there_are_some(small_study):
-    assert len(best_window(small_study.terrains["S0"]).slips) >= 2
-    assert len(best_window(small_study.terrains["TF"]).slips) == 0
+    assert len(busiest_window(small_study.terrains["S0"]).slips) >= 2
+    assert len(busiest_window(small_study.terrains["TF"]).slips) == 0
 
 
 def test_summary_counts_what_was_kept(small_study):

@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 
 from analysis.data.prepare import PrepareOptions, prepare
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.fold_store import ResultStore, task_key
+from analysis.study.fold_store import ResultStore, decode, encode, task_key
 from analysis.study.jobs import run_tasks
 from analysis.study.models import FitOptions
-from analysis.study.serialise import decode, encode
 
 ANY = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -26,7 +25,7 @@ def task(slice_trials):
         name: [prepare(series, PrepareOptions()) for series in slice_trials[name]]
         for name in ("S0", "TF")
     }
-    options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_all"))
+    options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_noise"))
     return plan_folds(trials, options)[0][0]
 
 

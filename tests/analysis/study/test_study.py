@@ -32,6 +32,25 @@ def test_models_of_stones_fail_on_a_plate(small_study):
     assert cross["S0"]["S0"] == small_study.terrains["S0"].mae(TUSTIN)
 
 
+def test_trials_that_contradict_each_other_about_the_stones_are_warned_of(
+    make_series, moving
+):
+    trials = [
+        replace(make_series(moving, seed=k), stones=stones)
+        for k, stones in enumerate(("small", "big"))
+    ]
+    fit = FitOptions(models=(TUSTIN,), draws=0)
+    options = StudyOptions(fit=fit, n_jobs=1)
+    study = run_study({"S0": trials}, options, simulated=True)
+    assert study.kinds == {"S0": "S0"}
+    assert any("big, small" in warning for warning in study.warnings)
+
+
+def test_a_terrain_is_titled_with_its_kind(small_study):
+    titles = [result.title for result in small_study.terrains.values()]
+    assert titles == ["S0: small stones", "B0: big stones", "TF: flat plate"]
+
+
 def test_fits_have_the_agreed_schema(small_study):
     fits = json.loads(json.dumps(to_fits(small_study), allow_nan=False))
     assert fits["schema"] == 1

@@ -15,18 +15,15 @@ from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 from analysis.terrains.database import load
 from analysis.terrains.export import database_of
-from analysis.terrains.identify import (
-    Confusion,
+from analysis.terrains.identify import Confusion, identify_study
+from analysis.terrains.recognition import recognise
+from analysis.terrains.scores import (
     Expert,
     TerrainScores,
-    identify_study,
-    kind_of,
     log_densities,
     neighbour_correlation,
     score_trial,
-    surface_of,
 )
-from analysis.terrains.recognition import recognise
 from analysis.terrains.table import Table
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
@@ -121,16 +118,6 @@ def test_one_spike_does_not_decide():
     assert calm.sum() - wild.sum() < 60.0
 
 
-def test_terrains_are_named_by_stone_and_surface():
-    assert [kind_of(n) for n in ("S10", "B0", "Tf", "moon")] == [
-        "small",
-        "big",
-        "flat",
-        "moon",
-    ]
-    assert [surface_of(n) for n in ("S10", "TF")] == ["rocky", "flat"]
-
-
 # --- a study --------------------------------------------------------------------------
 
 
@@ -155,9 +142,10 @@ def test_many_half_convinced_models_of_one_kind_outvote_a_single_one():
     )
     rows = slice(0, 10)
     assert scores.likeliest(rows) == "TF"
-    assert scores.likeliest_kind(rows, surface_of) == "rocky"
+    surfaces = {"S0": "rocky", "S10": "rocky", "TF": "flat"}
+    assert scores.likeliest_group(rows, surfaces) == "rocky"
     sure = TerrainScores(scores.terrains, 100.0 * density, scores.error, scores.strain)
-    assert sure.likeliest_kind(rows, surface_of) == "flat"
+    assert sure.likeliest_group(rows, surfaces) == "flat"
 
 
 def test_neighbouring_residuals_are_alike(found):
@@ -186,6 +174,33 @@ def test_a_posterior_is_a_probability(study):
     posterior = scores.posterior(slice(0, 100))
     assert posterior.sum() == pytest.approx(1.0)
     assert scores.terrains[int(posterior.argmax())] == "TF"
+
+
+def test_recorded_stones_and_not_names_decide_what_a_terrain_counts_as():
+    # a plate called Sand, small stones called Beach and Gravel
+    laws = {"Sand": ("TF", "none"), "Beach": ("S0", "small"), "Gravel": ("S0", "small")}
+    trials = {
+        name: [
+            replace(push(law, k), terrain=name, stones=stones)
+            for k in range(start, stop)
+        ]
+        for (name, (law, stones)), (start, stop) in zip(
+            laws.items(), [(0, 3), (0, 3), (3, 6)], strict=True
+        )
+    }
+    fit = FitOptions(models=(GP_SE,), gp_points=40, draws=0)
+    study = run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
+    assert study.kinds == {"Sand": "flat", "Beach": "small", "Gravel": "small"}
+    levels = identify_study(study).by_density[100]
+    assert levels["terrain"].names == ("Sand", "Beach", "Gravel")
+    assert set(levels["stones"].names) == {"flat", "small"}
+    assert set(levels["surface"].names) == {"flat", "rocky"}
+    # twins cannot be told apart, but both count as small stones
+    assert levels["terrain"].accuracy < 0.9
+    assert levels["stones"].accuracy > 0.9
+    content = json.loads(database_of(study, None, "2027-01-15T08:00:00Z", 1))
+    kinds = {name: terrain["kind"] for name, terrain in content["terrains"].items()}
+    assert kinds == study.kinds
 
 
 # --- the database ---------------------------------------------------------------------

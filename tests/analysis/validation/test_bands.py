@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,7 +107,7 @@ def toy_measures():
     trials = {name: [drawn(name, k, samples=2000) for k in range(5)] for name in names}
     fit = FitOptions(models=(TUSTIN, GP_SE), gp_points=60, draws=0)
     study = run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
-    return study, model_measures(study, ("TF", "Tf"))
+    return study, model_measures(study)
 
 
 def test_own_errors_are_those_of_the_study(toy_measures):
@@ -148,6 +149,25 @@ def test_the_toy_fails_most_of_what_dynamics_would_show(toy_measures):
     assert set(measures) == {b.id for b in BANDS if b.id[0] in "ABC"} | {"E7"}
 
 
+def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
+    study, measures = toy_measures
+    names = {"S0": "Tundra", "B0": "Trail", "TF": "Sand", "Tf": "Beach"}
+    stones = {"S0": "small", "B0": "big", "TF": "none", "Tf": "none"}
+    trials = {
+        names[name]: [
+            replace(
+                drawn(name, k, samples=2000), terrain=names[name], stones=stones[name]
+            )
+            for k in range(5)
+        ]
+        for name in names
+    }
+    renamed = model_measures(run_study(trials, study.options, simulated=True))
+    assert renamed.keys() == measures.keys()
+    assert renamed["B8"] == [1.0]  # stones and plates are never confused
+
+
 def test_a_study_without_plates_has_no_such_measures(toy_measures):
     study, _ = toy_measures
-    assert model_measures(study, ()) == {}
+    stones = {n: r for n, r in study.terrains.items() if n in ("S0", "B0")}
+    assert model_measures(replace(study, terrains=stones)) == {}

@@ -52,7 +52,8 @@ def odd_trials():
 def fitted(folder):
     """Return (what was printed, the page's text, fits.json) of all odd tables."""
     np.savez(folder / "odd.npz", **odd_trials())
-    done = traction("fit", folder / "odd.npz", "--out", folder / "out")
+    stones = ("--stones", "load=none,holes=small,twice=small")
+    done = traction("fit", folder / "odd.npz", "--out", folder / "out", *stones)
     assert done.code == 0, done.err
     page = (folder / "out/report/index.html").read_text()
     fits = json.loads((folder / "out/fits.json").read_text())
@@ -97,6 +98,13 @@ def test_the_rest_is_done_all_the_same(odd, terrain):
     # F_t spans 5 N; one short trial each is enough to see the law
     for model in ("tustin", "gp_se"):
         assert fits["terrains"][terrain]["mae"][model] < 1.0
+
+
+def test_stones_that_were_given_group_the_terrains(odd):
+    _, _, fits = odd
+    levels = fits["findings"]["identification"]["by_density"]["50"]
+    assert set(levels["stones"]["names"]) == {"pair", "flat", "small"}
+    assert set(levels["surface"]["names"]) == {"pair", "flat", "rocky"}
 
 
 @pytest.mark.parametrize("terrain", ["single", "stuck", "short"])

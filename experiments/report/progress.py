@@ -1,11 +1,13 @@
 """How far a long computation is and how long it still takes, on one line."""
 
-from acquisition.clock import Clock
+from collections.abc import Generator
+from contextlib import contextmanager
+
+from acquisition.clock import NS_PER_S, Clock, SystemClock
 from experiments.operator.console import Console
 
 _STEP = 0.1  # of the whole between two plain lines
 _BAR = 30  # characters
-_SECOND = 1_000_000_000
 
 
 class ProgressLine:
@@ -21,25 +23,35 @@ class ProgressLine:
         self._console, self._clock, self._what = console, clock, what
         self._began_ns = clock.now_ns()
         self._at_first: int | None = None
-        self._said = 0.0
+        self._reported = 0.0
 
     def __call__(self, done: int, total: int) -> None:
         """Show that `done` of `total` are done."""
         if self._at_first is None:
             # results of an earlier run are there at once and say nothing of the speed
             self._at_first = done - 1 if done == 1 else done
-        elapsed = (self._clock.now_ns() - self._began_ns) / _SECOND
+        elapsed = (self._clock.now_ns() - self._began_ns) / NS_PER_S
         left = time_left(done - self._at_first, total - done, elapsed)
         text = progress_text(done, total, left, self._what)
         if self._console.is_live:
             self._console.panel([text])
-        elif done == total or done / total >= self._said + _STEP:
-            self._said = done / total
+        elif done == total or done / total >= self._reported + _STEP:
+            self._reported = done / total
             self._console.say(text)
 
     def end(self) -> None:
         """Take the bar away; a second call does nothing."""
         self._console.end_panel()
+
+
+@contextmanager
+def fitting(console: Console) -> Generator[ProgressLine]:
+    """Show the progress of the fits inside the block."""
+    progress = ProgressLine(console, SystemClock(), "fits")
+    try:
+        yield progress
+    finally:
+        progress.end()
 
 
 def time_left(finished: int, left: int, elapsed: float) -> float | None:
@@ -62,5 +74,5 @@ def progress_text(done: int, total: int, left: float | None, what: str) -> str:
     if left is None or done >= total:
         return f"{bar} {done} of {total} {what}"
     minutes, seconds = divmod(round(left), 60)
-    words = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
-    return f"{bar} {done} of {total} {what}, {words} left"
+    duration = f"{minutes} min {seconds} s" if minutes else f"{seconds} s"
+    return f"{bar} {done} of {total} {what}, {duration} left"

@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.operator.progress import ProgressLine, progress_text, time_left
+from experiments.report.progress import ProgressLine, progress_text, time_left
 
 
 class Said:

@@ -1,0 +1,59 @@
+"""The kind of a terrain: small stones, big stones, a flat plate, or its own.
+
+The size of the stones is a fact of the recording (`stones` in matrix.toml, `stone_size`
+in a trial's metadata) or is given with a table; it never follows from a terrain's name.
+Only where nothing is said do the eight names of the paper stand for their stones. Any
+other terrain of unknown stones is a kind of its own, under its own name.
+"""
+
+from collections.abc import Iterable, Mapping
+
+SMALL, BIG, FLAT = "small", "big", "flat"
+STONE_SIZES: Mapping[str, str] = {"small": SMALL, "big": BIG, "none": FLAT}
+PAPER_KINDS: Mapping[str, str] = {
+    **dict.fromkeys(("S0", "S10", "S15"), SMALL),
+    **dict.fromkeys(("B0", "B10", "B15"), BIG),
+    **dict.fromkeys(("TF", "Tf"), FLAT),
+}
+LEVELS = ("terrain", "stones", "surface")
+_TITLES = {SMALL: "small stones", BIG: "big stones", FLAT: "flat plate"}
+
+
+def terrain_kind(terrain: str, stones: Iterable[str] = ()) -> str:
+    """Return "small", "big" or "flat"; the terrain's own name where it is unknown.
+
+    Args:
+        terrain: its name.
+        stones: sizes that its recordings state: "small", "big" or "none"; any other
+            text states nothing. Recordings that contradict each other make the
+            terrain a kind of its own.
+    """
+    stated = {STONE_SIZES[size] for size in stones if size in STONE_SIZES}
+    if not stated:
+        return PAPER_KINDS.get(terrain, terrain)
+    return stated.pop() if len(stated) == 1 else terrain
+
+
+def kind_title(kind: str) -> str:
+    """Return a kind in words, e.g. "small stones"; a terrain's own kind is its name."""
+    return _TITLES.get(kind, kind)
+
+
+def surface_of(kind: str) -> str:
+    """Return "flat" or "rocky"; a terrain's own kind stays what it is."""
+    if kind in (SMALL, BIG):
+        return "rocky"
+    return kind
+
+
+def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
+    """Return what every terrain counts as, by level: its name, its stones, its surface.
+
+    Args:
+        kinds: kind by name of the terrain.
+    """
+    return {
+        "terrain": {name: name for name in kinds},
+        "stones": dict(kinds),
+        "surface": {name: surface_of(kind) for name, kind in kinds.items()},
+    }
