@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.loop import LoopStats, Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import pack_timing
@@ -119,14 +119,14 @@ class LoopServer:
         heartbeats = self._shared.heartbeats
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
-            self._cycle.report(GuardVerdict(Action.HOLD, "console-silent"))
+            self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
             if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
                 self._around.ring()
         if (
             self._cycle.is_recording
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS
         ):
-            self._cycle.report(GuardVerdict(Action.HOLD, "recorder-silent"))
+            self._cycle.report(verdict_for(Fault.RECORDER_SILENT))
         if self.is_orphaned:
             self._brake_alone(now_ns)
 
@@ -134,7 +134,7 @@ class LoopServer:
         """Nobody will ever ask for anything again: hold, then brake, then end."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns
-            self._cycle.report(GuardVerdict(Action.HOLD, "console-lost"))
+            self._cycle.report(verdict_for(Fault.CONSOLE_LOST))
         elif now_ns - self._orphaned_ns > ORPHAN_NS:
             self._cycle.request(ArmState.IDLE)
             self.is_over = True

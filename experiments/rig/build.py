@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
@@ -204,9 +204,11 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
         ),
         LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
         build_limits(parts.rig, model.constants),
-        shared.cycles.write,
-        on_wrench,
-        extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
+        CycleOutputs(
+            shared.cycles.write,
+            on_wrench,
+            extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
+        ),
     )
     around = LoopHooks(parts.clock.now_ns, facts, parts.ring)
     return LoopServer(cycle, parts.arm, shared, around)
