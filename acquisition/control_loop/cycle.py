@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition import sample_flags as flags
+from acquisition.clock import NS_PER_MS
 from acquisition.control_loop.faults import (
     Action,
     CircuitCauses,
@@ -175,7 +176,7 @@ class Cycle:
         if self._wrench_ns == 0:
             self._wrench_ns = now_ns
         age = now_ns - self._wrench_ns
-        return self._wrench is not None and age <= self.limits.ft_stale_ns
+        return self._wrench is not None and age <= self.limits.ft_stale_ms * NS_PER_MS
 
     def _enter_requested(self, reading: ArmReading) -> None:
         """Obey a request: torques need all seven positions, the brakes need none."""

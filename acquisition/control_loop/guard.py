@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition.clock import PERIOD_NS
+from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
 from acquisition.control_loop.faults import (
     OK,
     CircuitCauses,
@@ -22,10 +22,6 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.devices import ArmReading, SafetyMode, Vector
 
-MS = 1_000_000
-S = 1_000_000_000
-
-
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 
 
@@ -33,33 +29,36 @@ _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 class GuardLimits:
     """Where the guard steps in.
 
+    What `[limits]` of rig.toml sets has the same name and unit there, and no default
+    here; the rest follows from the arm and from the protocol.
+
     Attributes:
         q_lower: lower joint limits [rad], seven.
         q_upper: upper joint limits [rad], seven.
-        qd: joint speed limits [rad/s], seven.
-        tau: joint torque limits [N m], seven.
+        speed: joint speed limits [rad/s], seven.
+        torque: joint torque limits [N m], seven.
         foot_speed: largest speed of the sole [m/s].
-        joint7: largest displacement of the locked joint 7 [rad].
-        ft_stale_ns: age at which a force sample is flagged [ns].
-        ft_stop_ns: age at which a trial is stopped [ns].
+        joint7_mrad: largest displacement of the locked joint 7 [mrad].
+        ft_stale_ms: age at which a force sample is flagged [ms].
+        ft_stop_ms: age at which a trial is stopped [ms].
+        late_per_second: late cycles in a second that end in hold.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
-        late_per_second: late cycles in a second that end in hold.
         armed_inside: a joint's position limit counts after it was this far inside
             [rad]: the home position lies on two stops.
     """
 
     q_lower: Sequence[float]
     q_upper: Sequence[float]
-    qd: Sequence[float]
-    tau: Sequence[float]
-    foot_speed: float = 0.8
-    joint7: float = 0.050
-    ft_stale_ns: int = 6 * MS
-    ft_stop_ns: int = 20 * MS
+    speed: Sequence[float]
+    torque: Sequence[float]
+    foot_speed: float
+    joint7_mrad: float
+    ft_stale_ms: float
+    ft_stop_ms: float
+    late_per_second: int
     hold_after_missing: int = 5
     idle_after_missing: int = 25
-    late_per_second: int = 10
     armed_inside: float = 0.1
 
 
@@ -144,8 +143,8 @@ def _remember(
         )
         armed |= int(np.packbits(inside, bitorder="little")[0])
     late = state.late
-    if seen.is_late or (late and late[0] < now - S):
-        kept = tuple(t for t in late if t >= now - S)
+    if seen.is_late or (late and late[0] < now - NS_PER_S):
+        kept = tuple(t for t in late if t >= now - NS_PER_S)
         late = (*kept, now) if seen.is_late else kept
     if armed == state.armed and late is state.late:
         return state
@@ -165,7 +164,7 @@ def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     if missing < limits.hold_after_missing:
         return OK
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
-    detail = ReplySilence(missing * PERIOD_NS / MS, silent)
+    detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
     is_lasting = missing >= limits.idle_after_missing
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
@@ -192,7 +191,7 @@ def _check_position(
 def _check_speed(
     limits: GuardLimits, seen: Observation, qd: list[float]
 ) -> GuardVerdict:
-    excess = _first_excess(qd, limits.qd)
+    excess = _first_excess(qd, limits.speed)
     if excess is not None:
         return verdict_for(Fault.OVERSPEED, excess)
     if seen.foot_speed > limits.foot_speed:
@@ -202,7 +201,7 @@ def _check_speed(
 
 
 def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
-    excess = _first_excess(tau, limits.tau)
+    excess = _first_excess(tau, limits.torque)
     return OK if excess is None else verdict_for(Fault.TORQUE_LIMIT, excess)
 
 
@@ -217,12 +216,12 @@ def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess |
 def _check_trial(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     if not seen.is_recording:
         return OK
-    if abs(seen.joint7_offset) > limits.joint7:
-        slip = Joint7Slip(abs(seen.joint7_offset) * 1e3, limits.joint7 * 1e3)
-        return verdict_for(Fault.JOINT7_SLIP, slip)
-    if seen.ft_age_ns > limits.ft_stop_ns:
-        age = ForceAge(seen.ft_age_ns / MS, limits.ft_stop_ns / MS)
-        return verdict_for(Fault.FT_STALE, age)
+    mrad = abs(seen.joint7_offset) * 1e3
+    if mrad > limits.joint7_mrad:
+        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, limits.joint7_mrad))
+    age_ms = seen.ft_age_ns / NS_PER_MS
+    if age_ms > limits.ft_stop_ms:
+        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, limits.ft_stop_ms))
     return OK
 
 

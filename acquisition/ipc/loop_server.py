@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from acquisition.clock import RATE_HZ
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.loop import LoopStats, Tick
@@ -23,8 +24,7 @@ MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
 LONELY_NS = 60_000 * MS  # of the console: the arm rings for help
 ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then brakes
-_FACTS_EVERY = 500  # cycles
-_BELL_EVERY = 500  # cycles
+_FACTS_EVERY = _BELL_EVERY = RATE_HZ  # cycles, once a second
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _CONSOLE, _CONTROL, _RECORDER = (

@@ -37,8 +37,6 @@ from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Body
 from wam.model.tool import Tool, sensor_body
 
-MS = 1_000_000
-
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:
     """Return the frame of a row of the matrix."""
@@ -69,17 +67,10 @@ def build_tool(rig: RigSettings, foot: str) -> Tool:
 
 def build_limits(rig: RigSettings, constants: ArmConstants) -> GuardLimits:
     """Return the guard's limits of rig.toml."""
-    limits = rig.limits
     return GuardLimits(
         q_lower=tuple(constants.q_lower.tolist()),
         q_upper=tuple(constants.q_upper.tolist()),
-        qd=limits.speed,
-        tau=limits.torque,
-        foot_speed=limits.foot_speed,
-        joint7=limits.joint7_mrad * 1e-3,
-        ft_stale_ns=round(limits.ft_stale_ms * MS),
-        ft_stop_ns=round(limits.ft_stop_ms * MS),
-        late_per_second=limits.late_per_second,
+        **rig.limits.of_guard(),
     )
 
 

@@ -30,9 +30,9 @@ def _behind_a_stop(scene: SimulatedScene) -> dict[str, object]:
 
 
 def _weak(scene: SimulatedScene) -> dict[str, object]:
-    tau = list(scene.cycle.limits.tau)
+    tau = list(scene.cycle.limits.torque)
     tau[_J2] = 0.5  # the arm's weight is more
-    return {"tau": tuple(tau)}
+    return {"torque": tuple(tau)}
 
 
 def _swing(scene: SimulatedScene) -> dict[str, object]:

@@ -19,8 +19,13 @@ START_NS = 1_000 * MS
 LIMITS = GuardLimits(
     q_lower=(-2.0,) * 7,
     q_upper=(2.0,) * 7,
-    qd=(1.5,) * 7,
-    tau=np.full(7, 30.0),
+    speed=(1.5,) * 7,
+    torque=np.full(7, 30.0),
+    foot_speed=0.8,
+    joint7_mrad=50.0,
+    ft_stale_ms=6.0,
+    ft_stop_ms=20.0,
+    late_per_second=10,
 )
 TORQUE = {
     ArmState.FLOAT: 1.0,

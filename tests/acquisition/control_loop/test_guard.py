@@ -23,8 +23,13 @@ ARMED = GuardState(armed=0x7F)
 LIMITS = GuardLimits(
     q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
     q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
-    qd=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
-    tau=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
+    speed=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
+    torque=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
+    foot_speed=0.8,
+    joint7_mrad=50.0,
+    ft_stale_ms=6.0,
+    ft_stop_ms=20.0,
+    late_per_second=10,
 )
 
 
@@ -141,7 +146,7 @@ def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(
     ("field", "limits", "fault"),
-    [("qd", LIMITS.qd, Fault.OVERSPEED), ("tau", LIMITS.tau, Fault.TORQUE_LIMIT)],
+    [("qd", LIMITS.speed, Fault.OVERSPEED), ("tau", LIMITS.torque, Fault.TORQUE_LIMIT)],
 )
 def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, fault):
     limit = float(limits[joint - 1])
