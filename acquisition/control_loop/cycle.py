@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import sample_flags as flags
 from acquisition.clock import NS_PER_MS
 from acquisition.control_loop.faults import (
     Action,
@@ -34,7 +33,14 @@ from acquisition.devices import (
     WrenchSensor,
 )
 from acquisition.errors import LinkError
-from acquisition.sample import Sample
+from acquisition.sample import (
+    Sample,
+    control_bits,
+    is_clipped,
+    reading_bits,
+    safety_bits,
+    wrench_bits,
+)
 
 _ZERO = np.zeros(7)
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
@@ -272,15 +278,14 @@ class Cycle:
         if wrench is not None:
             sample.ft_ns[0] = wrench.t_ns
             sample.ft_counter[0] = wrench.counter & 0xFFFFFFFF
-        bits = self._extra_flags | flags.of_safety(self._arm, self.status.safety)
-        bits |= flags.of_reading(reading, is_late=tick.is_late)
-        bits |= flags.of_wrench(wrench, is_new=is_new)
-        if self.status.state not in _UNPOWERED:
-            bits |= flags.JOINT7_LOCKED
-        if reading.is_complete and flags.is_clipped(sent, tau):
-            bits |= flags.TORQUE_CLIPPED
-        if sample.traction[2] > CONTACT_FORCE:
-            bits |= flags.CONTACT
+        bits = self._extra_flags | safety_bits(self._arm, self.status.safety)
+        bits |= reading_bits(reading, is_late=tick.is_late)
+        bits |= wrench_bits(wrench, is_new=is_new)
+        bits |= control_bits(
+            is_locked=self.status.state not in _UNPOWERED,
+            was_clipped=reading.is_complete and is_clipped(sent, tau),
+            has_contact=bool(sample.traction[2] > CONTACT_FORCE),
+        )
         sample.cycle[0] = tick.number
         sample.flags[0] = bits
         sample.host_ns[0] = reading.host_ns

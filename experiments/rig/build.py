@@ -20,8 +20,7 @@ from acquisition.sample import Flag
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
-from ft_sensor.observer import LiveFoot
-from ft_sensor.payload import TerrainFrame, payload_of
+from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor

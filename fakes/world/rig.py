@@ -11,8 +11,7 @@ from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground.container import Container
-from fakes.ground.terrain import make_terrain
+from fakes.ground.terrain import Container, make_terrain
 from fakes.plant.plant import ArmPlant, PlantOptions
 from fakes.plant.push import Pace
 from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
