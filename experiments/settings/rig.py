@@ -6,7 +6,7 @@ from pydantic import Field
 
 from acquisition.clock import RATE_HZ
 from acquisition.control_loop.guard import GuardLimits
-from experiments.settings.base import (
+from acquisition.settings import (
     File,
     Mass,
     Number,
@@ -15,7 +15,7 @@ from experiments.settings.base import (
     Vector3,
     Whole,
 )
-from experiments.settings.sensor import SensorSection
+from ft_sensor.vendors.registry import AnySensor
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _SevenPositive = tuple[
@@ -157,7 +157,7 @@ class RigSettings(SettingsSection):
 
     can: CanSettings
     arm: ArmSection = ArmSection()
-    ft_sensor: SensorSection
+    ft_sensor: Annotated[AnySensor, Field(discriminator="kind")]
     feet: Feet
     control: ControlSection
     limits: LimitSection
