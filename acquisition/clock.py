@@ -7,6 +7,9 @@ import time
 from typing import Protocol, runtime_checkable
 
 NS_PER_S = 1_000_000_000
+NS_PER_MS = 1_000_000
+PERIOD_NS = 2_000_000  # of the control loop, of the records and of the simulated world
+RATE_HZ = NS_PER_S // PERIOD_NS
 _POLL_NS = 100_000  # a link without a descriptor is looked at this often
 
 

@@ -60,12 +60,6 @@ class DeviceFaultError(TractionError):
     exit_code = 4
 
 
-class GuardStopError(TractionError):
-    """A limit was reached and the arm was stopped."""
-
-    exit_code = 4
-
-
 class SessionError(TractionError):
     """A session cannot be opened, continued or closed as asked."""
 

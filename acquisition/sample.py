@@ -6,6 +6,7 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.devices import Arm, ArmReading, SafetyMode, Vector, WrenchSample
 from acquisition.schema import CYCLE
 
 Record = NDArray[np.void]
@@ -18,7 +19,7 @@ class Flag(IntFlag):
     FT_FRESH = 1 << 4
     FT_SATURATED = 1 << 5
     TORQUE_CLIPPED = 1 << 6
-    LIMIT_WARNING = 1 << 7
+    # 1 << 7 is reserved: a warning of earlier versions that was never set
     SAFETY_WARNING = 1 << 8
     SAFETY_FAULT = 1 << 9
     DEADLINE_MISSED = 1 << 10
@@ -144,3 +145,62 @@ class Sample:
     def payload(self) -> memoryview:
         """Return the bytes of the record as they stand now, without a copy."""
         return self._bytes
+
+
+# Plain numbers: Python makes a new object of every `|` between members of a Flag.
+_TORQUE_CLIPPED = int(Flag.TORQUE_CLIPPED)
+_JOINT7_LOCKED = int(Flag.JOINT7_LOCKED)
+_CONTACT = int(Flag.CONTACT)
+_ARM_FRESH = int(Flag.ARM_FRESH)
+_FT_FRESH = int(Flag.FT_FRESH)
+_FT_SATURATED = int(Flag.FT_SATURATED)
+_SAFETY_WARNING = int(Flag.SAFETY_WARNING)
+_SAFETY_FAULT = int(Flag.SAFETY_FAULT)
+_DEADLINE_MISSED = int(Flag.DEADLINE_MISSED)
+_ROUNDING = 0.05  # what is sent may differ from what was wanted by this [N m]
+
+
+def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
+    """Return which motors answered, and whether the cycle began in time."""
+    flags = reading.fresh << MOTOR_FRESH_SHIFT
+    if reading.is_complete:
+        flags |= _ARM_FRESH
+    if is_late:
+        flags |= _DEADLINE_MISSED
+    return flags
+
+
+def safety_bits(arm: Arm, mode: SafetyMode) -> int:
+    """Return the `mode` of the safety circuit, and what it complains of."""
+    flags = int(mode)
+    if arm.safety_warnings():
+        flags |= _SAFETY_WARNING
+    if arm.safety_faults():
+        flags |= _SAFETY_FAULT
+    return flags
+
+
+def wrench_bits(wrench: WrenchSample | None, *, is_new: bool) -> int:
+    """Return how good the force sample in use is."""
+    flags = _FT_FRESH if is_new else 0
+    if wrench is not None and wrench.saturated:
+        flags |= _FT_SATURATED
+    return flags
+
+
+def control_bits(*, is_locked: bool, was_clipped: bool, has_contact: bool) -> int:
+    """Return what the control law did and whether the foot touches."""
+    flags = _JOINT7_LOCKED if is_locked else 0
+    if was_clipped:
+        flags |= _TORQUE_CLIPPED
+    if has_contact:
+        flags |= _CONTACT
+    return flags
+
+
+def is_clipped(sent: Vector, wanted: Vector) -> bool:
+    """Return whether torques [N m], shapes (7,), were cut on their way out."""
+    for a, b in zip(sent.tolist(), wanted.tolist(), strict=True):
+        if not -_ROUNDING <= a - b <= _ROUNDING:
+            return True
+    return False

@@ -18,9 +18,10 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import pinocchio as pin
 
+from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import Contact, Motion
 from fakes.ground.terrain import Terrain, make_terrain
-from fakes.plant.plant import CYCLE_NS, ArmPlant
+from fakes.plant.plant import ArmPlant
 from fakes.plant.push import HandView, Pace, Push, Vector3
 from fakes.randomness import TrialGenerators, trial_generators
 from fakes.truth import Truth
@@ -165,7 +166,7 @@ def _cycle(plant: ArmPlant, model: ArmModel) -> float:
     motor = np.linalg.solve(constants.j2mp.T, tau)
     plant.set_torques(np.rint(motor * np.array(constants.ipnm)).astype(int).tolist())
     begin = time.perf_counter_ns()
-    plant.advance(plant.t_ns + CYCLE_NS)
+    plant.advance(plant.t_ns + PERIOD_NS)
     return (time.perf_counter_ns() - begin) * 1e-3
 
 
@@ -201,7 +202,7 @@ def _pinocchio(notes: Notes) -> Callable[[int], None]:
 
 
 def _contact(notes: Notes) -> Callable[[int], None]:
-    ground, dt = _ground(), CYCLE_NS * 1e-9 / SUBSTEPS
+    ground, dt = _ground(), PERIOD_NS * 1e-9 / SUBSTEPS
 
     def run(cycle: int) -> None:
         for motion in notes.motions[SUBSTEPS * cycle : SUBSTEPS * (cycle + 1)]:
@@ -211,7 +212,7 @@ def _contact(notes: Notes) -> Callable[[int], None]:
 
 
 def _hand(notes: Notes) -> Callable[[int], None]:
-    push = Push(Pace(), _random().hand, notes.views[0], CYCLE_NS * 1e-9)
+    push = Push(Pace(), _random().hand, notes.views[0], PERIOD_NS * 1e-9)
 
     def run(cycle: int) -> None:
         push.step(notes.views[cycle])

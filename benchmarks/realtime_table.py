@@ -6,7 +6,8 @@ import statistics
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.control_loop.loop import LATE_NS, PERIOD_NS
+from acquisition.clock import PERIOD_NS
+from acquisition.control_loop.loop import LATE_NS
 from experiments.tools.bench import BenchReport, ProcessUse
 
 NEAR_NS = 4_000_000

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.clock import NS_PER_S, SystemClock
-from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.clock import NS_PER_S, PERIOD_NS, SystemClock
 from acquisition.devices import WrenchSample
 from acquisition.ipc.child import Child
 from acquisition.ipc.frame_tape import FrameTape

@@ -2,11 +2,16 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import resources
 from string import Formatter
 
-from acquisition.control_loop.guard import GuardVerdict
+from acquisition.control_loop.faults import (
+    CircuitCauses,
+    Fault,
+    GuardVerdict,
+    ReplySilence,
+)
 from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 
@@ -84,7 +89,8 @@ def catalogue_table(names: Sequence[str] = ()) -> list[str]:
     return rows
 
 
-_BY_CAUSE = {"pendant-idle": "safety-idle", "estop": "safety-stop"}
+# Names of the messages for a fault whose cause is known; else the fault's own.
+_BY_MONITOR = {Fault.PENDANT_IDLE: "safety-idle", Fault.E_STOP: "safety-stop"}
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows
 _PUCKS = 7
 
@@ -104,28 +110,33 @@ class FaultContext:
     is_bus_down: bool = False
 
 
-def fault_text(verdict: GuardVerdict, found: FaultContext, saved: str = "") -> str:
+def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
     """Return the message of a verdict.
 
     A verdict of the safety circuit is the pendant's unless a monitor is its cause;
     silence is the bus's, or that of the pucks that are silent.
     """
-    words = [f"{c} fault" for c in verdict.causes if c != _BUTTON]
-    name = _BY_CAUSE.get(verdict.reason, verdict.reason) if words else verdict.reason
-    facts = dict(verdict.facts)
-    silent = _nodes(int(facts.get("silent", 0)))
-    if name == "can-silence" and found.is_bus_down:
-        name = "bus-off"
-    elif name == "can-silence" and len(silent) < _PUCKS:
-        name = "puck-silent"
-    known: dict[str, object] = {
-        "trial": found.trial,
-        "seconds": found.seconds or 0.0,
-        "when": "" if found.seconds is None else f" at {found.seconds:.2f} s",
+    detail, causes = verdict.detail, ""
+    name, silent = verdict.reason, list[int]()
+    if isinstance(detail, CircuitCauses):
+        causes = ", ".join(
+            f"{cause} fault" for cause in detail.causes if cause != _BUTTON
+        )
+        if causes and verdict.fault is not None:
+            name = _BY_MONITOR[verdict.fault]
+    elif isinstance(detail, ReplySilence):
+        silent = _nodes(detail.silent)
+        if context.is_bus_down:
+            name = "bus-off"
+        elif len(silent) < _PUCKS:
+            name = "puck-silent"
+    values: dict[str, object] = {
+        "trial": context.trial,
+        "seconds": context.seconds or 0.0,
+        "when": "" if context.seconds is None else f" at {context.seconds:.2f} s",
         "pucks": _who(silent),
-        "causes": ", ".join(words),
     }
-    return CATALOGUE[name].text({**known, **facts}, saved)
+    return CATALOGUE[name].text({**values, **asdict(detail), "causes": causes}, saved)
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:

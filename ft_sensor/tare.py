@@ -7,16 +7,15 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.clock import NS_PER_S
+from acquisition.clock import NS_PER_S, RATE_HZ
 from acquisition.devices import WrenchSample
 from acquisition.errors import TractionError
 
 Wrench = tuple[float, float, float, float, float, float]
 
-SPREAD_LIMIT = 0.5  # [N]
 MIN_DURATION = 1.0  # [s]
 WINDOW = 0.2  # [s]
-SLOWEST = 500.0  # what the slowest sensor in use sends [Hz]
+SLOWEST = float(RATE_HZ)  # no sensor in use sends less [Hz]
 _FEWEST = 0.5  # share of its samples that a window must hold
 _AGAIN = "[space] to try again."
 
@@ -57,7 +56,7 @@ class TareResult:
 
 def tare(
     samples: Sequence[WrenchSample],
-    spread_limit: float = SPREAD_LIMIT,
+    spread_limit: float,
     rate: float = SLOWEST,
 ) -> TareResult:
     """Return the mean of at least one second of raw samples, oldest first.

@@ -1,25 +1,28 @@
 """One cycle: read, check, command, sample. It has no waiting of its own."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition import sample_flags as flags
-from acquisition.control_loop.guard import (
+from acquisition.clock import NS_PER_MS
+from acquisition.control_loop.faults import (
     Action,
-    GuardLimits,
-    GuardState,
+    CircuitCauses,
+    Fault,
     GuardVerdict,
-    Observation,
-    check,
+    verdict_for,
 )
+from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
+from acquisition.control_loop.law import ControlLaw, FootObserver
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import (
+    REQUESTS,
+    TRANSITIONS,
+    VERDICTS,
+    ArmEvent,
     ArmState,
-    ControlLaw,
     ControlStatus,
-    FootObserver,
 )
 from acquisition.devices import (
     Arm,
@@ -30,57 +33,78 @@ from acquisition.devices import (
     WrenchSensor,
 )
 from acquisition.errors import LinkError
-from acquisition.sample import Sample
+from acquisition.sample import (
+    Sample,
+    control_bits,
+    is_clipped,
+    reading_bits,
+    safety_bits,
+    wrench_bits,
+)
 
 _ZERO = np.zeros(7)
-_OF_CIRCUIT = frozenset({"estop", "pendant-idle"})  # verdicts that may have a cause
 CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
+_IDLE = ArmState.IDLE
 _UNKNOWN = ArmState.UNKNOWN
 _ACTIVE = SafetyMode.ACTIVE
 _E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
+_REQUEST_IDLE = ArmEvent.REQUEST_IDLE
+
+
+@dataclass(frozen=True, slots=True)
+class CycleOutputs:
+    """Where the results of a cycle go.
+
+    Attributes:
+        on_sample: takes the bytes of every sample; they change in the next cycle.
+        on_wrenches: takes the sensor's own samples as they arrive.
+        extra_flags: bits that every sample carries.
+    """
+
+    on_sample: Callable[[memoryview], None]
+    on_wrenches: Callable[[list[WrenchSample]], None]
+    extra_flags: int = 0
 
 
 class Cycle:
     """The work of one period, with the devices, the law and the guard given.
 
-    `sink` receives the bytes of every sample; `on_wrench` the sensor's own samples.
-
     Attributes:
+        law: torques from positions; may be replaced between two cycles.
+        limits: of the guard; may be replaced between two cycles.
         is_recording: a trial is being recorded; the guard's limits for it count.
         replies_ns: when the last joint reply of this cycle arrived [ns], 0 = none did.
         status: what the console sees.
     """
 
-    def __init__(  # noqa: PLR0913, PLR0917
+    def __init__(
         self,
         arm: Arm,
         sensor: WrenchSensor,
         law: ControlLaw,
         observer: FootObserver,
         limits: GuardLimits,
-        sink: Callable[[memoryview], None],
-        on_wrench: Callable[[list[WrenchSample]], None],
-        extra_flags: int = 0,
+        outputs: CycleOutputs,
     ) -> None:
         self._arm = arm
         self._sensor = sensor
-        self._law = law
+        self.law = law
         self._observer = observer
-        self._limits = limits
-        self._sink = sink
-        self._on_wrench = on_wrench
-        self._extra_flags = int(extra_flags)
+        self.limits = limits
+        self._on_sample = outputs.on_sample
+        self._on_wrenches = outputs.on_wrenches
+        self._extra_flags = int(outputs.extra_flags)
         self._guard = GuardState()
         self._sample = Sample()
         self._wrench: WrenchSample | None = None
         self._wrench_ns = 0
         self._speed = 0.0
-        self._requested: ArmState | None = None
+        self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
         self._reported: GuardVerdict | None = None
         self._was_active = False
@@ -94,7 +118,7 @@ class Cycle:
         A state asked for while the arm is still idle sends its torques at once: they
         are there when the pendant activates the arm, or it would fall for a moment.
         """
-        self._requested = state
+        self._requested = REQUESTS[state]
         self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
@@ -109,7 +133,7 @@ class Cycle:
         self._observer.set_bias(bias)
 
     def report(self, verdict: GuardVerdict) -> None:
-        """Let the next cycle obey what was found outside of it."""
+        """Let the next cycle obey a verdict of the processes around it."""
         self._reported = verdict
 
     def __call__(self, tick: Tick) -> None:
@@ -118,7 +142,8 @@ class Cycle:
         self.replies_ns = reading.arm_ns
         status = self.status
         status.safety = self._arm.safety_mode()
-        self._confirm_idle(reading)
+        if status.safety in _BRAKED:
+            self._handle(ArmEvent.CIRCUIT_BRAKED, reading)
         self._enter_requested(reading)
         self._begin_move(reading)
         tau, tau_gravity = self._torque(reading)
@@ -136,7 +161,7 @@ class Cycle:
             reading, self._wrench if is_new else None, sample
         )
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
-        self._sink(sample.payload())
+        self._on_sample(sample.payload())
 
     def _take_wrench(self, now_ns: int) -> bool:
         """Drain the sensor; return whether the used sample is fresh.
@@ -148,7 +173,7 @@ class Cycle:
         except LinkError:
             samples = []
         if samples:
-            self._on_wrench(samples)
+            self._on_wrenches(samples)
             for newest in reversed(samples):
                 if newest.is_valid:
                     self._wrench = newest
@@ -157,17 +182,15 @@ class Cycle:
         if self._wrench_ns == 0:
             self._wrench_ns = now_ns
         age = now_ns - self._wrench_ns
-        return self._wrench is not None and age <= self._limits.ft_stale_ns
+        return self._wrench is not None and age <= self.limits.ft_stale_ms * NS_PER_MS
 
     def _enter_requested(self, reading: ArmReading) -> None:
-        state = self._requested
-        if state is None or (reading.missing_cycles and state is not ArmState.IDLE):
+        """Obey a request: torques need all seven positions, the brakes need none."""
+        event = self._requested
+        if event is None or (reading.missing_cycles and event is not _REQUEST_IDLE):
             return
         self._requested = None
-        if state is ArmState.IDLE:
-            self._idle(reading)
-        else:
-            self._enter(state, reading)
+        self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
         move = self._move
@@ -175,33 +198,36 @@ class Cycle:
             return
         self._move = None
         try:
-            self._law.move_to(*move, reading)
+            self.law.move_to(*move, reading)
         except ValueError:
-            self.report(GuardVerdict(Action.HOLD, "move-refused"))
+            self.report(verdict_for(Fault.MOVE_REFUSED))
 
-    def _idle(self, reading: ArmReading) -> None:
-        """Brake the arm. Unless that is confirmed no zero torque follows: free fall."""
-        is_confirmed = self._arm.idle()
-        if is_confirmed:
-            self._sample.torque_command[:] = 0.0
-        self._enter(ArmState.IDLE if is_confirmed else ArmState.UNKNOWN, reading)
+    def _handle(self, event: ArmEvent, reading: ArmReading) -> None:
+        """Do what the table of states says of `event` in the present state.
 
-    def _confirm_idle(self, reading: ArmReading) -> None:
-        """Believe the safety circuit when it confirms later what it was asked for."""
-        is_unknown = self.status.state is _UNKNOWN
-        if is_unknown and self.status.safety in _BRAKED:
-            self._sample.torque_command[:] = 0.0
-            self._enter(ArmState.IDLE, reading)
+        Unless the brakes are confirmed no zero torque follows: the arm would fall.
+        """
+        transition = TRANSITIONS[self.status.state, event]
+        if transition.brakes:
+            is_confirmed = self._arm.idle()
+            followed_by = (
+                ArmEvent.IDLE_CONFIRMED if is_confirmed else ArmEvent.IDLE_UNCONFIRMED
+            )
+            self._handle(followed_by, reading)
+        elif transition.to is not None:
+            self._enter(transition.to, reading)
 
     def _enter(self, state: ArmState, reading: ArmReading) -> None:
+        if state is _IDLE:
+            self._sample.torque_command[:] = 0.0
         self.status.state = state
         self._was_active = self.status.safety is SafetyMode.ACTIVE
-        self._law.enter(state, reading)
+        self.law.enter(state, reading)
 
     def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         if self.status.state in _UNPOWERED:
             return _ZERO, _ZERO
-        return self._law.torque(reading)
+        return self.law.torque(reading)
 
     def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> GuardVerdict:
         status = self.status
@@ -214,32 +240,28 @@ class Cycle:
             reading=reading,
             safety=status.safety,
             foot_speed=self._speed,
-            joint7_offset=self._law.joint7_offset(reading),
+            joint7_offset=self.law.joint7_offset(reading),
             ft_age_ns=status.ft_age_ns,
             tau=tau,
             is_recording=self.is_recording,
             is_powered=is_commanded and has_power,
             is_late=tick.is_late,
         )
-        self._guard, verdict = check(self._limits, self._guard, seen)
+        self._guard, verdict = check(self.limits, self._guard, seen)
         reported, self._reported = self._reported, None
         if reported is not None and reported.severity > verdict.severity:
             return reported
         return verdict
 
     def _obey(self, verdict: GuardVerdict, reading: ArmReading) -> None:
-        """Enter the state the guard asks for; a fault is never made milder."""
-        state = self.status.state
-        if verdict.action is Action.IDLE:
-            self._idle(reading)
-            if verdict.reason in _OF_CIRCUIT:
-                verdict = replace(verdict, causes=self._arm.safety_faults())
-        elif verdict.action is Action.DAMP and state is not ArmState.DAMP:
-            self._enter(ArmState.DAMP, reading)
-        elif verdict.action is Action.HOLD and state is ArmState.FLOAT:
-            self._enter(ArmState.HOLD, reading)
-        told = self.status.verdict
-        if told is None or verdict.severity > told.severity:
+        """Enter the state the guard asks for and keep the worst verdict."""
+        self._handle(VERDICTS[verdict.action], reading)
+        if isinstance(verdict.detail, CircuitCauses):
+            # Known only now: idling the arm asks the module for its monitors.
+            causes = CircuitCauses(self._arm.safety_faults())
+            verdict = replace(verdict, detail=causes)
+        worst = self.status.verdict
+        if worst is None or verdict.severity > worst.severity:
             self.status.verdict = verdict
         self.is_recording = False
 
@@ -256,15 +278,14 @@ class Cycle:
         if wrench is not None:
             sample.ft_ns[0] = wrench.t_ns
             sample.ft_counter[0] = wrench.counter & 0xFFFFFFFF
-        bits = self._extra_flags | flags.of_safety(self._arm, self.status.safety)
-        bits |= flags.of_reading(reading, is_late=tick.is_late)
-        bits |= flags.of_wrench(wrench, is_new=is_new)
-        if self.status.state not in _UNPOWERED:
-            bits |= flags.JOINT7_LOCKED
-        if reading.is_complete and flags.is_clipped(sent, tau):
-            bits |= flags.TORQUE_CLIPPED
-        if sample.traction[2] > CONTACT_FORCE:
-            bits |= flags.CONTACT
+        bits = self._extra_flags | safety_bits(self._arm, self.status.safety)
+        bits |= reading_bits(reading, is_late=tick.is_late)
+        bits |= wrench_bits(wrench, is_new=is_new)
+        bits |= control_bits(
+            is_locked=self.status.state not in _UNPOWERED,
+            was_clipped=reading.is_complete and is_clipped(sent, tau),
+            has_contact=bool(sample.traction[2] > CONTACT_FORCE),
+        )
         sample.cycle[0] = tick.number
         sample.flags[0] = bits
         sample.host_ns[0] = reading.host_ns

@@ -2,52 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
+from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
+from acquisition.control_loop.faults import (
+    OK,
+    CircuitCauses,
+    Fault,
+    FootSpeedExcess,
+    ForceAge,
+    GuardVerdict,
+    Joint7Slip,
+    JointExcess,
+    LateCycles,
+    ReplySilence,
+    verdict_for,
+)
 from acquisition.devices import ArmReading, SafetyMode, Vector
 
-MS = 1_000_000
-S = 1_000_000_000
-
-
-class Action(Enum):
-    """What the arm has to do."""
-
-    NONE = "none"
-    HOLD = "hold"
-    DAMP = "damp"
-    IDLE = "idle"
-
-
-_SEVERITY = {Action.NONE: 0, Action.HOLD: 1, Action.DAMP: 2, Action.IDLE: 3}
-
-
-@dataclass(frozen=True, slots=True)
-class GuardVerdict:
-    """The guard's decision.
-
-    Attributes:
-        action: what the arm does from this cycle on.
-        reason: name of the failure as in the message catalogue; empty for none.
-        facts: numbers for the message.
-        causes: monitors that the safety circuit names as the cause; often empty.
-    """
-
-    action: Action
-    reason: str = ""
-    facts: tuple[tuple[str, float], ...] = ()
-    causes: tuple[str, ...] = ()
-
-    @property
-    def severity(self) -> int:
-        """How much is taken from the arm: 0 nothing, 1 hold, 2 damp, 3 idle."""
-        return _SEVERITY[self.action]
-
-
-OK = GuardVerdict(Action.NONE)
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 
 
@@ -55,33 +29,36 @@ _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 class GuardLimits:
     """Where the guard steps in.
 
+    What `[limits]` of rig.toml sets has the same name and unit there, and no default
+    here; the rest follows from the arm and from the protocol.
+
     Attributes:
         q_lower: lower joint limits [rad], seven.
         q_upper: upper joint limits [rad], seven.
-        qd: joint speed limits [rad/s], seven.
-        tau: joint torque limits [N m], seven.
+        speed: joint speed limits [rad/s], seven.
+        torque: joint torque limits [N m], seven.
         foot_speed: largest speed of the sole [m/s].
-        joint7: largest displacement of the locked joint 7 [rad].
-        ft_stale_ns: age at which a force sample is flagged [ns].
-        ft_stop_ns: age at which a trial is stopped [ns].
+        joint7_mrad: largest displacement of the locked joint 7 [mrad].
+        ft_stale_ms: age at which a force sample is flagged [ms].
+        ft_stop_ms: age at which a trial is stopped [ms].
+        late_per_second: late cycles in a second that end in hold.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
-        late_per_second: late cycles in a second that end in hold.
         armed_inside: a joint's position limit counts after it was this far inside
             [rad]: the home position lies on two stops.
     """
 
     q_lower: Sequence[float]
     q_upper: Sequence[float]
-    qd: Sequence[float]
-    tau: Sequence[float]
-    foot_speed: float = 0.8
-    joint7: float = 0.050
-    ft_stale_ns: int = 6 * MS
-    ft_stop_ns: int = 20 * MS
+    speed: Sequence[float]
+    torque: Sequence[float]
+    foot_speed: float
+    joint7_mrad: float
+    ft_stale_ms: float
+    ft_stop_ms: float
+    late_per_second: int
     hold_after_missing: int = 5
     idle_after_missing: int = 25
-    late_per_second: int = 10
     armed_inside: float = 0.1
 
 
@@ -166,8 +143,8 @@ def _remember(
         )
         armed |= int(np.packbits(inside, bitorder="little")[0])
     late = state.late
-    if seen.is_late or (late and late[0] < now - S):
-        kept = tuple(t for t in late if t >= now - S)
+    if seen.is_late or (late and late[0] < now - NS_PER_S):
+        kept = tuple(t for t in late if t >= now - NS_PER_S)
         late = (*kept, now) if seen.is_late else kept
     if armed == state.armed and late is state.late:
         return state
@@ -178,7 +155,8 @@ def _check_safety(seen: Observation) -> GuardVerdict:
     if seen.safety not in _BRAKED:
         return OK
     is_stopped = seen.safety is SafetyMode.E_STOP
-    return GuardVerdict(Action.IDLE, "estop" if is_stopped else "pendant-idle")
+    fault = Fault.E_STOP if is_stopped else Fault.PENDANT_IDLE
+    return verdict_for(fault, CircuitCauses())
 
 
 def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
@@ -186,16 +164,16 @@ def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     if missing < limits.hold_after_missing:
         return OK
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
-    facts = (("ms", missing * 2.0), ("silent", float(silent)))
-    is_long = missing >= limits.idle_after_missing
-    return GuardVerdict(Action.IDLE if is_long else Action.HOLD, "can-silence", facts)
+    detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
+    is_lasting = missing >= limits.idle_after_missing
+    return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
 
 def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
     """Refuse what is no number; infinities that cancel in `total` leave NaN."""
     total += seen.foot_speed + seen.joint7_offset
     if total - total != 0.0:  # NaN or infinite
-        return GuardVerdict(Action.IDLE, "not-a-number")
+        return verdict_for(Fault.NOT_A_NUMBER)
     return OK
 
 
@@ -206,56 +184,49 @@ def _check_position(
     for joint, (value, low, high) in enumerate(ranges):
         if not low <= value <= high and state.armed >> joint & 1:
             limit = low if value < low else high
-            facts = (("joint", joint + 1.0), ("value", value), ("limit", limit))
-            return GuardVerdict(Action.DAMP, "joint-limit", facts)
+            return verdict_for(Fault.JOINT_LIMIT, JointExcess(joint + 1, value, limit))
     return OK
 
 
 def _check_speed(
     limits: GuardLimits, seen: Observation, qd: list[float]
 ) -> GuardVerdict:
-    facts = _first_beyond(qd, limits.qd)
-    if facts:
-        return GuardVerdict(Action.DAMP, "overspeed", facts)
+    excess = _first_excess(qd, limits.speed)
+    if excess is not None:
+        return verdict_for(Fault.OVERSPEED, excess)
     if seen.foot_speed > limits.foot_speed:
-        facts = (("value", seen.foot_speed), ("limit", limits.foot_speed))
-        return GuardVerdict(Action.DAMP, "foot-speed", facts)
+        detail = FootSpeedExcess(seen.foot_speed, limits.foot_speed)
+        return verdict_for(Fault.FOOT_SPEED, detail)
     return OK
 
 
 def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
-    facts = _first_beyond(tau, limits.tau)
-    return GuardVerdict(Action.DAMP, "torque-limit", facts) if facts else OK
+    excess = _first_excess(tau, limits.torque)
+    return OK if excess is None else verdict_for(Fault.TORQUE_LIMIT, excess)
 
 
-def _first_beyond(
-    values: list[float], limits: Sequence[float]
-) -> tuple[tuple[str, float], ...]:
-    """Return the facts of the first joint beyond its limit; none if all are within."""
+def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
+    """Return the first joint beyond its limit; None if all are within."""
     for joint, (value, limit) in enumerate(zip(values, limits, strict=True)):
         if not -limit <= value <= limit:
-            return ("joint", joint + 1.0), ("value", abs(value)), ("limit", limit)
-    return ()
+            return JointExcess(joint + 1, abs(value), limit)
+    return None
 
 
 def _check_trial(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     if not seen.is_recording:
         return OK
-    if abs(seen.joint7_offset) > limits.joint7:
-        facts = (
-            ("mrad", abs(seen.joint7_offset) * 1e3),
-            ("limit", limits.joint7 * 1e3),
-        )
-        return GuardVerdict(Action.HOLD, "joint7-slip", facts)
-    if seen.ft_age_ns > limits.ft_stop_ns:
-        facts = (("ms", seen.ft_age_ns / MS), ("limit", limits.ft_stop_ns / MS))
-        return GuardVerdict(Action.HOLD, "ft-stale", facts)
+    mrad = abs(seen.joint7_offset) * 1e3
+    if mrad > limits.joint7_mrad:
+        return verdict_for(Fault.JOINT7_SLIP, Joint7Slip(mrad, limits.joint7_mrad))
+    age_ms = seen.ft_age_ns / NS_PER_MS
+    if age_ms > limits.ft_stop_ms:
+        return verdict_for(Fault.FT_STALE, ForceAge(age_ms, limits.ft_stop_ms))
     return OK
 
 
 def _check_cadence(limits: GuardLimits, state: GuardState, now: int) -> GuardVerdict:
     late = len(state.late)
     if late > limits.late_per_second and state.late[-1] == now:
-        facts = (("late", float(late)), ("limit", float(limits.late_per_second)))
-        return GuardVerdict(Action.HOLD, "loop-late", facts)
+        return verdict_for(Fault.LOOP_LATE, LateCycles(late, limits.late_per_second))
     return OK

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from acquisition.clock import Clock
+from acquisition.clock import PERIOD_NS, Clock
 
-PERIOD_NS = 2_000_000
 LATE_NS = 500_000  # a cycle that begins later than this missed its deadline
 
 

@@ -1,13 +1,11 @@
-"""What the arm can be doing, and what the loop asks of law and observer."""
+"""States of the arm as one table: which event leads where from each of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Protocol
+from enum import Enum, IntEnum
 
-from acquisition.control_loop.guard import GuardVerdict
-from acquisition.devices import ArmReading, SafetyMode, Vector, WrenchSample
-from acquisition.sample import Sample
+from acquisition.control_loop.faults import Action, GuardVerdict
+from acquisition.devices import SafetyMode
 
 
 class ArmState(IntEnum):
@@ -20,44 +18,92 @@ class ArmState(IntEnum):
     UNKNOWN = 4
 
 
-class ControlLaw(Protocol):
-    """Torques from positions."""
+class ArmEvent(Enum):
+    """What can change the state of the arm."""
 
-    def enter(self, state: ArmState, reading: ArmReading) -> None:
-        """Begin `state` without a jump in torque."""
-        ...
-
-    def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
-        """Return (joint torques, their gravity part) [N m], shapes (7,)."""
-        ...
-
-    def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
-        """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
-
-        No joint is faster than `speed` [rad/s].
-
-        Raises:
-            ValueError: the arm is not in hold, or `goal` cannot be reached so.
-        """
-        ...
-
-    def joint7_offset(self, reading: ArmReading) -> float:
-        """Return how far joint 7 is from where it was locked [rad]."""
-        ...
+    REQUEST_IDLE = "idle requested"
+    REQUEST_FLOAT = "float requested"
+    REQUEST_HOLD = "hold requested"
+    REQUEST_DAMP = "damp requested"
+    VERDICT_HOLD = "verdict: hold"
+    VERDICT_DAMP = "verdict: damp"
+    VERDICT_IDLE = "verdict: idle"
+    IDLE_CONFIRMED = "idle confirmed"
+    IDLE_UNCONFIRMED = "idle not confirmed"
+    CIRCUIT_BRAKED = "safety circuit is braked"
 
 
-class FootObserver(Protocol):
-    """Fills in what follows from joints and wrench: foot and traction."""
+REQUESTS: Mapping[ArmState, ArmEvent] = {
+    ArmState.IDLE: ArmEvent.REQUEST_IDLE,
+    ArmState.FLOAT: ArmEvent.REQUEST_FLOAT,
+    ArmState.HOLD: ArmEvent.REQUEST_HOLD,
+    ArmState.DAMP: ArmEvent.REQUEST_DAMP,
+}
+VERDICTS: Mapping[Action, ArmEvent] = {
+    Action.HOLD: ArmEvent.VERDICT_HOLD,
+    Action.DAMP: ArmEvent.VERDICT_DAMP,
+    Action.IDLE: ArmEvent.VERDICT_IDLE,
+}
 
-    def observe(
-        self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
-    ) -> float:
-        """Write foot pose, twist, wrench and traction; return the sole's speed."""
-        ...
 
-    def set_bias(self, bias: Sequence[float]) -> None:
-        """Take the sensor's reading without load [N, N m], six numbers."""
-        ...
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """What an event does in a state.
+
+    Attributes:
+        to: the state that is entered, possibly the same anew; None = nothing changes.
+        brakes: the safety circuit is put to idle first; `IDLE_CONFIRMED` or
+            `IDLE_UNCONFIRMED` follows in the same cycle.
+    """
+
+    to: ArmState | None = None
+    brakes: bool = False
+
+
+_STAY = Transition()
+_BRAKE = Transition(brakes=True)
+
+
+def _always(transition: Transition) -> Mapping[ArmState, Transition]:
+    return dict.fromkeys(ArmState, transition)
+
+
+def _only(to: ArmState, *states: ArmState) -> Mapping[ArmState, Transition]:
+    """Return the row of an event that leads to `to` from `states` and else nowhere."""
+    return {state: Transition(to) if state in states else _STAY for state in ArmState}
+
+
+_ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
+    ArmEvent.REQUEST_IDLE: _always(_BRAKE),
+    # A state may be entered anew: the law then starts from the pose of this cycle.
+    ArmEvent.REQUEST_FLOAT: _always(Transition(ArmState.FLOAT)),
+    ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
+    ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
+    # No verdict makes an earlier fault milder, and none gives a braked arm torques.
+    ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, ArmState.FLOAT),
+    ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, ArmState.FLOAT, ArmState.HOLD),
+    ArmEvent.VERDICT_IDLE: _always(_BRAKE),
+    ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
+    ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),
+    # A late confirmation. While the arm is powered the guard judges the circuit.
+    ArmEvent.CIRCUIT_BRAKED: _only(ArmState.IDLE, ArmState.UNKNOWN),
+}
+TRANSITIONS: Mapping[tuple[ArmState, ArmEvent], Transition] = {
+    (state, event): _ROWS[event][state] for state in ArmState for event in ArmEvent
+}
+
+
+def transition_lines() -> list[str]:
+    """Return the table for people: one line per pair, state by state."""
+    lines: list[str] = []
+    for (state, event), transition in TRANSITIONS.items():
+        result = "-"
+        if transition.brakes:
+            result = "brakes, then idle confirmed or idle not confirmed"
+        elif transition.to is not None:
+            result = f"-> {transition.to.name.lower()}"
+        lines.append(f"{state.name.lower():<8} {event.value:<25} {result}")
+    return lines
 
 
 @dataclass(slots=True)

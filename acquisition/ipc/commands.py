@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import GuardVerdict, from_plain, to_plain
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.ipc.rings import Ring, Slot
@@ -99,7 +99,7 @@ class LoopStatus:
 
 
 class StatusSlot:
-    """Writes and reads the loop's status; a verdict is put into words once."""
+    """Writes and reads the loop's status; each verdict is encoded once."""
 
     def __init__(self, slot: Slot) -> None:
         self._slot = slot
@@ -142,15 +142,8 @@ class StatusSlot:
 
 
 def _verdict_text(verdict: GuardVerdict | None) -> bytes:
-    if verdict is None:
-        return b""
-    fields = (verdict.action.value, verdict.reason, verdict.facts, verdict.causes)
-    return json.dumps(fields).encode()
+    return b"" if verdict is None else json.dumps(to_plain(verdict)).encode()
 
 
 def _verdict_of(text: bytes) -> GuardVerdict | None:
-    if not text:
-        return None
-    action, reason, facts, causes = json.loads(text)
-    pairs = tuple((name, value) for name, value in facts)
-    return GuardVerdict(Action(action), reason, pairs, tuple(causes))
+    return from_plain(json.loads(text)) if text else None

@@ -4,8 +4,8 @@ import json
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from acquisition.clock import NS_PER_S, Clock
-from acquisition.control_loop.loop import PERIOD_NS, Loop
+from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
+from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout

@@ -4,8 +4,9 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from acquisition.clock import RATE_HZ
 from acquisition.control_loop.cycle import Cycle
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import Fault, verdict_for
 from acquisition.control_loop.loop import LoopStats, Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.control_loop.timing import pack_timing
@@ -23,8 +24,7 @@ MS = 1_000_000
 SILENT_NS = 500 * MS  # of console or recorder: the arm holds
 LONELY_NS = 60_000 * MS  # of the console: the arm rings for help
 ORPHAN_NS = 1_000 * MS  # an arm whose console has died holds this long, then brakes
-_FACTS_EVERY = 500  # cycles
-_BELL_EVERY = 500  # cycles
+_FACTS_EVERY = _BELL_EVERY = RATE_HZ  # cycles, once a second
 
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _CONSOLE, _CONTROL, _RECORDER = (
@@ -119,14 +119,14 @@ class LoopServer:
         heartbeats = self._shared.heartbeats
         console_ns = now_ns - heartbeats.last_ns(_CONSOLE)
         if console_ns > SILENT_NS:
-            self._cycle.report(GuardVerdict(Action.HOLD, "console-silent"))
+            self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
             if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
                 self._around.ring()
         if (
             self._cycle.is_recording
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS
         ):
-            self._cycle.report(GuardVerdict(Action.HOLD, "recorder-silent"))
+            self._cycle.report(verdict_for(Fault.RECORDER_SILENT))
         if self.is_orphaned:
             self._brake_alone(now_ns)
 
@@ -134,7 +134,7 @@ class LoopServer:
         """Nobody will ever ask for anything again: hold, then brake, then end."""
         if not self._orphaned_ns:
             self._orphaned_ns = now_ns
-            self._cycle.report(GuardVerdict(Action.HOLD, "console-lost"))
+            self._cycle.report(verdict_for(Fault.CONSOLE_LOST))
         elif now_ns - self._orphaned_ns > ORPHAN_NS:
             self._cycle.request(ArmState.IDLE)
             self.is_over = True

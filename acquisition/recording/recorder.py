@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.clock import Clock
+from acquisition.clock import RATE_HZ, Clock
 from acquisition.errors import TrialFileError
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.sample import Record
@@ -21,7 +21,6 @@ from acquisition.trial_file.writer import (
 )
 
 FLUSH_NS = 250_000_000
-RATE_HZ = 500
 _BATCH_NS = 20_000_000  # of sensor samples or frames in one message
 PRE_ROLL = 1.0  # what is kept from before the trigger [s]
 

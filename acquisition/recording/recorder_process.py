@@ -10,7 +10,7 @@ from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
 from acquisition.ipc.child import Child, ChildContext, name_process
-from acquisition.ipc.layout import ProcessRole, SharedLayout
+from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import give_back_heap
 from acquisition.ipc.rpc import ChannelClosedError, Handler
 from acquisition.recording.recorder import Recorder
@@ -69,11 +69,6 @@ class RemoteRecorder:
     def is_recording(self) -> bool:
         """Whether a trial file is open."""
         return self._is_recording
-
-    @property
-    def is_beating(self) -> bool:
-        """Whether it has ever shown that it is alive."""
-        return self._shared.heartbeats.last_ns(ProcessRole.RECORDER) > 0
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples."""

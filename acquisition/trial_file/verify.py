@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.clock import PERIOD_NS
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.chunks import as_trial_file_error
 from acquisition.trial_file.reader import TopicRows, TrialReader
 from acquisition.trial_file.writer import WriterCounts
 
-PERIOD_NS = 2_000_000
 PERIOD_TOLERANCE = 0.02
 REQUIRED_METADATA = ("trial", "clock", "provenance", "channels", "result")
 

@@ -11,6 +11,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
+from acquisition.clock import RATE_HZ
 from acquisition.errors import TrialFileError
 from acquisition.ipc.frame_tape import encode_can_batch
 from acquisition.sample import CHANNELS, Flag, Record
@@ -57,7 +58,7 @@ class TrialHeader:
     provenance: Mapping[str, str]
     attachments: Mapping[str, bytes]
     robot_description: str
-    rate_hz: int = 500
+    rate_hz: int = RATE_HZ
     views_every: int = 10
     has_frames: bool = False
 

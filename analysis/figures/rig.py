@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from analysis.data.quality import JOINT7_WARNING
 from analysis.data.series import Array
 from analysis.figures.spec import FigureSpec, ReportSection
 from analysis.figures.style import (
@@ -15,8 +16,6 @@ from analysis.figures.style import (
 )
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
-
-_WARNING_MRAD = 20.0  # motion of joint 7 that the guard warns of
 
 
 def draw_timing(results: StudyResults) -> Figure | None:
@@ -74,7 +73,7 @@ def draw_rig(results: StudyResults) -> Figure | None:
     axes[0, 0].set_ylim(bottom=0.0)
     low, high = axes[1, 0].get_ylim()
     axes[1, 0].set_ylim(min(low, high - 10.0), high + 2.0)
-    axes[0, 1].axhline(_WARNING_MRAD, color="#D55E00", lw=0.9, ls="--")
+    axes[0, 1].axhline(JOINT7_WARNING * 1e3, color="#D55E00", lw=0.9, ls="--")
     axes[0, 1].set_ylim(bottom=0.0)
     axes[1, 1].axhline(0.0, color="#808080", lw=0.6)
     for ax in axes[1]:

@@ -13,6 +13,7 @@ from analysis.data.load import RecordedTrial
 from analysis.data.prepare import moving_average
 from analysis.data.series import Array
 from ft_sensor.reading import largest_traction
+from wam.model.constants import GRAVITY
 
 HEALTH_UNITS = {
     "period": "ms",
@@ -34,7 +35,6 @@ HEALTH_UNITS = {
 PERIOD_EDGES = np.append(np.arange(0.05, 8.0, 0.1), np.inf)  # ms, 2 in mid-bin
 SKEW_EDGES = np.arange(-4.1, 12.2, 0.2)  # ms
 
-GRAVITY = 9.81  # m/s^2, as the controller's virtual mass is weighed
 _MOVING = 0.005  # m/s
 _SMOOTHING = 11  # samples, as the models see the trial
 _REST = 0.3  # s at the start of a trial that are at rest by the procedure

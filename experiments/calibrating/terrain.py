@@ -8,7 +8,7 @@ from experiments.operator.prompts import Prompt
 from experiments.run.activation import activate
 from experiments.run.console_loop import ConsoleLoop
 from experiments.trial.header import TrialName
-from ft_sensor.calibration.terrain_fit import (
+from ft_sensor.calibration.fit import (
     CORNERS,
     ContainerFit,
     check_terrain,

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--explain",
         metavar="NAME|all|states",
-        help="more about a message; all of them; the table of all states",
+        help="more about a message; all of them; the tables of all states",
     )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
@@ -73,11 +73,15 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _explain(name: str, console: Console) -> int:
+    from acquisition.control_loop.states import transition_lines
     from acquisition.errors import SettingsError
     from experiments.messages import CATALOGUE, catalogue_table, explanation
     from experiments.session.states import table_lines
 
-    pages = {"states": table_lines, "all": catalogue_table}
+    pages = {
+        "states": lambda: [*table_lines(), *transition_lines()],
+        "all": catalogue_table,
+    }
     if name not in pages and name not in CATALOGUE:
         raise SettingsError(
             f"There is no message called {name!r}.",

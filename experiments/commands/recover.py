@@ -108,8 +108,10 @@ def lost_text(recovery: Recovery) -> str:
     """Return what was lost in words, for the operator."""
     if not recovery.bytes_dropped:
         return "Lost: nothing that was on the disk. The source is kept."
+    from acquisition.clock import RATE_HZ
+
     lost = f"Lost: {recovery.bytes_dropped} bytes at the end"
     if recovery.seconds_dropped > 0.0:
-        cycles = round(recovery.seconds_dropped * 500)
+        cycles = round(recovery.seconds_dropped * RATE_HZ)
         lost += f", {recovery.seconds_dropped:.2f} s or about {cycles} cycles"
     return f"{lost}. The source is kept."

@@ -74,7 +74,7 @@ def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:
         PreflightError: the arm is not where home was.
     """
     from experiments.operator.console import GOOD, WARNING
-    from wam.driver.home_check import check_home, home_error
+    from wam.driver.startup import check_home, home_error
 
     before = rig.settings.rig.arm.mech_at_home
     mech = [puck.mech for puck in info.pucks if puck.mech is not None]

@@ -13,7 +13,6 @@ from ft_sensor.serial_line.sensor import BURSTY
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
-OLD_MS = 6.0  # ms, a force sample that is older counts as stale
 NOISY = 0.5  # N, several times what a quiet sensor shows
 
 
@@ -52,12 +51,13 @@ def check_code(facts: dict[str, str]) -> CheckResult:
     return CheckResult(GOOD, "code", f"{facts['software']} {commit}")
 
 
-def check_wrenches(samples: Record, now_ns: int) -> CheckResult:
+def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult:
     """Grade rate, age and noise of force samples.
 
     Args:
         samples: newest records of the board's ring of wrenches, oldest first.
         now_ns: monotonic time [ns].
+        stale_ms: age at which a sample counts as stale [ms].
     """
     name = "F/T samples"
     times = samples["t_ns"].astype(np.int64) * 1e-9
@@ -72,7 +72,7 @@ def check_wrenches(samples: Record, now_ns: int) -> CheckResult:
     if saturated:
         axes = axis_names(int(np.bitwise_or.reduce(samples["saturated"])))
         text += f", {saturated} saturated ({', '.join(axes)})"
-    is_fine = age < OLD_MS and noise < NOISY and not saturated
+    is_fine = age < stale_ms and noise < NOISY and not saturated
     return CheckResult(GOOD if is_fine else WARNING, name, text)
 
 

@@ -109,7 +109,8 @@ def run_preflight(
     wrenches = rig.shared.wrenches.reader()
     rig.backend.begin()
     _check_loop(rig, seconds, add)
-    note(check_wrenches(wrenches.read(), rig.clock.now_ns()))
+    stale_ms = rig.settings.rig.limits.ft_stale_ms
+    note(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
     _check_stream(rig, note)
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
     return Preflight(tuple(checks), {**devices, **grants})

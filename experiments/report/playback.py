@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.clock import NS_PER_S, Clock
+from acquisition.clock import NS_PER_S, RATE_HZ, Clock
 from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
 from analysis.data.load import RecordedTrial, load_trial
 from experiments.operator.console import Console
@@ -14,7 +14,6 @@ from experiments.operator.screens import RecordingView, recording_lines
 _PICTURES = 8  # per second of the person's time
 _LINES = 1.0  # seconds of the trial between two lines without a terminal
 _HISTORY = 5.0  # s of traction in the sparklines
-_SECOND = 500  # cycles
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 
 
@@ -54,7 +53,7 @@ def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:
 
 def _view(trial: RecordedTrial, row: int) -> RecordingView:
     first = int(np.searchsorted(trial.t, float(trial.t[row]) - _HISTORY))
-    before = max(0, row - _SECOND)
+    before = max(0, row - RATE_HZ)
     span = float(trial.t[row] - trial.t[before])
     flags = int(trial.cycles["flags"][row])
     missed = int(trial.cycles["cycle"][row]) - int(trial.cycles["cycle"][0]) - row

@@ -5,8 +5,7 @@ from typing import Protocol
 
 from pydantic import TypeAdapter
 
-from acquisition.clock import Clock
-from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.realtime import Grant
 from acquisition.devices import SafetyMode
 from acquisition.ipc.loop_client import LoopClient

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.control_loop.cycle import Cycle
+from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import SettingsError
@@ -20,8 +20,7 @@ from acquisition.sample import Flag
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
-from ft_sensor.observer import LiveFoot
-from ft_sensor.payload import TerrainFrame, payload_of
+from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
@@ -36,8 +35,6 @@ from wam.driver.settings import ArmSettings
 from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Body
 from wam.model.tool import Tool, sensor_body
-
-MS = 1_000_000
 
 
 def terrain_frame(row: TerrainRow) -> TerrainFrame:
@@ -69,17 +66,10 @@ def build_tool(rig: RigSettings, foot: str) -> Tool:
 
 def build_limits(rig: RigSettings, constants: ArmConstants) -> GuardLimits:
     """Return the guard's limits of rig.toml."""
-    limits = rig.limits
     return GuardLimits(
         q_lower=tuple(constants.q_lower.tolist()),
         q_upper=tuple(constants.q_upper.tolist()),
-        qd=limits.speed,
-        tau=limits.torque,
-        foot_speed=limits.foot_speed,
-        joint7=limits.joint7_mrad * 1e-3,
-        ft_stale_ns=round(limits.ft_stale_ms * MS),
-        ft_stop_ns=round(limits.ft_stop_ms * MS),
-        late_per_second=limits.late_per_second,
+        **rig.limits.of_guard(),
     )
 
 
@@ -204,9 +194,11 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
         ),
         LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
         build_limits(parts.rig, model.constants),
-        shared.cycles.write,
-        on_wrench,
-        extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
+        CycleOutputs(
+            shared.cycles.write,
+            on_wrench,
+            extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
+        ),
     )
     around = LoopHooks(parts.clock.now_ns, facts, parts.ring)
     return LoopServer(cycle, parts.arm, shared, around)

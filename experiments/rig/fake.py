@@ -23,9 +23,9 @@ from experiments.rig.simulation import SimulationControl
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
-from experiments.settings.sensor import SensorSection
 from ft_sensor.serial_line.link import SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
+from ft_sensor.vendors.registry import AnySensor
 from wam.bus.link import CanLink
 from wam.model.arm_model import ArmModel
 from wam.model.tool import tool_facts, tool_of
@@ -80,15 +80,10 @@ class SimulatedRig:
         }
 
 
-def sensor_facts(section: SensorSection) -> dict[str, Any]:
+def sensor_facts(section: AnySensor) -> dict[str, Any]:
     """Return which simulated sensor fits the settings, in plain values."""
-    return {
-        "kind": section.kind,
-        "sinc": section.sinc,
-        "baudrate": section.baudrate,
-        "sensitivity": section.sensitivity,
-        "serial_number": section.serial_number,
-    }
+    options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number"}
+    return section.model_dump(include=options)
 
 
 def stepped(

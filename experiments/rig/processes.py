@@ -6,8 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from acquisition.clock import Clock
-from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.realtime import Grant, choose_cores
 from acquisition.devices import SafetyMode
 from acquisition.errors import TractionError

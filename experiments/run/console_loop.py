@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TypeVar
 
-from acquisition.control_loop.guard import GuardVerdict
+from acquisition.control_loop.faults import GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.ipc.loop_client import LoopClient
 from experiments.fault_injection.plan import FaultTrigger

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from acquisition.control_loop.guard import GuardVerdict
+from acquisition.control_loop.faults import GuardVerdict
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.messages import FaultContext, fault_text
@@ -15,9 +15,6 @@ from experiments.session.journal import Journal
 from experiments.session.states import Event
 from experiments.trial.files import TrialArchive
 from experiments.trial.header import SessionFacts, TrialName
-
-# Verdicts of the guard after which no trial can follow.
-_ENDING = frozenset({"estop", "pendant-idle", "can-silence", "not-a-number"})
 
 
 @dataclass(slots=True)
@@ -102,7 +99,7 @@ class RunContext:
             FaultedError: no trial can follow: the arm has gone.
         """
         verdict = self.console_loop.worst(fault.verdict)
-        if verdict.reason in _ENDING:
+        if verdict.ends_session:
             raise ArmFaultError(verdict) from fault
         self.tell_fault(verdict)
         self.console_loop.clear_faults()

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from acquisition.clock import RATE_HZ
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError, TrialFileError
 from acquisition.ipc.child import ProcessLostError
@@ -36,7 +37,7 @@ def recording_screen(
 
     def lines(width: int) -> list[str]:
         records = loop_client.last(HISTORY)
-        last_second = records[-500:]
+        last_second = records[-RATE_HZ:]
         span = (int(last_second["host_ns"][-1]) - int(last_second["host_ns"][0])) * 1e-9
         flags = int(records["flags"][-1])
         is_sensor_fine = bool(flags & Flag.FT_FRESH) and not flags & Flag.FT_SATURATED

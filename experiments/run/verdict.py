@@ -1,5 +1,6 @@
 """The verdict on a trial, which is always a person's and always deliberate."""
 
+from analysis.data.prepare import MINIMUM_TRAVEL_SHARE
 from experiments.messages import FaultContext
 from experiments.operator.double_tap import FootKeys
 from experiments.operator.prompts import REJECT_REASONS, Prompt
@@ -8,7 +9,7 @@ from experiments.run.context import RunContext
 from experiments.run.participants import ArmFaultError, StopRequestedError
 from experiments.run.ready import take_note
 from experiments.session.states import Event
-from experiments.trial.files import ENOUGH, TrialOutcome
+from experiments.trial.files import TrialOutcome
 from experiments.trial.header import TrialName
 
 _ENDED = "session ended at the review"
@@ -23,7 +24,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     """
     context.say(review_keys())
     context.place = FaultContext(name.kept)
-    is_whole = outcome.displacement >= ENOUGH * context.rig.frame.travel
+    is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
     feet = FootKeys(context.rig)
     while True:
         try:

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from experiments.settings.base import (
+from acquisition.settings import (
     File,
     Near,
     Number,

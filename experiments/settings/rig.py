@@ -1,10 +1,12 @@
 """What may stand in rig.toml."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from experiments.settings.base import (
+from acquisition.clock import RATE_HZ
+from acquisition.control_loop.guard import GuardLimits
+from acquisition.settings import (
     File,
     Mass,
     Number,
@@ -13,10 +15,10 @@ from experiments.settings.base import (
     Vector3,
     Whole,
 )
-from experiments.settings.sensor import SensorSection
+from ft_sensor.vendors.registry import AnySensor
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
-LimitsSection = tuple[
+_SevenPositive = tuple[
     Positive, Positive, Positive, Positive, Positive, Positive, Positive
 ]
 
@@ -81,18 +83,26 @@ class GravitySection(SettingsSection):
 
 
 class LimitSection(SettingsSection):
-    """Where the guard steps in."""
+    """Where the guard steps in, with the names and units of `GuardLimits`; and others.
 
-    speed: LimitsSection = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
-    torque: LimitsSection = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
+    `tare_spread`, `residual` and `free_disk_gb` are looked at between trials.
+    """
+
+    speed: _SevenPositive = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
+    torque: _SevenPositive = Field(examples=[[20, 45, 15, 15, 2.5, 2.5, 1.3]])
     foot_speed: Positive = Field(examples=[0.8])
     joint7_mrad: Positive = Field(examples=[50.0])
     ft_stale_ms: Positive = Field(examples=[6.0])
     ft_stop_ms: Positive = Field(examples=[20.0])
-    late_per_second: Whole = Field(ge=1, le=500, examples=[10])
+    late_per_second: Whole = Field(ge=1, le=RATE_HZ, examples=[10])
     tare_spread: Positive = Field(examples=[0.5])
     residual: Positive = Field(default=1.0, examples=[1.0])
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
+
+    def of_guard(self) -> dict[str, Any]:
+        """Return the values of those fields that the guard has."""
+        names = GuardLimits.__dataclass_fields__.keys() & type(self).model_fields.keys()
+        return {name: getattr(self, name) for name in names}
 
 
 class SafetySection(SettingsSection):
@@ -147,7 +157,7 @@ class RigSettings(SettingsSection):
 
     can: CanSettings
     arm: ArmSection = ArmSection()
-    ft_sensor: SensorSection
+    ft_sensor: Annotated[AnySensor, Field(discriminator="kind")]
     feet: Feet
     control: ControlSection
     limits: LimitSection

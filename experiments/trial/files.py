@@ -19,7 +19,6 @@ from experiments.trial.quality import Review
 COMPLETE = frozenset({"travel", "key", "time-limit"})
 CELLS = (4, 4)  # speeds, loads of a coverage
 MANY = 1_000_000_000  # samples, more than any trial has
-ENOUGH = 0.9  # share of the container a trial has to cross
 
 
 @dataclass(slots=True)

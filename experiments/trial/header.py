@@ -19,7 +19,7 @@ from experiments import provenance
 from experiments.rig.rig import Rig
 from experiments.session.store import SessionFolder, iso_utc
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
-from wam.model.urdf import urdf
+from wam.model.arm_model import urdf
 
 TIME_LIMIT = 30.0  # s
 AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]

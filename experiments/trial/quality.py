@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 from acquisition.sample import Flag
 from analysis.data.events import find_slips
 from analysis.data.load import load_trial
-from analysis.data.prepare import PrepareOptions, prepare
-from analysis.data.quality import coverage, quick_ratio
+from analysis.data.prepare import MINIMUM_KEPT, PrepareOptions, prepare
+from analysis.data.quality import JOINT7_WARNING, coverage, quick_ratio
 from experiments.operator.console import GOOD, WARNING
 
-JOINT7_WARNING = 0.020  # rad
-MIN_KEPT = 250
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd
 ODD = 3.0  # standard deviations
@@ -63,7 +61,7 @@ class Review:
         """
         timing = GOOD if self.worst_gap < 0.004 and not self.missed else WARNING
         joint7 = GOOD if self.joint7 < JOINT7_WARNING else WARNING
-        kept = GOOD if self.kept >= MIN_KEPT else WARNING
+        kept = GOOD if self.kept >= MINIMUM_KEPT else WARNING
         sensor = WARNING if self.saturated or self.stale > STALE_SHARE else GOOD
         fit, words = self._quick_fit(earlier)
         return [

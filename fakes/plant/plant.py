@@ -18,6 +18,7 @@ from math import floor
 import numpy as np
 import pinocchio as pin
 
+from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import NO_CONTACT
 from fakes.ground.terrain import Terrain
 from fakes.plant.gauges import Wrench, WristGauges
@@ -31,7 +32,6 @@ from wam.model.constants import GRAVITY, ArmConstants, Array
 from wam.model.tool import Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-CYCLE_NS = 2_000_000
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
@@ -76,13 +76,13 @@ class ArmPlant:
         self._constants = constants
         self._model, self._sole, self._hand = arm_and_hand(constants, tool, frame)
         self._data = self._model.createData()
-        self._wrist = WristGauges(tool, frame.axes()[:, 2], CYCLE_NS * 1e-9)
+        self._wrist = WristGauges(tool, frame.axes()[:, 2], PERIOD_NS * 1e-9)
         self._substeps = options.substeps
-        self._substep_ns = CYCLE_NS // options.substeps
+        self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
         self._resistance = JointResistance(constants, options.friction, self._dt)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
-        self._midway = np.array([1.0, 5e-10 * (CYCLE_NS - self._substep_ns), 0.0])
+        self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
         # counts of the encoders per joint angle, joint torque per puck unit
@@ -95,7 +95,7 @@ class ArmPlant:
         self._is_held = True
         self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
-        self.hand = Hand(CYCLE_NS * 1e-9)
+        self.hand = Hand(PERIOD_NS * 1e-9)
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
@@ -165,7 +165,7 @@ class ArmPlant:
 
         Its mean over the cycle that ended last; the steps after that can wait.
         """
-        self.advance(t_ns - t_ns % CYCLE_NS)
+        self.advance(t_ns - t_ns % PERIOD_NS)
         return self._wrist.load()
 
     # --- the world ----------------------------------------------------------------
@@ -196,7 +196,7 @@ class ArmPlant:
         return taken
 
     def _step(self) -> None:
-        if self.t_ns % CYCLE_NS == 0:
+        if self.t_ns % PERIOD_NS == 0:
             self._begin_cycle()
         self.t_ns += self._substep_ns
         sx, sy, sz, fx, fy, fz, _, _, _, wx, wy, wz = self._rates
@@ -213,7 +213,7 @@ class ArmPlant:
             ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
             self._integrate((*ground, *self._held, *turned))
-        if self.t_ns % CYCLE_NS == 0:
+        if self.t_ns % PERIOD_NS == 0:
             self._end_cycle()
 
     def _begin_cycle(self) -> None:

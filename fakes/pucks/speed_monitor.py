@@ -10,21 +10,20 @@ from math import hypot, pi, sin
 
 import numpy as np
 
-from wam.driver.transmission import coupled_ratios
+from wam.model.constants import load_constants
 
 ELBOW = 0.55  # from shoulder to elbow [m]
 FOREARM = 0.35  # from the elbow to the point on the forearm [m]
 HISTORY = 5  # differences; a jump of a position is seen in as many samples
 _MAIN_JOINTS = 4  # wrist motion is not counted
 _Row = tuple[float, float, float, float]
-_RATIOS = (42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93)
 
 
 class SpeedMonitor:
     """Speeds out of position reports of motors 1 to 4 with `cts` counts per turn."""
 
     def __init__(self, cts: Sequence[int]) -> None:
-        m2jp = np.linalg.inv(coupled_ratios(_RATIOS))[:_MAIN_JOINTS, :_MAIN_JOINTS]
+        m2jp = np.linalg.inv(load_constants().j2mp)[:_MAIN_JOINTS, :_MAIN_JOINTS]
         per_count = [2 * pi / (count or 1) for count in cts[:_MAIN_JOINTS]]
         self._joints: list[_Row] = [(*row,) for row in (m2jp * per_count).tolist()]
         self._seen: list[deque[tuple[int, int]]] = [

@@ -7,11 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.clock import Clock
+from acquisition.clock import PERIOD_NS, Clock
 from acquisition.devices import SafetyMode
 from fakes.bus.adapter import CanPort
 from fakes.bus.hub import Frame, SocketHub
-from fakes.plant.plant import CYCLE_NS, ArmPlant
+from fakes.plant.plant import ArmPlant
 from fakes.pucks.bank import MotorSide
 from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.pucks.network import PuckNetwork
@@ -21,13 +21,11 @@ from fakes.pucks.wire import WiredNetwork
 from fakes.randomness import trial_generator
 from fakes.sensor.errors import SensorErrors
 from fakes.serving.sensor_server import SensorLine, SensorServer
+from fakes.world_clock import TICK_NS, WorldClock
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import load_constants
 from wam.model.tool import Tool
 
-TICK_NS = 2_000_000
-# A stall of the machine must not look like a lost heartbeat or a fall of the arm.
-_LONGEST_STEP_NS = 10 * TICK_NS
 _SEED = 1  # of the sensor's errors
 
 Tap = Callable[[int, bytes], None]
@@ -112,15 +110,19 @@ class PuckServer:
     """
 
     def __init__(
-        self, network: PuckNetwork, motors: MotorSide, port: Port, clock: Clock
+        self,
+        network: PuckNetwork,
+        motors: MotorSide,
+        port: Port,
+        clock: Clock,
+        sensor: SensorServer | None = None,
     ) -> None:
         self.network = network
         self._wired = WiredNetwork(network, is_far=True)
         self._motors = motors
         self._port = port
-        self._clock = clock
-        self._seen_ns = self._world_ns = clock.now_ns()
-        self.sensor: SensorServer | None = None
+        self._clock = WorldClock(clock)
+        self.sensor = sensor
 
     @property
     def name(self) -> str:
@@ -148,7 +150,7 @@ class PuckServer:
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant now."""
-        self._go_on()
+        self._clock.go_on()
         self.network.pendant(action)
 
     def step(self, tap: Tap | None = None) -> None:
@@ -161,17 +163,17 @@ class PuckServer:
             LinkError: the bus broke.
         """
         self._clock.wait(self._port, self._deadline_ns())
-        self._go_on()
+        now_ns = self._clock.go_on()
         for can_id, data in self._port.receive():
             if tap is not None:
                 tap(can_id, data)
-            self._wired.send(self._world_ns, can_id, data)
-        for _, can_id, data in self._wired.advance(self._world_ns):
+            self._wired.send(now_ns, can_id, data)
+        for _, can_id, data in self._wired.advance(now_ns):
             self._port.send(can_id, data)
             if tap is not None:
                 tap(can_id, data)
         # Nobody may have looked at the arm for long; catching up would delay answers.
-        self._motors.advance(self._world_ns)
+        self._motors.advance(now_ns)
         if self.sensor is not None:
             self.sensor.step()
 
@@ -182,15 +184,9 @@ class PuckServer:
             self.sensor.close()
 
     def _deadline_ns(self) -> int:
-        event_ns = self._wired.next_event_ns()
-        left = TICK_NS if event_ns is None else event_ns - self._world_ns
-        return self._seen_ns + max(0, min(left, TICK_NS))
-
-    def _go_on(self) -> None:
-        """Let the world's time pass, which a stall stops."""
-        now_ns = self._clock.now_ns()
-        self._world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
-        self._seen_ns = now_ns
+        now_ns, event_ns = self._clock.now_ns(), self._wired.next_event_ns()
+        left = TICK_NS if event_ns is None else event_ns - now_ns
+        return now_ns + max(0, min(left, TICK_NS))
 
 
 def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
@@ -207,7 +203,7 @@ def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
 
 @dataclass(frozen=True, slots=True)
 class HomePose:
-    """An arm at its home position, and how it is found.
+    """An arm at its home position, and how it is pose.
 
     Attributes:
         tool: what it carries.
@@ -222,7 +218,7 @@ class HomePose:
     is_idle_first: bool
 
 
-def build_home_server(port: Port, found: HomePose, clock: Clock) -> PuckServer:
+def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
     """Return a server of an arm that stands at its home position, not zeroed.
 
     It has a force/torque sensor on its bus or on a serial line.
@@ -238,22 +234,22 @@ def build_home_server(port: Port, found: HomePose, clock: Clock) -> PuckServer:
         q_lower=np.minimum(constants.q_lower, home),
         q_upper=np.maximum(constants.q_upper, home),
     )
-    plant = ArmPlant(constants, found.tool, found.frame, home)
+    plant = ArmPlant(constants, pose.tool, pose.frame, home)
     now_ns = clock.now_ns()
-    plant.t_ns = now_ns // CYCLE_NS * CYCLE_NS
+    plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS
     motors = SupportedMotors(plant)
     rng = trial_generator(_SEED, "home", 0)
     errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
     options = NetworkOptions(
-        safety_mode=SafetyMode.IDLE if found.is_idle_first else SafetyMode.E_STOP,
+        safety_mode=SafetyMode.IDLE if pose.is_idle_first else SafetyMode.E_STOP,
         are_asleep=True,
-        has_sensor=found.line is None,
+        has_sensor=pose.line is None,
         is_zeroed=False,
         mt=constants.mt,
     )
     load = Load(plant.sensor_load, errors)
     network = PuckNetwork(motors, options, now_ns, load)
-    server = PuckServer(network, motors, port, clock)
-    if found.line is not None:
-        server.sensor = SensorServer(found.line, plant.sensor_load, clock)
-    return server
+    sensor = None
+    if pose.line is not None:
+        sensor = SensorServer(pose.line, plant.sensor_load, clock)
+    return PuckServer(network, motors, port, clock, sensor)

@@ -23,6 +23,7 @@ from fakes.sensor.kinds import SensorChoice
 from fakes.sensor.pty import SerialPty
 from fakes.truth import truth_records
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
+from fakes.world_clock import TICK_NS, WorldClock
 from ft_sensor.payload import TerrainFrame
 from wam.model.constants import load_constants
 from wam.model.tool import tool_of
@@ -30,28 +31,6 @@ from wam.model.tool import tool_of
 PRIORITY = 70
 TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
 LINGER_NS = 5_000_000_000  # an arm whose console has died is braked within this
-TICK_NS = 2_000_000
-# A stall of the machine stops the simulated world too: it is no lost heartbeat.
-_LONGEST_STEP_NS = 10 * TICK_NS
-
-
-class WorldClock(SystemClock):
-    """The machine's time without the stalls that this process has noticed."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.world_ns = self._seen_ns = super().now_ns()
-
-    def now_ns(self) -> int:
-        """Return the world's time [ns], as it was when `go_on` was called last."""
-        return self.world_ns
-
-    def go_on(self) -> int:
-        """Let the world's time pass and return it."""
-        now_ns = super().now_ns()
-        self.world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
-        self._seen_ns = now_ns
-        return self.world_ns
 
 
 class PtyCable:
@@ -106,8 +85,8 @@ class RigServer:
                     if self._step(self._channel.fileno()):
                         self._channel.answer(self._handlers)
             except ChannelClosedError:
-                end_ns = self._clock.world_ns + LINGER_NS
-            while self._hub.clients and self._clock.world_ns < end_ns:
+                end_ns = self._clock.now_ns() + LINGER_NS
+            while self._hub.clients and self._clock.now_ns() < end_ns:
                 self._step(None)
         finally:
             self._hub.close()
@@ -201,7 +180,7 @@ def main(station: ChildContext) -> None:
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     folder = Path(tempfile.mkdtemp(prefix=f"traction-{os.getpid()}-"))
     try:
-        settings, clock = station.settings, WorldClock()
+        settings, clock = station.settings, WorldClock(SystemClock())
         rig = FakeRig(
             scene_of(settings["scene"]),
             load_constants(),

@@ -12,12 +12,10 @@ from fakes.sensor.errors import SensorErrors
 from fakes.sensor.kinds import SensorChoice, make_stream
 from fakes.sensor.pty import SerialPty
 from fakes.sensor.stream import Source
+from fakes.world_clock import TICK_NS, WorldClock
 from wam.model.constants import GRAVITY
 from wam.model.tool import Tool
 
-TICK_NS = 2_000_000
-# A stall of the machine is none of the sensor's: it goes on where it stopped.
-_LONGEST_STEP_NS = 10 * TICK_NS
 _SEED = 2  # of the sensor's errors
 
 
@@ -38,13 +36,13 @@ class SensorServer:
         Raises:
             SettingsError: the path is in use or cannot be one.
         """
-        self._clock = clock
+        self._clock = WorldClock(clock)
         self._kind = line.choice.kind
-        self._seen_ns = self._world_ns = clock.now_ns()
+        now_ns = self._clock.now_ns()
         errors = SensorErrors(trial_generator(_SEED, "home", 0))
-        stream = make_stream(line.choice, source, errors, self._world_ns)
+        stream = make_stream(line.choice, source, errors, now_ns)
         try:
-            self._pty = SerialPty(stream, self._world_ns, line.path)
+            self._pty = SerialPty(stream, now_ns, line.path)
         except OSError as error:
             raise SettingsError(
                 f"--serial {line.path} cannot be served ({error.strerror}).",
@@ -76,10 +74,7 @@ class SensorServer:
 
     def step(self) -> None:
         """Carry bytes both ways up to now."""
-        now_ns = self._clock.now_ns()
-        self._world_ns += min(now_ns - self._seen_ns, _LONGEST_STEP_NS)
-        self._seen_ns = now_ns
-        self._pty.advance(self._world_ns)
+        self._pty.advance(self._clock.go_on())
 
     def close(self) -> None:
         """Pull the cable; the path is gone."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from acquisition.clock import PERIOD_NS
 from fakes.plant.plant import ArmPlant
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.event_queue import FRAME_NS
@@ -104,7 +105,6 @@ _BLOW = 20.0  # rad/s; the safety module does not count the wrist, so the guard 
 # The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
 # sudden twist would swing beyond that, so it grows.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
-_STEP_NS = 2_000_000
 _FINGER = (0.0, 0.0, 3.2)  # below the sole while it hangs free, terrain frame [N]
 
 Later = Callable[[int, Callable[[], None]], None]  # (delay [ns], action)
@@ -148,7 +148,7 @@ class BodyFaults:
             return
         torque = self._plant.disturbance[_JOINT_7] + _TWIST_STEP
         self._plant.disturbance[_JOINT_7] = min(torque, _TWIST)
-        self._later(_STEP_NS, self._twist)
+        self._later(PERIOD_NS, self._twist)
 
 
 CLOCK_JUMP_US = 10_000_000

@@ -6,14 +6,13 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.clock import Clock
+from acquisition.clock import PERIOD_NS, Clock
 from acquisition.errors import SettingsError
 from acquisition.sample import Record
 from fakes.bus.in_process import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground.container import Container
-from fakes.ground.terrain import make_terrain
-from fakes.plant.plant import CYCLE_NS, ArmPlant, PlantOptions
+from fakes.ground.terrain import Container, make_terrain
+from fakes.plant.plant import ArmPlant, PlantOptions
 from fakes.plant.push import Pace
 from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from fakes.pucks.network import PuckNetwork
@@ -132,7 +131,7 @@ class FakeRig:
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
-        self.plant.t_ns = clock.now_ns() // CYCLE_NS * CYCLE_NS
+        self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
         found = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:
             found = replace(found, has_sensor=True)

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from acquisition.clock import NS_PER_S, Clock
+from acquisition.clock import NS_PER_S, RATE_HZ, Clock
 from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
 from ft_sensor.reading import Reading, StreamTiming
 from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.serial_line.link import SerialLink
 
-MIN_RATE = 495.0  # [Hz]; 500 Hz less what two clocks may disagree
+MIN_RATE = 0.99 * RATE_HZ  # [Hz]; less by what two clocks may disagree
 FIRST_READINGS = 10
 _FIRST_NS = NS_PER_S
 _HEARD_SIZE = 2048  # answers are looked for in this much of what came last

@@ -1,10 +1,16 @@
 """Barrett's wrist sensor: node 8 of the arm's bus, asked along with the positions."""
 
 from dataclasses import asdict, dataclass
+from typing import Literal
+
+from pydantic import Field
 
 from acquisition.clock import Clock
 from acquisition.devices import WrenchSample
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
+from acquisition.settings import Whole
+from ft_sensor.section import SensorSection
+from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.vendors.barrett_frames import (
     RANGES,
     BarrettCounters,
@@ -181,3 +187,19 @@ def _role_text(role: int | None) -> str:
     return f"ROLE {role:#06x}" + (
         "" if is_usual else f", usually {PuckRole.FORCE:#06x}"
     )
+
+
+class BarrettSection(SensorSection):
+    """[ft_sensor] of a sensor on the arm's bus: it has no line and no options."""
+
+    kind: Literal["barrett"] = Field(examples=["barrett"])
+    port: str = Field(default="none", examples=["none"])
+    baudrate: Whole = Field(default=1_000_000, gt=0, examples=[1_000_000])
+
+    @property
+    def is_on_bus(self) -> bool:
+        """Whether it is asked over the arm's bus and has no port."""
+        return True
+
+    def build(self, line: PortSettings) -> None:
+        """Return None: the arm's driver asks it."""

@@ -1,10 +1,15 @@
 """A Bota sensor of generation 1: from any mode to a stream to be trusted."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from acquisition.settings import Positive, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.startup import FIRST_READINGS, SerialDialog
@@ -198,3 +203,24 @@ def _is_plausible(readings: list[Reading]) -> bool:
         for reading in readings[:FIRST_READINGS]
     ]
     return sum(good) >= _PLAUSIBLE_OF_TEN
+
+
+class BotaSection(SensorSection):
+    """[ft_sensor] of a Bota sensor.
+
+    Attributes:
+        sinc: filter length, see `BotaSettings`.
+        ranges: of this very sensor [N, N m]; left out: as commonly given.
+    """
+
+    kind: Literal["bota"] = Field(examples=["bota"])
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
+    sinc: Whole = Field(default=64, ge=51, le=512, examples=[64])
+    ranges: tuple[Positive, Positive, Positive, Positive, Positive, Positive] | None = (
+        Field(default=None, examples=[[*RANGES]])
+    )
+
+    def build(self, line: PortSettings) -> BotaDevice:
+        """Return the sensor at the end of `line`."""
+        settings = BotaSettings(self.sinc, ranges=self.ranges or RANGES)
+        return BotaDevice(line, settings)

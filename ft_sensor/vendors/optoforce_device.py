@@ -1,10 +1,15 @@
 """An OptoForce / OnRobot HEX sensor: matched to its report, set up, started."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from acquisition.settings import Six, Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.startup import SerialDialog
@@ -167,3 +172,35 @@ class OptoForceDevice:
                 f"The F/T sensor reports: {words}.",
                 hint="Check the cable between sensor and DAQ; cycle its power.",
             )
+
+
+class OptoForceSection(SensorSection):
+    """[ft_sensor] of a HEX sensor; its options are those of `OptoForceSettings`."""
+
+    kind: Literal["optoforce"] = Field(examples=["optoforce"])
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
+    filter_hz: Whole = Field(default=150, ge=0, examples=[150])
+    sensitivity: Six | None = Field(
+        default=None, examples=[[18.28, 18.41, 2.12, 278.72, 259.55, 448.47]]
+    )
+    serial_number: str | None = Field(
+        default=None, min_length=1, max_length=8, examples=["HEX00042"]
+    )
+
+    def build(self, line: PortSettings) -> OptoForceDevice:
+        """Return the sensor at the end of `line`.
+
+        Raises:
+            SettingsError: what its report says is missing.
+        """
+        if self.sensitivity is None or self.serial_number is None:
+            raise SettingsError(
+                "an optoforce needs sensitivity and serial_number, e.g. sensitivity = "
+                "[18.28, 18.41, 2.12, 278.72, 259.55, 448.47], serial_number = "
+                '"HEX00042".',
+                hint="Both stand in the report that came with the unit.",
+            )
+        settings = OptoForceSettings(
+            self.sensitivity, self.serial_number, self.filter_hz
+        )
+        return OptoForceDevice(line, settings)

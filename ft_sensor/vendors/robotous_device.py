@@ -1,10 +1,15 @@
 """A Robotous RFT sensor: identified, set up, read back, started."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field
 
 from acquisition.clock import NS_PER_S
 from acquisition.errors import DeviceFaultError, LinkTimeoutError, SettingsError
+from acquisition.settings import Whole
 from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.section import SensorSection
 from ft_sensor.serial_line.framing import FrameScanner, wire_time_ns
 from ft_sensor.serial_line.link import PortSettings
 from ft_sensor.serial_line.startup import SerialDialog
@@ -240,3 +245,16 @@ def _not_taken(
         f"The F/T sensor reads back {what} code {got}, told was {wished}.",
         hint="Cycle its power and try again; check its firmware.",
     )
+
+
+class RobotousSection(SensorSection):
+    """[ft_sensor] of a Robotous sensor; its options are those of `RobotousSettings`."""
+
+    kind: Literal["robotous"] = Field(examples=["robotous"])
+    baudrate: Whole = Field(default=BAUDRATE, gt=0, examples=[BAUDRATE])
+    rate: Whole = Field(default=1000, gt=0, examples=[1000])
+    filter_hz: Whole = Field(default=150, ge=0, examples=[150])
+
+    def build(self, line: PortSettings) -> RobotousDevice:
+        """Return the sensor at the end of `line`."""
+        return RobotousDevice(line, RobotousSettings(self.rate, self.filter_hz))

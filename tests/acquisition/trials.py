@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from acquisition.clock import PERIOD_NS
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
 
 START_NS = 5_000_000_000
 OFFSET_NS = 1_700_000_000_123_456_789
-PERIOD_NS = 2_000_000
 ATTACHMENTS = {
     "config.toml": b"[rig]\narm = 'wam7'\n",
     "arm_model.toml": bytes(range(256)) * 20,

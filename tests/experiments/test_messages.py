@@ -1,8 +1,22 @@
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
 
-from experiments.messages import CATALOGUE, Message, catalogue_table
+from acquisition.control_loop.faults import (
+    FAULTS,
+    Action,
+    CircuitCauses,
+    Fault,
+    verdict_for,
+)
+from experiments.messages import (
+    CATALOGUE,
+    FaultContext,
+    Message,
+    catalogue_table,
+    fault_text,
+)
 from tests.experiments.program import traction
 
 README = Path(__file__).parents[2] / "README.md"
@@ -48,3 +62,26 @@ def test_what_is_filled_in_is_left_open_in_a_table():
     assert message.text({"n": 2.4, "m": 3, "k": 4, "s": 5}, "All safe.") == (
         "2 of 3 at T04. Wait 5 s. All safe."
     )
+
+
+ARM_TEXTS = {
+    Action.HOLD: ("holding",),
+    Action.DAMP: ("damping, then holding",),
+    Action.IDLE: ("idle", "stopped by its hardware", "UNKNOWN"),
+}
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_the_message_of_a_fault_says_what_the_guard_makes_the_arm_do(fault):
+    message, spec = CATALOGUE[fault.value], FAULTS[fault]
+    assert message.exit_code == 4
+    assert message.arm.startswith(ARM_TEXTS[spec.actions[-1]])
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_the_numbers_of_a_fault_fill_its_message(fault):
+    detail = FAULTS[fault].detail
+    numbers = () if detail is CircuitCauses else (7 for _ in fields(detail))
+    text = fault_text(verdict_for(fault, detail(*numbers)), FaultContext("T03", 1.5))
+    assert "{" not in text
+    assert CATALOGUE[fault.value].arm in text or fault is Fault.CAN_SILENCE

@@ -47,7 +47,7 @@ class SimulatedScene:
     def clear_faults(self) -> None:
         """Give the guard its limits back."""
         if self.usual_limits is not None:
-            self.cycle._limits, self.usual_limits = self.usual_limits, None
+            self.cycle.limits, self.usual_limits = self.usual_limits, None
 
     @property
     def arm(self) -> str:

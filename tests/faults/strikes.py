@@ -17,22 +17,22 @@ def _tighten(change: Callable[[SimulatedScene], dict[str, object]]) -> Strike:
 
     def inject(scene: SimulatedScene) -> None:
         cycle = scene.cycle
-        scene.usual_limits = cycle._limits
-        cycle._limits = replace(cycle._limits, **change(scene))
+        scene.usual_limits = cycle.limits
+        cycle.limits = replace(cycle.limits, **change(scene))
 
     return inject
 
 
 def _behind_a_stop(scene: SimulatedScene) -> dict[str, object]:
-    upper = list(scene.cycle._limits.q_upper)
+    upper = list(scene.cycle.limits.q_upper)
     upper[_J6] = float(scene.rig.plant.q[_J6]) - 0.01
     return {"q_upper": tuple(upper)}
 
 
 def _weak(scene: SimulatedScene) -> dict[str, object]:
-    tau = list(scene.cycle._limits.tau)
+    tau = list(scene.cycle.limits.torque)
     tau[_J2] = 0.5  # the arm's weight is more
-    return {"tau": tuple(tau)}
+    return {"torque": tuple(tau)}
 
 
 def _swing(scene: SimulatedScene) -> dict[str, object]:
@@ -43,7 +43,7 @@ def _swing(scene: SimulatedScene) -> dict[str, object]:
 def _nonsense(scene: SimulatedScene) -> None:
     """Let the control law come to no number."""
     nan = np.full(7, np.nan)
-    scene.patch.setattr(scene.cycle._law, "torque", lambda _: (nan, nan))
+    scene.patch.setattr(scene.cycle.law, "torque", lambda _: (nan, nan))
 
 
 def _stall(duration_ms: int) -> Strike:

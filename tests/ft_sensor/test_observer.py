@@ -5,8 +5,7 @@ import pytest
 
 from acquisition.devices import ArmReading, WrenchSample
 from acquisition.sample import Sample
-from ft_sensor.observer import LiveFoot
-from ft_sensor.payload import TerrainFrame, payload_of, traction
+from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of, traction
 
 Q = np.array([0.2, 0.9, -0.1, 1.6, 0.1, np.pi - 2.5, 0.3])
 QD = np.array([0.1, -0.2, 0.3, 0.1, -0.4, 0.2, 0.5])

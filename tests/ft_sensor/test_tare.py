@@ -9,6 +9,10 @@ from ft_sensor.tare import TareError, tare
 PERIOD_NS = 1_250_000
 
 
+def measure(samples, spread_limit=0.5):
+    return tare(samples, spread_limit)
+
+
 def samples(forces, **changes):
     """800 Hz samples with `forces` in z, 2 N in x and 0.5 N m about x."""
     values = {"status": 0, "is_valid": True, "saturated": 0} | changes
@@ -29,7 +33,7 @@ def noise(count, deviation=0.3):
 
 def test_tare_is_the_mean_of_the_samples():
     values = noise(1600)
-    result = tare(samples(values))
+    result = measure(samples(values))
     assert result.wrench == pytest.approx((2, 0, values.mean(), 0.5, 0, 0))
     assert result.deviation[2] == pytest.approx(values.std())
     assert result.samples == 1600
@@ -38,18 +42,18 @@ def test_tare_is_the_mean_of_the_samples():
 
 def test_white_noise_hardly_spreads_the_window_means():
     # 160 samples a window: 0.3 N / sqrt(160) = 0.024 N each, ten of them.
-    assert 0 < tare(samples(noise(1600))).spread < 0.12
+    assert 0 < measure(samples(noise(1600))).spread < 0.12
 
 
 def test_spread_is_between_the_extreme_window_means():
     steps = np.repeat([0.0, 0.1, -0.2, 0.05, 0.0], 160)
-    assert tare(samples(steps)).spread == pytest.approx(0.3)
+    assert measure(samples(steps)).spread == pytest.approx(0.3)
 
 
 def test_touching_is_refused_in_numbers():
     touch = np.repeat([0.0, 0.0, 3.2, 0.0, 0.0], 160)
     with pytest.raises(TareError) as refused:
-        tare(samples(touch))
+        measure(samples(touch))
     assert str(refused.value) == (
         "Force varied 3.2 N during tare (0.2 s means, limit 0.5). "
         "Is the foot touching? [space] to try again."
@@ -58,37 +62,37 @@ def test_touching_is_refused_in_numbers():
 
 def test_limit_can_be_set():
     steps = np.repeat([0.0, 0.0, 0.9, 0.0, 0.0], 160)
-    assert tare(samples(steps), spread_limit=1.0).spread == pytest.approx(0.9)
+    assert measure(samples(steps), spread_limit=1.0).spread == pytest.approx(0.9)
     with pytest.raises(TareError, match=r"limit 0\.8"):
-        tare(samples(steps), spread_limit=0.8)
+        measure(samples(steps), spread_limit=0.8)
 
 
 def test_one_second_is_enough():
-    assert tare(samples(noise(800))).samples == 800
+    assert measure(samples(noise(800))).samples == 800
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 780])
 def test_less_than_a_second_is_refused(count):
     with pytest.raises(TareError, match="too few"):
-        tare(samples(noise(count)))
+        measure(samples(noise(count)))
 
 
 def test_one_second_of_jittering_arrivals_is_enough():
     jittered = samples(noise(800))
     jittered[0] = replace(jittered[0], t_ns=jittered[0].t_ns + 500_000)
-    assert tare(jittered).samples == 800
+    assert measure(jittered).samples == 800
 
 
 def test_a_touch_at_the_very_end_is_refused():
     # 80 of the 240 samples of the last window: a mean of 1 N.
     with pytest.raises(TareError, match=r"varied 1\.0 N"):
-        tare(samples([*[0.0] * 800, *[3.0] * 80]))
+        measure(samples([*[0.0] * 800, *[3.0] * 80]))
 
 
 def test_a_gap_is_refused():
     gapped = samples(noise(1600))
     with pytest.raises(TareError, match=r"Only \d+ F/T samples in one"):
-        tare(gapped[:500] + gapped[780:])
+        measure(gapped[:500] + gapped[780:])
 
 
 @pytest.mark.parametrize("flag", [{"is_valid": False}, {"saturated": 4}, {"status": 1}])
@@ -96,9 +100,9 @@ def test_a_flagged_sample_is_refused(flag):
     good = samples(noise(1600))
     bad = samples(noise(1600), **flag)[700:701]
     with pytest.raises(TareError, match="1 of 1600"):
-        tare(good[:700] + bad + good[701:])
+        measure(good[:700] + bad + good[701:])
 
 
 def test_a_non_finite_sample_is_refused():
     with pytest.raises(TareError, match="non-finite"):
-        tare(samples([*noise(1599), float("nan")]))
+        measure(samples([*noise(1599), float("nan")]))

@@ -3,13 +3,14 @@
 from dataclasses import dataclass, field
 
 from wam.driver.safety_module import SafetyLimits
-from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix, coupled_ratios
+from wam.driver.transmission import HOST_TORQUE_LIMITS, Matrix
+from wam.model.constants import load_constants
 
 _MS = 1_000_000
 
 
-def _wam_j2mp() -> Matrix:
-    return coupled_ratios((42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93))
+def _shipped_j2mp() -> Matrix:
+    return load_constants().j2mp
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,7 +32,7 @@ class ArmSettings:
         idle_ns: longest wait for the safety module to confirm IDLE [ns].
     """
 
-    j2mp: Matrix = field(default_factory=_wam_j2mp)
+    j2mp: Matrix = field(default_factory=_shipped_j2mp)
     torque_limits: tuple[int, ...] = HOST_TORQUE_LIMITS
     velocity_pole: float = 180.0
     first_look_ns: int = 700_000

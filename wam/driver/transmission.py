@@ -146,21 +146,6 @@ def keep_gravity(
     return [h + share * r for h, r in zip(held, rest, strict=True)]
 
 
-def coupled_ratios(
-    ratios: Sequence[float], n3: float = 1.68, n6: float = 1.0
-) -> Matrix:
-    """Return j2mp, shape (7, 7), of the seven drive ratios.
-
-    Joints 2 and 3 share motors 2 and 3, joints 5 and 6 share 5 and 6; `n3` and `n6`
-    are the ratios of those differentials (libbarrett, `wam7w.conf`).
-    """
-    n1, n2, _, n4, n5, _, n7 = ratios
-    j2mp = np.diag([-n1, n2, -n2 / n3, -n4, n5, n5 / n6, -n7])
-    j2mp[1, 2], j2mp[2, 1] = -n2 / n3, -n2
-    j2mp[4, 5], j2mp[5, 4] = -n5 / n6, n5
-    return j2mp
-
-
 def _is_beyond(values: Sequence[float], limits: Sequence[float]) -> bool:
     """Return whether any of `values` is beyond its limit."""
     for value, limit in zip(values, limits, strict=True):

@@ -8,8 +8,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     Field,
     PositiveInt,
     ValidationError,
@@ -17,6 +15,7 @@ from pydantic import (
 )
 
 from acquisition.errors import SettingsError
+from acquisition.settings import SettingsSection
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]
@@ -34,13 +33,7 @@ _Counts7 = tuple[
 ]
 
 
-class ModelSection(BaseModel):
-    """A table of the constants file; unknown keys are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class KinematicsSection(ModelSection):
+class KinematicsSection(SettingsSection):
     """Denavit-Hartenberg: angles [pi rad], lengths and offsets [m]."""
 
     alpha_over_pi: _Vector7
@@ -48,7 +41,7 @@ class KinematicsSection(ModelSection):
     d: _Vector7
 
 
-class LimitsSection(ModelSection):
+class LimitsSection(SettingsSection):
     """Joint stops [rad]."""
 
     lower: _Vector7
@@ -61,19 +54,19 @@ class LimitsSection(ModelSection):
         return self
 
 
-class HomeSection(ModelSection):
+class HomeSection(SettingsSection):
     """Joint positions [rad] at the home pose."""
 
     position: _Vector7
 
 
-class TransmissionSection(ModelSection):
+class TransmissionSection(SettingsSection):
     """Joint to motor positions, a matrix."""
 
     j2mp: tuple[_Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7, _Vector7]
 
 
-class PucksSection(ModelSection):
+class PucksSection(SettingsSection):
     """Encoder counts per turn, torque units per N m, poles."""
 
     cts: _Counts7
@@ -82,13 +75,13 @@ class PucksSection(ModelSection):
     mt: _Counts7
 
 
-class MotorsSection(ModelSection):
+class MotorsSection(SettingsSection):
     """Inertia of each drive [kg m^2]."""
 
     drive_inertia: _Vector7
 
 
-class LinkSection(ModelSection):
+class LinkSection(SettingsSection):
     """Mass [kg], centre [m] and inertia [kg m^2] of a link."""
 
     mass: float = Field(gt=0)
@@ -96,28 +89,28 @@ class LinkSection(ModelSection):
     inertia: tuple[_Vector3, _Vector3, _Vector3]
 
 
-class FrictionSection(ModelSection):
+class FrictionSection(SettingsSection):
     """Coulomb [N m] and viscous [N m s/rad] friction of the joints."""
 
     coulomb: _Vector7
     viscous: _Vector7
 
 
-class ConstantsControlSection(ModelSection):
+class ConstantsControlSection(SettingsSection):
     """Gains of a joint controller [N m/rad], [N m s/rad]."""
 
     kp: _Vector7
     kd: _Vector7
 
 
-class GravityConstantsSection(ModelSection):
+class GravityConstantsSection(SettingsSection):
     """First moments [kg m] as the maker calibrates them."""
 
     mus: tuple[_Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3, _Vector3]
     poses: tuple[_Vector7, ...]
 
 
-class ConstantsFile(ModelSection):
+class ConstantsFile(SettingsSection):
     """The whole file."""
 
     kinematics: KinematicsSection

@@ -3,9 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.cycle import Cycle
+from acquisition.clock import PERIOD_NS
+from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.faults import CircuitCauses, ReplySilence
 from acquisition.control_loop.guard import GuardLimits
-from acquisition.control_loop.loop import PERIOD_NS, Tick
+from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import ArmReading, SafetyMode, WrenchSample
 from acquisition.errors import LinkError
@@ -17,8 +19,13 @@ START_NS = 1_000 * MS
 LIMITS = GuardLimits(
     q_lower=(-2.0,) * 7,
     q_upper=(2.0,) * 7,
-    qd=(1.5,) * 7,
-    tau=np.full(7, 30.0),
+    speed=(1.5,) * 7,
+    torque=np.full(7, 30.0),
+    foot_speed=0.8,
+    joint7_mrad=50.0,
+    ft_stale_ms=6.0,
+    ft_stop_ms=20.0,
+    late_per_second=10,
 )
 TORQUE = {
     ArmState.FLOAT: 1.0,
@@ -150,9 +157,11 @@ class Bench:
             self.law,
             self.observer,
             self.limits,
-            lambda payload: self.records.append(bytes(payload)),
-            self.wrenches.extend,
-            extra_flags,
+            CycleOutputs(
+                lambda payload: self.records.append(bytes(payload)),
+                self.wrenches.extend,
+                extra_flags,
+            ),
         )
 
     def run(self, cycles=1, *, force=5.0, is_late=False):
@@ -541,7 +550,7 @@ def test_a_fault_of_the_safety_module_is_flagged_and_named_as_the_cause(bench):
     bench.arm.mode, bench.arm.faults = SafetyMode.IDLE, ("velocity",)
     assert has(bench.run(), Flag.SAFETY_FAULT)
     assert bench.reason == "pendant-idle"
-    assert bench.cycle.status.verdict.causes == ("velocity",)
+    assert bench.cycle.status.verdict.detail == CircuitCauses(("velocity",))
 
 
 def test_what_the_guard_stops_itself_has_no_cause_in_the_module(bench):
@@ -550,7 +559,7 @@ def test_what_the_guard_stops_itself_has_no_cause_in_the_module(bench):
     bench.arm.missing = 25
     bench.run()
     assert bench.reason == "can-silence"
-    assert bench.cycle.status.verdict.causes == ()
+    assert bench.cycle.status.verdict.detail == ReplySilence(50.0, 0b1000000)
 
 
 def test_an_unknown_arm_can_be_held_again(bench):

@@ -3,14 +3,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.control_loop.guard import (
+from acquisition.control_loop.faults import (
+    OK,
     Action,
-    GuardLimits,
-    GuardState,
+    Fault,
+    ForceAge,
     GuardVerdict,
-    Observation,
-    check,
+    Joint7Slip,
+    JointExcess,
+    LateCycles,
+    ReplySilence,
 )
+from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
 from acquisition.devices import ArmReading, SafetyMode
 
 MS = 1_000_000
@@ -19,8 +23,13 @@ ARMED = GuardState(armed=0x7F)
 LIMITS = GuardLimits(
     q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
     q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
-    qd=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
-    tau=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
+    speed=np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]),
+    torque=np.array([20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3]),
+    foot_speed=0.8,
+    joint7_mrad=50.0,
+    ft_stale_ms=6.0,
+    ft_stop_ms=20.0,
+    late_per_second=10,
 )
 
 
@@ -39,24 +48,25 @@ def reading(**changes):
     return ArmReading(**(facts | changes))
 
 
-QUIET = Observation(
-    reading=reading(),
-    safety=SafetyMode.ACTIVE,
-    foot_speed=0.0,
-    joint7_offset=0.0,
-    ft_age_ns=0,
-    tau=np.zeros(7),
-    is_recording=True,
-    is_powered=True,
-    is_late=False,
-)
+OBSERVED = {
+    "reading": reading(),
+    "safety": SafetyMode.ACTIVE,
+    "foot_speed": 0.0,
+    "joint7_offset": 0.0,
+    "ft_age_ns": 0,
+    "tau": np.zeros(7),
+    "is_recording": True,
+    "is_powered": True,
+    "is_late": False,
+}
+QUIET = Observation(**OBSERVED)
 
 
 def seen(**changes):
     """Return a quiet cycle with `changes` to it or to its reading."""
-    own = {k: v for k, v in changes.items() if k in Observation._fields}
+    own = {k: v for k, v in changes.items() if k in OBSERVED}
     rest = {k: v for k, v in changes.items() if k not in own}
-    return QUIET._replace(reading=reading(**rest), **own)
+    return Observation(**(OBSERVED | {"reading": reading(**rest)} | own))
 
 
 def judge(**changes: Any):
@@ -76,30 +86,35 @@ def missing(cycles):
 E = 1e-9
 LIMIT_TABLE = [
     (
-        "estop",
+        Fault.E_STOP,
         Action.IDLE,
         {"safety": SafetyMode.ACTIVE},
         {"safety": SafetyMode.E_STOP},
     ),
     (
-        "pendant-idle",
+        Fault.PENDANT_IDLE,
         Action.IDLE,
         {"safety": SafetyMode.UNKNOWN},
         {"safety": SafetyMode.IDLE},
     ),
-    ("can-silence", Action.HOLD, missing(4), missing(5)),
-    ("can-silence", Action.HOLD, missing(0), missing(24)),
-    ("can-silence", Action.IDLE, missing(0), missing(25)),
-    ("foot-speed", Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
-    ("joint7-slip", Action.HOLD, {"joint7_offset": 0.05}, {"joint7_offset": 0.05 + E}),
+    (Fault.CAN_SILENCE, Action.HOLD, missing(4), missing(5)),
+    (Fault.CAN_SILENCE, Action.HOLD, missing(0), missing(24)),
+    (Fault.CAN_SILENCE, Action.IDLE, missing(0), missing(25)),
+    (Fault.FOOT_SPEED, Action.DAMP, {"foot_speed": 0.8}, {"foot_speed": 0.8 + E}),
     (
-        "joint7-slip",
+        Fault.JOINT7_SLIP,
+        Action.HOLD,
+        {"joint7_offset": 0.05},
+        {"joint7_offset": 0.05 + E},
+    ),
+    (
+        Fault.JOINT7_SLIP,
         Action.HOLD,
         {"joint7_offset": -0.05},
         {"joint7_offset": -0.05 - E},
     ),
     (
-        "ft-stale",
+        Fault.FT_STALE,
         Action.HOLD,
         {"ft_age_ns": 20 * MS},
         {"ft_age_ns": 20 * MS + 1},
@@ -107,13 +122,13 @@ LIMIT_TABLE = [
 ]
 
 
-@pytest.mark.parametrize(("reason", "action", "inside", "outside"), LIMIT_TABLE)
+@pytest.mark.parametrize(("fault", "action", "inside", "outside"), LIMIT_TABLE)
 def test_every_limit_trips_just_outside_and_not_just_inside(
-    reason, action, inside, outside
+    fault, action, inside, outside
 ):
-    assert judge(**inside).reason != reason
+    assert judge(**inside).fault != fault
     verdict = judge(**outside)
-    assert (verdict.reason, verdict.action) == (reason, action)
+    assert (verdict.fault, verdict.action) == (fault, action)
 
 
 @pytest.mark.parametrize("joint", range(1, 8))
@@ -123,28 +138,27 @@ def test_a_joint_may_reach_its_limit_and_not_pass_it(joint, side):
     beyond = limit + (E if side == "upper" else -E)
     assert judge(q=at(joint, limit)).action is Action.NONE
     verdict = judge(q=at(joint, beyond))
-    assert (verdict.reason, verdict.action) == ("joint-limit", Action.DAMP)
-    assert dict(verdict.facts) == {"joint": joint, "value": beyond, "limit": limit}
+    assert (verdict.fault, verdict.action) == (Fault.JOINT_LIMIT, Action.DAMP)
+    assert verdict.detail == JointExcess(joint, beyond, limit)
 
 
 @pytest.mark.parametrize("joint", range(1, 8))
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(
-    ("field", "limits", "reason"),
-    [("qd", LIMITS.qd, "overspeed"), ("tau", LIMITS.tau, "torque-limit")],
+    ("field", "limits", "fault"),
+    [("qd", LIMITS.speed, Fault.OVERSPEED), ("tau", LIMITS.torque, Fault.TORQUE_LIMIT)],
 )
-def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, reason):
+def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, fault):
     limit = float(limits[joint - 1])
     assert judge(**{field: at(joint, sign * limit)}).action is Action.NONE
     verdict = judge(**{field: at(joint, sign * (limit + E))})
-    assert (verdict.reason, verdict.action) == (reason, Action.DAMP)
-    assert dict(verdict.facts)["joint"] == joint
-    assert dict(verdict.facts)["limit"] == limit
+    assert (verdict.fault, verdict.action) == (fault, Action.DAMP)
+    assert verdict.detail == JointExcess(joint, limit + E, limit)
 
 
 def test_a_quiet_cycle_passes():
     state, verdict = check(LIMITS, ARMED, QUIET)
-    assert verdict == GuardVerdict(Action.NONE)
+    assert verdict is OK
     assert state == ARMED
 
 
@@ -153,42 +167,42 @@ def test_a_quiet_cycle_passes():
 @pytest.mark.parametrize("joint", [1, 7])
 def test_what_is_no_number_ends_in_idle(field, value, joint):
     verdict = judge(**{field: at(joint, value)})
-    assert (verdict.reason, verdict.action) == ("not-a-number", Action.IDLE)
+    assert (verdict.fault, verdict.action) == (Fault.NOT_A_NUMBER, Action.IDLE)
 
 
 @pytest.mark.parametrize("field", ["foot_speed", "joint7_offset"])
 def test_a_speed_or_offset_that_is_no_number_ends_in_idle(field):
-    assert judge(**{field: float("nan")}).reason == "not-a-number"
+    assert judge(**{field: float("nan")}).fault == Fault.NOT_A_NUMBER
 
 
 def test_opposite_infinities_do_not_cancel():
     q = np.zeros(7)
     q[0], q[1] = np.inf, -np.inf
-    assert judge(q=q).reason == "not-a-number"
+    assert judge(q=q).fault == Fault.NOT_A_NUMBER
 
 
 FAULTS = {
-    "estop": {"safety": SafetyMode.E_STOP},
-    "not-a-number": {"tau": at(1, np.nan)},
-    "joint-limit": {"q": at(2, 2.5)},
-    "overspeed": {"qd": at(3, 9.0)},
-    "foot-speed": {"foot_speed": 2.0},
-    "torque-limit": {"tau": at(4, 99.0)},
-    "can-silence": missing(7),
-    "joint7-slip": {"joint7_offset": 0.2},
-    "ft-stale": {"ft_age_ns": S},
+    Fault.E_STOP: {"safety": SafetyMode.E_STOP},
+    Fault.NOT_A_NUMBER: {"tau": at(1, np.nan)},
+    Fault.JOINT_LIMIT: {"q": at(2, 2.5)},
+    Fault.OVERSPEED: {"qd": at(3, 9.0)},
+    Fault.FOOT_SPEED: {"foot_speed": 2.0},
+    Fault.TORQUE_LIMIT: {"tau": at(4, 99.0)},
+    Fault.CAN_SILENCE: missing(7),
+    Fault.JOINT7_SLIP: {"joint7_offset": 0.2},
+    Fault.FT_STALE: {"ft_age_ns": S},
 }
 PAIRS = [
     (worse, milder)
     for i, worse in enumerate(FAULTS)
     for milder in list(FAULTS)[i + 1 :]
-    if {worse, milder} != {"not-a-number", "torque-limit"}  # both are in tau
+    if {worse, milder} != {Fault.NOT_A_NUMBER, Fault.TORQUE_LIMIT}  # both are in tau
 ]
 
 
 @pytest.mark.parametrize(("worse", "milder"), PAIRS)
 def test_of_two_faults_the_more_severe_is_told(worse, milder):
-    assert judge(**(FAULTS[milder] | FAULTS[worse])).reason == worse
+    assert judge(**(FAULTS[milder] | FAULTS[worse])).fault == worse
 
 
 def test_no_fault_hides_a_more_severe_one():
@@ -208,14 +222,16 @@ def test_an_arm_that_is_not_powered_is_left_alone(name):
     assert judge(**FAULTS[name], is_powered=False).action is Action.NONE
 
 
-@pytest.mark.parametrize("name", ["joint7-slip", "ft-stale"])
+@pytest.mark.parametrize("name", [Fault.JOINT7_SLIP, Fault.FT_STALE])
 def test_what_only_ends_a_trial_needs_a_trial(name):
     assert judge(**FAULTS[name], is_recording=False).action is Action.NONE
 
 
-@pytest.mark.parametrize("name", sorted(set(FAULTS) - {"joint7-slip", "ft-stale"}))
+@pytest.mark.parametrize(
+    "name", sorted(set(FAULTS) - {Fault.JOINT7_SLIP, Fault.FT_STALE})
+)
 def test_the_other_limits_hold_without_a_trial_too(name):
-    assert judge(**FAULTS[name], is_recording=False).reason == name
+    assert judge(**FAULTS[name], is_recording=False).fault == name
 
 
 HOME = np.array([0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0])
@@ -239,7 +255,7 @@ def test_an_armed_limit_stays_armed():
     state, _ = check(LIMITS, GuardState(), QUIET)
     assert state.armed == 0x7F
     state, verdict = check(LIMITS, state, seen(q=HOME))
-    assert verdict.reason == "joint-limit"
+    assert verdict.fault == Fault.JOINT_LIMIT
     assert state.armed == 0x7F
 
 
@@ -257,11 +273,11 @@ def test_only_joints_whose_limit_is_armed_are_judged():
     q = np.zeros(7)
     q[1], q[2] = -2.01, 2.81
     _, verdict = check(LIMITS, GuardState(armed=0b1111101), seen(q=q))
-    assert dict(verdict.facts)["joint"] == 3
+    assert verdict.detail == JointExcess(3, 2.81, 2.8)
 
 
 def late_cycles(times, state=ARMED):
-    verdict = GuardVerdict(Action.NONE)
+    verdict = OK
     for t_ns in times:
         changes = {"is_late": True, "host_ns": t_ns}
         state, verdict = check(LIMITS, state, seen(**changes))
@@ -274,15 +290,15 @@ def test_ten_late_cycles_in_a_second_are_tolerated():
 
 def test_eleven_late_cycles_in_a_second_end_in_hold():
     _, verdict = late_cycles(range(0, 110 * MS, 10 * MS))
-    assert (verdict.reason, verdict.action) == ("loop-late", Action.HOLD)
-    assert dict(verdict.facts) == {"late": 11.0, "limit": 10.0}
+    assert (verdict.fault, verdict.action) == (Fault.LOOP_LATE, Action.HOLD)
+    assert verdict.detail == LateCycles(11, 10)
 
 
 def test_late_cycles_are_forgotten_after_a_second():
     times = [*range(0, 100 * MS, 10 * MS), S + 1]
     assert late_cycles(times)[1].action is Action.NONE
     times = [*range(0, 100 * MS, 10 * MS), S]
-    assert late_cycles(times)[1].reason == "loop-late"
+    assert late_cycles(times)[1].fault == Fault.LOOP_LATE
 
 
 def test_a_punctual_cycle_does_not_repeat_the_verdict():
@@ -299,15 +315,17 @@ def test_the_memory_of_late_cycles_does_not_grow():
 
 
 def test_silence_tells_how_long_and_which_motors():
-    assert dict(judge(**missing(5)).facts) == {"ms": 10.0, "silent": 0b0100000}
-    assert dict(judge(**missing(25)).facts) == {"ms": 50.0, "silent": 0b0100000}
+    assert judge(**missing(5)).detail == ReplySilence(10.0, 0b0100000)
+    assert judge(**missing(25)).detail == ReplySilence(50.0, 0b0100000)
 
 
-def test_facts_are_told_in_the_units_of_the_message():
+def test_details_are_in_the_units_of_the_message():
     stale = judge(ft_age_ns=26 * MS)
-    assert dict(stale.facts) == {"ms": 26.0, "limit": 20.0}
+    assert stale.detail == ForceAge(26.0, 20.0)
     slipped = judge(joint7_offset=-0.061)
-    assert dict(slipped.facts) == pytest.approx({"mrad": 61.0, "limit": 50.0})
+    assert isinstance(slipped.detail, Joint7Slip)
+    assert slipped.detail.mrad == pytest.approx(61.0)
+    assert slipped.detail.limit == pytest.approx(50.0)
 
 
 def test_severity_counts_what_is_taken_from_the_arm():

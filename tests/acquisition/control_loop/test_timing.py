@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.timing import loop_report
 from acquisition.ipc.layout import TIMING_DTYPE
 

@@ -1,6 +1,14 @@
+from dataclasses import fields
+
 import pytest
 
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import (
+    FAULTS,
+    Action,
+    CircuitCauses,
+    Fault,
+    GuardVerdict,
+)
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.devices import SafetyMode
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
@@ -43,12 +51,22 @@ def test_numbers_go_on_when_a_console_comes_later(shared):
     assert console.post(CommandKind.LEAVE) == before + 1
 
 
+def example(detail):
+    """Return a detail of that type with different numbers in all of its fields."""
+    if detail is CircuitCauses:
+        return detail(("velocity", "torque"))
+    return detail(*(n + 0.5 for n, _ in enumerate(fields(detail), 1)))
+
+
 @pytest.mark.parametrize(
     "verdict",
     [
         None,
-        GuardVerdict(Action.HOLD, "ft-stale", (("age", 26.5), ("limit", 20.0))),
-        GuardVerdict(Action.IDLE, "estop", causes=("velocity", "torque")),
+        GuardVerdict(Action.IDLE, Fault.E_STOP, CircuitCauses(("velocity", "torque"))),
+        *(
+            GuardVerdict(spec.actions[0], fault, example(spec.detail))
+            for fault, spec in FAULTS.items()
+        ),
     ],
 )
 def test_the_status_arrives_as_it_was_written(shared, verdict):

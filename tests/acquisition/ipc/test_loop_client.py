@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
 
-from acquisition.control_loop.guard import Action, GuardVerdict
-from acquisition.control_loop.loop import PERIOD_NS
+from acquisition.clock import PERIOD_NS
+from acquisition.control_loop.faults import Fault, ForceAge, verdict_for
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.loop_client import LoopClient
 from fakes.clock import SteppedClock
 
-STOPPED = GuardVerdict(Action.HOLD, "ft-stale")
+STOPPED = verdict_for(Fault.FT_STALE, ForceAge(26.0, 20.0))
 
 
 class Room:

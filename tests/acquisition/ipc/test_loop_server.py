@@ -2,8 +2,9 @@ import json
 
 import pytest
 
-from acquisition.control_loop.guard import Action
-from acquisition.control_loop.loop import PERIOD_NS, Tick
+from acquisition.clock import PERIOD_NS
+from acquisition.control_loop.faults import Action
+from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout

@@ -236,7 +236,7 @@ def _weak(scene):
 
 
 def _not_a_number(scene):
-    law = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle._law
+    law = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle.law
     scene.patch.setattr(
         type(law), "torque", lambda *_: (np.full(7, np.nan), np.zeros(7))
     )
@@ -281,8 +281,8 @@ def _swing(scene):
 def _narrow(scene):
     """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
     cycle = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle
-    upper = (*cycle._limits.q_upper[:5], 1.0, cycle._limits.q_upper[6])
-    cycle._limits = replace(cycle._limits, q_upper=upper)
+    upper = (*cycle.limits.q_upper[:5], 1.0, cycle.limits.q_upper[6])
+    cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
 def _saturate(scene):

@@ -57,27 +57,27 @@ def samples(count=400, *, noise=0.05, age_ms=2.0):
 
 
 def test_a_healthy_sensor_is_shown_with_rate_age_and_noise():
-    found = check_wrenches(samples(), NOW_NS)
+    found = check_wrenches(samples(), NOW_NS, 6.0)
     assert found.mark == GOOD
     assert found.text == "800 Hz, age 2.0 ms, noise 0.05 N"
 
 
 @pytest.mark.parametrize("trouble", [{"noise": 2.0}, {"age_ms": 9.0}])
 def test_noise_and_age_are_marked(trouble):
-    assert check_wrenches(samples(**trouble), NOW_NS).mark == WARNING
+    assert check_wrenches(samples(**trouble), NOW_NS, 6.0).mark == WARNING
 
 
 def test_saturation_is_marked():
     records = samples()
     records["saturated"][3] = 0b100
-    found = check_wrenches(records, NOW_NS)
+    found = check_wrenches(records, NOW_NS, 6.0)
     assert found.mark == WARNING
     assert found.text.endswith("1 saturated (Fz)")
 
 
 @pytest.mark.parametrize("count", [0, 1])
 def test_a_sensor_that_says_nothing_is_marked(count):
-    found = check_wrenches(samples(5)[:count], NOW_NS)
+    found = check_wrenches(samples(5)[:count], NOW_NS, 6.0)
     assert (found.mark, found.text) == (WARNING, f"{count} while the loop was tested")
 
 

@@ -31,7 +31,9 @@ def configured(tmp_path):
         text = KINDS[kind]
         config = write_config(tmp_path, rig=('kind = "bota"', text))
         lines = config.read_text().splitlines(keepends=True)
-        config.write_text("".join(x for x in lines if not x.startswith("baudrate")))
+        config.write_text(
+            "".join(x for x in lines if not x.startswith(("baudrate", "sinc")))
+        )
         return config
 
     return write
@@ -64,6 +66,7 @@ def test_a_session_runs_with_a_sensor_of_each_kind(
 
 def test_an_optoforce_without_its_report_is_refused_before_anything_starts(tmp_path):
     config = write_config(tmp_path, rig=('kind = "bota"', 'kind = "optoforce"'))
+    config.write_text(config.read_text().replace("\nsinc", "\n# sinc"))
     done = run_short(config, tmp_path / "data")
     assert done.code == 2
     assert "an optoforce needs sensitivity and serial_number" in done.err
@@ -74,6 +77,7 @@ def test_a_rate_that_a_sensor_cannot_do_is_refused_with_the_configuration(tmp_pa
     config = write_config(
         tmp_path, rig=('kind = "bota"', 'kind = "robotous"\nrate = 333')
     )
+    config.write_text(config.read_text().replace("\nsinc", "\n# sinc"))
     done = traction("check", "--config-only", "--config", config)
     assert done.code == 2
     assert done.err.startswith("rig.toml: ft_sensor: F/T sensor rate 333 Hz")

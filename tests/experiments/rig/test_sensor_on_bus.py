@@ -24,7 +24,9 @@ LINE = ("port", "baudrate", "sinc")
 @pytest.fixture(scope="module")
 def on_bus(tmp_path_factory):
     folder = tmp_path_factory.mktemp("on-bus")
-    return write_config(folder, rig=('kind = "bota"', 'kind = "barrett"'))
+    path = write_config(folder, rig=('kind = "bota"', 'kind = "barrett"'))
+    path.write_text(without(path.read_text(), ["sinc"]))
+    return path
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +103,40 @@ def test_a_sensor_on_the_bus_needs_no_serial_line(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(without(text, LINE).replace('"bota"', '"barrett"', 1))
     assert load_settings(path).rig.ft_sensor.kind == "barrett"
+
+
+@pytest.mark.parametrize(
+    ("kind", "option", "owners"),
+    [
+        ("barrett", "sinc = 64", '"bota"'),
+        ("robotous", 'serial_number = "A"', '"optoforce"'),
+        ("bota", "filter_hz = 150", '"robotous" and "optoforce"'),
+    ],
+)
+def test_an_option_of_another_make_is_refused_by_name(tmp_path, kind, option, owners):
+    text = (resources.files("experiments.data") / "rig.toml").read_text()
+    text = without(text, ["sinc"])
+    path = tmp_path / "rig.toml"
+    path.write_text(text.replace('kind = "bota"', f'kind = "{kind}"\n{option}'))
+    done = traction("check", "--config-only", "--config", path)
+    name = option.split()[0]
+    assert done.code == 2
+    assert done.err.startswith(f"rig.toml: ft_sensor.{name} belongs to kind {owners},")
+    assert f'"{kind}"' in done.err
+
+
+def test_a_value_of_a_make_is_named_without_the_make(tmp_path):
+    config = write_config(tmp_path, rig=("sinc = 64", "sinc = 13"))
+    done = traction("check", "--config-only", "--config", config)
+    assert done.err.startswith(
+        "rig.toml: ft_sensor.sinc = 13 - expected a whole number >= 51 and <= 512"
+    )
+
+
+def test_a_sensor_without_a_kind_names_those_that_are_known(tmp_path):
+    config = write_config(tmp_path, rig=('kind = "bota"', ""))
+    done = traction("check", "--config-only", "--config", config)
+    assert done.err.startswith("rig.toml: ft_sensor.kind is missing, e.g. 'bota',")
 
 
 def test_a_serial_sensor_needs_its_port(tmp_path):

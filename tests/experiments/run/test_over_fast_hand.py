@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.control_loop.guard import Action
+from acquisition.control_loop.faults import Action
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from experiments.rig.rig import FakeOptions, build_rig

@@ -2,7 +2,7 @@
 
 import pytest
 
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import CircuitCauses, Fault, verdict_for
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from experiments.messages import FaultContext, fault_text
@@ -50,7 +50,7 @@ VL1 = 45
     ],
 )
 def test_a_stop_of_the_safety_circuit_is_told_with_its_cause(reason, causes, text):
-    verdict = GuardVerdict(Action.IDLE, reason, causes=causes)
+    verdict = verdict_for(Fault(reason), CircuitCauses(causes))
     assert fault_text(verdict, FOUND).startswith(text)
 
 

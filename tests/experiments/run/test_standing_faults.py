@@ -17,8 +17,8 @@ MANY = 40  # looks of 20 ms, of which the fault takes 5 and more each time it is
 def narrow(backend):
     """Let joint 6 stand beyond what it is allowed from now on."""
     cycle = backend.loop_client.advance_cycles._loop._cycle._cycle
-    upper = (*cycle._limits.q_upper[:5], -1.5, cycle._limits.q_upper[6])
-    cycle._limits = replace(cycle._limits, q_upper=upper)
+    upper = (*cycle.limits.q_upper[:5], -1.5, cycle.limits.q_upper[6])
+    cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
 @pytest.fixture

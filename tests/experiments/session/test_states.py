@@ -1,5 +1,6 @@
 import pytest
 
+from acquisition.control_loop.states import TRANSITIONS
 from experiments.session.states import OPEN, TABLE, Event, SessionPhase
 from tests.experiments.program import traction
 
@@ -74,6 +75,6 @@ def test_a_crash_can_be_found_in_every_open_phase_and_in_no_other():
 def test_the_program_prints_the_whole_table():
     done = traction("check", "--explain", "states")
     lines = done.out.splitlines()
-    assert (done.code, len(lines)) == (0, len(PAIRS))
+    assert (done.code, len(lines)) == (0, len(PAIRS) + len(TRANSITIONS))
     assert "ready       trial-started    -> recording" in lines
     assert "complete    session-resumed  refused: the session is complete" in lines

@@ -2,9 +2,12 @@ import can
 import numpy as np
 import pytest
 
+from acquisition.clock import PERIOD_NS
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
+from experiments import arguments
 from fakes.plant.hand import HandPhase
+from fakes.plant.plant import PlantOptions
 from fakes.plant.push import PACES
 from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
@@ -17,7 +20,7 @@ from fakes.randomness import (
 )
 from fakes.world.rig import LocalSimulation, solve_start
 from ft_sensor.payload import TerrainFrame
-from tests.fakes.scenes import CYCLE_NS, FRAME, MODEL, START_Q, make_rig
+from tests.fakes.scenes import FRAME, MODEL, START_Q, make_rig
 from wam.bus.frames import decode_force, decode_torque
 
 S = 1_000_000_000
@@ -91,7 +94,7 @@ def pushed(trials, pace=None):
         hand.push()
         clock.sleep_until(clock.now_ns() + S)
         truth = hand.take_truth()
-    shown = [rig.errors.apply(k * CYCLE_NS, (0.0,) * 6) for k in range(50)]
+    shown = [rig.errors.apply(k * PERIOD_NS, (0.0,) * 6) for k in range(50)]
     rig.bus.shutdown()
     return truth["hand_force"].tobytes(), truth["contact_force"].tobytes(), shown
 
@@ -111,7 +114,7 @@ def test_a_tare_takes_away_nothing_of_the_trial_and_leaves_nothing_of_the_last()
     hand = LocalSimulation(rig)
 
     def mean():
-        shown = [rig.errors.apply(k * CYCLE_NS, (0.0,) * 6)[:3] for k in range(1000)]
+        shown = [rig.errors.apply(k * PERIOD_NS, (0.0,) * 6)[:3] for k in range(1000)]
         return np.mean(shown, axis=0)
 
     tares, remains = [], []
@@ -144,7 +147,7 @@ def test_the_hand_does_what_the_rehearsal_says(rig_and_clock):
     assert not rig.plant.hand.is_done
     assert rig.plant.hand.phase is HandPhase.CARRY
     hand.push()
-    clock.sleep_until(clock.now_ns() + CYCLE_NS)
+    clock.sleep_until(clock.now_ns() + PERIOD_NS)
     assert rig.plant.hand.phase is HandPhase.PUSH
 
 
@@ -216,7 +219,7 @@ def test_true_forces_are_told_in_the_frame_of_the_base(rig_and_clock):
     rig, clock = rig_and_clock
     hand = LocalSimulation(rig)
     hand.push()
-    clock.sleep_until(clock.now_ns() + 10 * CYCLE_NS)
+    clock.sleep_until(clock.now_ns() + 10 * PERIOD_NS)
     truth = hand.take_truth()
     assert len(truth) == 10
     position = MODEL.sole_pose(truth["position"][-1])[0]
@@ -289,3 +292,8 @@ def test_trials_of_other_terrains_or_numbers_have_other_generators():
     }
     assert len(draws) == 4
     assert trial_generator(1, "S0", 1).random() in draws
+
+
+def test_the_commands_offer_the_paces_and_the_friction_of_the_simulation():
+    assert tuple(PACES) == arguments.PACES
+    assert PlantOptions().friction == arguments.FRICTION

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from ft_sensor.calibration.terrain_fit import check_terrain, fit_terrain
+from ft_sensor.calibration.fit import check_terrain, fit_terrain
 from ft_sensor.payload import TerrainFrame
 
 LENGTH, HALF_WIDTH = 0.45, 0.15

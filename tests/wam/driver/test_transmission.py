@@ -7,7 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import DeviceFaultError, SettingsError
-from wam.driver.transmission import Transmission, coupled_ratios, keep_gravity
+from wam.driver.settings import ArmSettings
+from wam.driver.transmission import Transmission, keep_gravity
+from wam.model.constants import load_constants
 
 VECTORS = json.loads(
     (Path(__file__).parents[2] / "data" / "wam7_vectors.json").read_text()
@@ -137,10 +139,9 @@ def test_power_is_the_same_on_both_sides(wam):
     assert motor_rates @ motor_torques == pytest.approx(qd @ TAU, rel=1e-12)
 
 
-def test_ratios_make_the_known_matrix():
-    ratios = (42.0, 28.25, 28.25, 18.0, 9.7, 9.7, 14.93)
-    # The table prints 16.8155 for 28.25 / 1.68.
-    assert coupled_ratios(ratios) == pytest.approx(J2MP, abs=5e-5)
+def test_the_driver_has_the_matrix_of_the_arm_model():
+    assert (ArmSettings().j2mp == load_constants().j2mp).all()
+    assert load_constants().j2mp == pytest.approx(J2MP, abs=5e-5)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What the sections of rig.toml and matrix.toml are made of."""
+"""What the sections of a settings file in TOML are made of."""
 
 from typing import Annotated
 

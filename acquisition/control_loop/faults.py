@@ -1,0 +1,225 @@
+"""Every fault that stops the arm: its recorded name, its numbers, what the arm does.
+
+`FAULTS` is the catalogue: one row per fault. The texts for the operator have the same
+names in `experiments/data/messages.toml`; tests hold the two against each other.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from enum import Enum, StrEnum
+from typing import Any
+
+
+class Action(Enum):
+    """What the arm has to do."""
+
+    NONE = "none"
+    HOLD = "hold"
+    DAMP = "damp"
+    IDLE = "idle"
+
+
+_SEVERITY = {Action.NONE: 0, Action.HOLD: 1, Action.DAMP: 2, Action.IDLE: 3}
+
+
+class Fault(StrEnum):
+    """Why the arm was stopped; the value is the name in recordings and messages."""
+
+    E_STOP = "estop"
+    PENDANT_IDLE = "pendant-idle"
+    CAN_SILENCE = "can-silence"
+    NOT_A_NUMBER = "not-a-number"
+    JOINT_LIMIT = "joint-limit"
+    OVERSPEED = "overspeed"
+    FOOT_SPEED = "foot-speed"
+    TORQUE_LIMIT = "torque-limit"
+    JOINT7_SLIP = "joint7-slip"
+    FT_STALE = "ft-stale"
+    LOOP_LATE = "loop-late"
+    MOVE_REFUSED = "move-refused"
+    CONSOLE_SILENT = "console-silent"
+    CONSOLE_LOST = "console-lost"
+    RECORDER_SILENT = "recorder-silent"
+
+
+@dataclass(frozen=True, slots=True)
+class NoDetail:
+    """A fault without numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class CircuitCauses:
+    """Monitors of the safety circuit that caused its stop; none for the pendant."""
+
+    causes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ReplySilence:
+    """Silence of the arm.
+
+    Attributes:
+        ms: how long replies have been missing [ms].
+        silent: bit i set = motor i+1 did not answer in the last cycle.
+    """
+
+    ms: float
+    silent: int
+
+
+@dataclass(frozen=True, slots=True)
+class JointExcess:
+    """A joint beyond its limit.
+
+    Attributes:
+        joint: its number, 1-7.
+        value: position [rad], or magnitude of speed [rad/s] or torque [N m].
+        limit: of the same quantity.
+    """
+
+    joint: int
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class FootSpeedExcess:
+    """Speed of the sole and its limit [m/s]."""
+
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Joint7Slip:
+    """Displacement of the locked joint 7 and its limit [mrad]."""
+
+    mrad: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class ForceAge:
+    """Age of the newest force sample and its limit [ms]."""
+
+    ms: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class LateCycles:
+    """Late cycles within a second, and how many are tolerated."""
+
+    late: int
+    limit: int
+
+
+FaultDetail = (
+    NoDetail
+    | CircuitCauses
+    | ReplySilence
+    | JointExcess
+    | FootSpeedExcess
+    | Joint7Slip
+    | ForceAge
+    | LateCycles
+)
+
+
+@dataclass(frozen=True, slots=True)
+class FaultSpec:
+    """What holds for every occurrence of a fault.
+
+    Attributes:
+        actions: what the arm does; of two, the second when the fault lasts.
+        detail: the type of its numbers.
+        needs_trial: it is a fault only while a trial is recorded.
+        ends_session: no trial can follow, the arm has to be activated anew.
+    """
+
+    actions: tuple[Action, ...]
+    detail: type[FaultDetail] = NoDetail
+    needs_trial: bool = False
+    ends_session: bool = False
+
+
+_HOLD, _DAMP, _IDLE = (Action.HOLD,), (Action.DAMP,), (Action.IDLE,)
+FAULTS: Mapping[Fault, FaultSpec] = {
+    Fault.E_STOP: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
+    Fault.PENDANT_IDLE: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
+    Fault.CAN_SILENCE: FaultSpec(
+        (Action.HOLD, Action.IDLE), ReplySilence, ends_session=True
+    ),
+    Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
+    Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),
+    Fault.OVERSPEED: FaultSpec(_DAMP, JointExcess),
+    Fault.FOOT_SPEED: FaultSpec(_DAMP, FootSpeedExcess),
+    Fault.TORQUE_LIMIT: FaultSpec(_DAMP, JointExcess),
+    Fault.JOINT7_SLIP: FaultSpec(_HOLD, Joint7Slip, needs_trial=True),
+    Fault.FT_STALE: FaultSpec(_HOLD, ForceAge, needs_trial=True),
+    Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
+    Fault.MOVE_REFUSED: FaultSpec(_HOLD),
+    Fault.CONSOLE_SILENT: FaultSpec(_HOLD),
+    Fault.CONSOLE_LOST: FaultSpec(_HOLD),
+    Fault.RECORDER_SILENT: FaultSpec(_HOLD, needs_trial=True),
+}
+_NO_DETAIL = NoDetail()
+
+
+@dataclass(frozen=True, slots=True)
+class GuardVerdict:
+    """The guard's decision.
+
+    Attributes:
+        action: what the arm does from this cycle on.
+        fault: why; None where nothing is wrong.
+        detail: the numbers of the fault, of the type that `FAULTS` names.
+    """
+
+    action: Action
+    fault: Fault | None = None
+    detail: FaultDetail = _NO_DETAIL
+
+    @property
+    def severity(self) -> int:
+        """How much is taken from the arm: 0 nothing, 1 hold, 2 damp, 3 idle."""
+        return _SEVERITY[self.action]
+
+    @property
+    def reason(self) -> str:
+        """The recorded name of the fault; empty for none."""
+        return "" if self.fault is None else self.fault.value
+
+    @property
+    def ends_session(self) -> bool:
+        """Whether no trial can follow."""
+        return self.fault is not None and FAULTS[self.fault].ends_session
+
+
+OK = GuardVerdict(Action.NONE)
+
+
+def verdict_for(
+    fault: Fault, detail: FaultDetail = _NO_DETAIL, *, is_lasting: bool = False
+) -> GuardVerdict:
+    """Return the verdict of a fault, with the action that the catalogue names."""
+    action = FAULTS[fault].actions[-1 if is_lasting else 0]
+    return GuardVerdict(action, fault, detail)
+
+
+def to_plain(verdict: GuardVerdict) -> list[Any]:
+    """Return a verdict as values for JSON."""
+    return [verdict.action.value, verdict.reason, asdict(verdict.detail)]
+
+
+def from_plain(plain: list[Any]) -> GuardVerdict:
+    """Return the verdict of `to_plain` values that went through JSON."""
+    action, reason, values = plain
+    if not reason:
+        return GuardVerdict(Action(action))
+    fault = Fault(reason)
+    if FAULTS[fault].detail is CircuitCauses:  # JSON has no tuples
+        return GuardVerdict(
+            Action(action), fault, CircuitCauses(tuple(values["causes"]))
+        )
+    return GuardVerdict(Action(action), fault, FAULTS[fault].detail(**values))

@@ -1,0 +1,48 @@
+"""What a cycle asks of the control law and of the observer of the foot."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import ArmReading, Vector, WrenchSample
+from acquisition.sample import Sample
+
+
+class ControlLaw(Protocol):
+    """Torques from positions."""
+
+    def enter(self, state: ArmState, reading: ArmReading) -> None:
+        """Begin `state` without a jump in torque."""
+        ...
+
+    def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
+        """Return (joint torques, their gravity part) [N m], shapes (7,)."""
+        ...
+
+    def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
+        """Go to `goal` [rad], shape (7,), in hold; return how long it takes [s].
+
+        No joint is faster than `speed` [rad/s].
+
+        Raises:
+            ValueError: the arm is not in hold, or `goal` cannot be reached so.
+        """
+        ...
+
+    def joint7_offset(self, reading: ArmReading) -> float:
+        """Return how far joint 7 is from where it was locked [rad]."""
+        ...
+
+
+class FootObserver(Protocol):
+    """Fills in what follows from joints and wrench: foot and traction."""
+
+    def observe(
+        self, reading: ArmReading, wrench: WrenchSample | None, sample: Sample
+    ) -> float:
+        """Write foot pose, twist, wrench and traction; return the sole's speed."""
+        ...
+
+    def set_bias(self, bias: Sequence[float]) -> None:
+        """Take the sensor's reading without load [N, N m], six numbers."""
+        ...

@@ -1,0 +1,67 @@
+import pytest
+
+from acquisition.control_loop.faults import (
+    FAULTS,
+    OK,
+    Action,
+    Fault,
+    GuardVerdict,
+    from_plain,
+    to_plain,
+    verdict_for,
+)
+
+RECORDED_NAMES = {
+    "estop",
+    "pendant-idle",
+    "can-silence",
+    "not-a-number",
+    "joint-limit",
+    "overspeed",
+    "foot-speed",
+    "torque-limit",
+    "joint7-slip",
+    "ft-stale",
+    "loop-late",
+    "move-refused",
+    "console-silent",
+    "console-lost",
+    "recorder-silent",
+}
+
+
+def test_recorded_names_of_faults_stay_as_they_are():
+    assert {fault.value for fault in Fault} == RECORDED_NAMES
+
+
+def test_every_fault_has_a_row_in_the_catalogue():
+    assert set(FAULTS) == set(Fault)
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_a_fault_stops_the_arm_and_a_lasting_one_takes_no_less(fault):
+    first, lasting = verdict_for(fault), verdict_for(fault, is_lasting=True)
+    assert 0 < first.severity <= lasting.severity
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_a_session_goes_on_unless_the_arm_may_have_become_idle(fault):
+    verdict = verdict_for(fault, is_lasting=True)
+    assert verdict.ends_session is (verdict.action is Action.IDLE)
+
+
+def test_no_fault_has_no_reason_and_ends_no_session():
+    assert (OK.reason, OK.ends_session, OK.severity) == ("", False, 0)
+
+
+def test_a_verdict_without_a_fault_survives_the_way_through_json():
+    assert from_plain(to_plain(OK)) == OK
+
+
+def test_a_name_that_is_no_fault_is_refused():
+    with pytest.raises(ValueError, match="no-fault"):
+        from_plain(["hold", "no-fault", {}])
+
+
+def test_a_reason_is_the_recorded_name():
+    assert GuardVerdict(Action.HOLD, Fault.FT_STALE).reason == "ft-stale"
