@@ -13,7 +13,7 @@ from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.study.jobs import Store, Workers, run_tasks
-from analysis.study.models import BEYOND, FITTERS, GP_SE, TITLES, FitOptions
+from analysis.study.models import GP_SE, TITLES, FitOptions, ModelFitter
 from analysis.study.study import Study
 from analysis.terrains.database import FORMAT, VERSION
 from analysis.terrains.identify import Identification
@@ -56,11 +56,11 @@ def tabulate(task: TableTask) -> dict[str, Any]:
     chosen = np.random.default_rng(key).choice(rows.count, count, replace=False)
     training = TrainingSet(rows, tuple(trial.count for trial in task.trials), chosen)
     F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
+    fitter = ModelFitter(training, task.options)
     models: dict[str, Any] = {}
     for name in task.options.models:
-        fit = FITTERS[name] if name in FITTERS else BEYOND[name]
         try:
-            model = fit(training, task.options)
+            model = fitter.fit(name)
         except TractionError:
             continue
         prediction = model.predict(F_n, v_t)

@@ -235,7 +235,7 @@ def test_more_traction_than_there_is_is_a_risk(path):
 
 def test_the_tables_are_close_to_the_model_between_their_points(study, path):
     from analysis.data.samples import SampleTable, TrainingSet
-    from analysis.study.models import FITTERS
+    from analysis.study.models import ModelFitter
     from analysis.terrains.export import _STREAM, zlib
 
     trials = study.terrains["S0"].trials
@@ -243,7 +243,8 @@ def test_the_tables_are_close_to_the_model_between_their_points(study, path):
     key = (study.options.fit.seed, zlib.crc32(b"S0"), _STREAM)
     chosen = np.random.default_rng(key).choice(rows.count, 60, replace=False)
     lengths = tuple(trial.kept for trial in trials)
-    model = FITTERS[GP_SE](TrainingSet(rows, lengths, chosen), study.options.fit)
+    training = TrainingSet(rows, lengths, chosen)
+    model = ModelFitter(training, study.options.fit).fit(GP_SE)
     F_n = np.linspace(2.6, 4.4, 37)
     v_t = np.linspace(0.021, 0.079, 37)
     exact = model.predict(F_n, v_t)
