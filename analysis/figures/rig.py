@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from analysis.data.series import Array
-from analysis.figures.spec import FigureSpec, ReportSection
+from analysis.figures.sections import ReportSection
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     Axes,
     Figure,
