@@ -34,9 +34,8 @@ from analysis.study.models import (
     TUSTIN,
     FitOptions,
     FittedModel,
+    ModelFitter,
     TustinModel,
-    fit_model,
-    tustin_of,
 )
 
 __all__ = [
@@ -85,7 +84,7 @@ def fit_tustin(
         SettingsError: fewer than 20 samples.
     """
     options = options or FitOptions()
-    return TustinModel(tustin_of(_training(trials, options), options))
+    return TustinModel(ModelFitter(_training(trials, options), options).curve())
 
 
 def fit_gp(
@@ -104,7 +103,7 @@ def fit_gp(
         SettingsError: fewer than 20 samples, forces that do not vary, or no such model.
     """
     options = options or FitOptions()
-    return fit_model(model, _training(trials, options), options)
+    return ModelFitter(_training(trials, options), options).fit(model)
 
 
 def crossvalidate(

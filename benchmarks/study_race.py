@@ -27,8 +27,7 @@ from analysis.study.models import (
     GP_SE_TUSTIN,
     TUSTIN,
     FitOptions,
-    fit_model,
-    tustin_of,
+    ModelFitter,
 )
 from analysis.tustin.model import TustinFit
 from benchmarks.beside_sklearn import fit_theirs, our_starts
@@ -118,7 +117,8 @@ def folds_of(path: Path) -> list[FoldTask]:
 def given(task: FoldTask) -> Given:
     """Return what the Gaussian processes of one fold are fitted to."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
-    curve, subset = tustin_of(training, task.options), training.subset
+    curve = ModelFitter(training, task.options).curve()
+    subset = training.subset
     plain = subset.F_t - subset.F_t.mean()
     left = subset.F_t - curve.mean(subset.F_n, subset.v_t)
     centre, scale = subset.inputs.mean(axis=0), subset.inputs.std(axis=0)
@@ -209,13 +209,14 @@ def run_theirs(
 def where_time_goes(task: FoldTask) -> list[str]:
     """Return what the parts of one of our folds cost."""
     training = TrainingSet(task.training, task.lengths, choose_rows(task))
-    spent, _ = timed(lambda: fit_model(TUSTIN, training, task.options))
+    fitter = ModelFitter(training, task.options)
+    spent, _ = timed(lambda: fitter.fit(TUSTIN))
     parts = [f"Tustin of {task.training.count} rows {1e3 * spent:.0f} ms"]
     foreign = [rows for trials in task.others.values() for rows in trials]
     tested = SampleTable.joined([task.training, *foreign])
     predicting = 0.0
     for name in FITS:
-        spent, model = timed(lambda name=name: fit_model(name, training, task.options))
+        spent, model = timed(lambda name=name: fitter.fit(name))
         starts = model.process.starts
         count = sum(start.evaluations for start in starts)
         parts.append(f"{name} {1e3 * spent:.0f} ms ({count} evaluations)")

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from analysis.figures.sections import ReportSection
 from analysis.figures.selection import (
     Panel,
     TimeWindow,
@@ -14,7 +15,7 @@ from analysis.figures.selection import (
     panels,
     time_windows,
 )
-from analysis.figures.spec import FigureSpec, ReportSection
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     FORCE_LABEL,
     LOAD_LINES,
@@ -84,19 +85,19 @@ def caption_gp(results: StudyResults) -> str:
 
 
 def _draw_window(above: Axes, below: Axes, window: TimeWindow) -> None:
-    for k, (slip, onset, end) in enumerate(window.slips):
+    for k, slip in enumerate(window.slips):
         for ax in (above, below):
             ax.axvspan(
-                onset,
-                end,
+                slip.onset,
+                slip.end,
                 color="#F0E442",
                 alpha=0.55,
                 lw=0,
                 label="slip" if k == 0 else None,
             )
             if slip.has_bounce:
-                ax.axvline(end, color="#CC79A7", lw=1.0, ls=":")
-    bounced = [end for slip, _, end in window.slips if slip.has_bounce]
+                ax.axvline(slip.end, color="#CC79A7", lw=1.0, ls=":")
+    bounced = [slip.end for slip in window.slips if slip.has_bounce]
     if bounced:
         above.axvline(
             bounced[0], color="#CC79A7", lw=1.0, ls=":", label="bounce-back follows"
@@ -192,7 +193,7 @@ def _note_loads(ax: Axes, panel: Panel) -> None:
 
 def _describe_window(window: TimeWindow) -> str:
     where = f"{window.terrain}, trial {window.trial}"
-    slips = [slip for slip, _, _ in window.slips]
+    slips = window.slips
     if not slips:
         low, middle, high = np.quantile(window.F_t, (0.05, 0.5, 0.95))
         return (

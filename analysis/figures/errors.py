@@ -3,7 +3,8 @@
 import numpy as np
 
 from analysis.data.terrain_kinds import FLAT
-from analysis.figures.spec import FigureSpec, ReportSection
+from analysis.figures.sections import ReportSection
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     ERROR_LABEL,
     MODEL_COLOURS,

@@ -6,7 +6,8 @@ import numpy as np
 
 from analysis.data.quality import JOINT7_WARNING
 from analysis.data.series import Array
-from analysis.figures.spec import FigureSpec, ReportSection
+from analysis.figures.sections import ReportSection
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     Axes,
     Figure,

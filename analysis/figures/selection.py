@@ -1,7 +1,7 @@
 """What the figures show, chosen and computed without drawing anything."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,7 +41,7 @@ class TimeWindow:
     t: Array
     v_t: Array
     F_t: Array
-    slips: tuple[tuple[Slip, float, float], ...]
+    slips: tuple[Slip, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ def busiest_window(result: TerrainResult) -> TimeWindow:
         v_t=smooth.v_t[rows],
         F_t=smooth.F_t[rows],
         slips=tuple(
-            (slip, slip.onset - start, slip.end - start)
+            replace(slip, onset=slip.onset - start, end=slip.end - start)
             for slip in result.slips[k]
             if _is_inside(slip, start)
         ),

@@ -1,28 +1,11 @@
-"""A figure of the report as one value: what draws it and everything said about it."""
+"""A figure of the report as one value: its drawing and its texts."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import Enum
 
+from analysis.figures.sections import ReportSection
 from analysis.figures.style import Figure
 from analysis.findings.findings import StudyResults
-
-
-class ReportSection(Enum):
-    """A section of the report; the value is its heading, the order that of the page."""
-
-    SUMMARY = "Summary"
-    CHANGED = "Under another choice"
-    PAPER = "The paper's table and figures"
-    BEYOND = "Beyond the paper"
-    HEALTH = "Rig health"
-    REACH = "What this rig could have seen"
-    ORIGIN = "Choices and provenance"
-
-    @property
-    def anchor(self) -> str:
-        """Name of the section in links."""
-        return self.name.lower()
 
 
 @dataclass(frozen=True, slots=True)

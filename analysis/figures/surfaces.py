@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from analysis.data.series import Array
+from analysis.figures.sections import ReportSection
 from analysis.figures.selection import representatives
-from analysis.figures.spec import FigureSpec, ReportSection
+from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     LOAD_LABEL,
     SPEED_LABEL,

@@ -9,6 +9,7 @@ from analysis.data.terrain_kinds import LEVELS
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.trends import TREND_UNITS, NoiseSummary, ResidualBand, Trend
+from analysis.study.fits import CsvRow
 from analysis.terrains.identify import Confusion, Identification
 
 _DIGITS = 5  # of the surfaces in fits.json
@@ -44,33 +45,33 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
     }
 
 
-def findings_rows(results: StudyResults) -> list[tuple[str, str, str, str, float, str]]:
-    """Return the findings for fits.csv: terrain, model, fold, quantity, value, unit."""
-    rows: list[tuple[str, str, str, str, float, str]] = []
+def findings_rows(results: StudyResults) -> list[CsvRow]:
+    """Return the findings as lines of fits.csv."""
+    rows: list[CsvRow] = []
     for s in results.noise:
         rows += [
-            (s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
-            (s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
+            CsvRow(s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
+            CsvRow(s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
         ]
     for name, trends in results.trends.items():
         for key, trend in trends.items():
             values = {"slope per trial": trend.slope, "slope error": trend.slope_error}
             values["spread of trial means"] = trend.spread
             rows += [
-                (name, "", "", f"{key} {what}", value, TREND_UNITS[key])
+                CsvRow(name, "", "", f"{key} {what}", value, TREND_UNITS[key])
                 for what, value in values.items()
                 if value is not None
             ]
     for name, bands in results.residuals.items():
         for model, band in bands.items():
-            rows.append((name, model, "", "residual bias", band.bias, "N"))
-            rows.append((name, model, "", "residual sd", band.sd, "N"))
+            rows.append(CsvRow(name, model, "", "residual bias", band.bias, "N"))
+            rows.append(CsvRow(name, model, "", "residual sd", band.sd, "N"))
     return rows + _recognised(results.identification) + _rig_rows(results.rig)
 
 
 def _recognised(
     identification: Identification | None,
-) -> list[tuple[str, str, str, str, float, str]]:
+) -> list[CsvRow]:
     if identification is None:
         return []
     rules = {
@@ -78,7 +79,7 @@ def _recognised(
         "smallest error": identification.by_error,
     }
     return [
-        ("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
+        CsvRow("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
         for rule, sizes in rules.items()
         for size, levels in sizes.items()
         for level in LEVELS
@@ -88,9 +89,16 @@ def _recognised(
 
 def _rig_rows(
     rig: Sequence[RigTrial],
-) -> list[tuple[str, str, str, str, float, str]]:
+) -> list[CsvRow]:
     return [
-        (trial.terrain, "", "", f"{trial.name} {key}", float(value), HEALTH_UNITS[key])
+        CsvRow(
+            trial.terrain,
+            "",
+            "",
+            f"{trial.name} {key}",
+            float(value),
+            HEALTH_UNITS[key],
+        )
         for trial in rig
         for key, value in trial.numbers().items()
         if key in HEALTH_UNITS and isinstance(value, int | float)

@@ -1,4 +1,4 @@
-"""Everything a report shows, computed once: for tables, figures and files alike."""
+"""Everything a report shows, computed once for tables, figures and files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -102,9 +102,9 @@ def maximise(
     began = _first_starts(kernel, offered, rough)
     reached: list[Start] = []
     for start in began:
-        reached.append(_climb(objective, start, (bounds, steps), reached))
+        reached.append(climb(objective, start, (bounds, steps), reached))
     began.append(_last_start(kernel, offered, exact, (began, reached), bounds))
-    reached.append(_climb(objective, began[-1], (bounds, steps), reached))
+    reached.append(climb(objective, began[-1], (bounds, steps), reached))
     best = _finish(objective, (bounds, steps), reached)
     theta = np.array(best.theta)
     is_edge = np.abs(bounds - theta[:, None]).min(axis=1) < _AT_BOUND
@@ -177,7 +177,7 @@ def _scored(score: Score, theta: Array) -> float:
         return -np.inf
 
 
-def _climb(
+def climb(
     objective: Objective,
     start: Array,
     box: tuple[Array, Array],
@@ -227,7 +227,7 @@ def _finish(
     On a ridge a climb may stop short of the top; without its memory it goes on.
     """
     k = int(np.argmax([start.lml for start in reached]))
-    end, more = reached[k], _climb(objective, np.array(reached[k].theta), box, [])
+    end, more = reached[k], climb(objective, np.array(reached[k].theta), box, [])
     best = max(end, more, key=lambda start: start.lml)
     reached[k] = best._replace(evaluations=end.evaluations + more.evaluations)
     return reached[k]

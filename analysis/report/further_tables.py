@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from analysis.data.terrain_kinds import LEVELS
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
 from analysis.report.page_model import ReportTable

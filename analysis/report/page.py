@@ -12,7 +12,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.findings.as_numbers import findings_rows, plain_findings
 from analysis.findings.findings import StudyResults, compute_results
 from analysis.findings.rig_health import RigTrial
@@ -44,7 +44,7 @@ _NO_RIG = (
 
 @dataclass(frozen=True, slots=True)
 class ReportContext:
-    """What a report says beyond the study itself.
+    """What a report shows beyond the study itself.
 
     Attributes:
         title: heading of the page.
@@ -55,7 +55,7 @@ class ReportContext:
         tables: further tables, each for its section.
         warnings: further warnings, shown first.
         rig: health of the rig by trial.
-        facts: further plain values for fits.json, by name.
+        further_numbers: further plain values for fits.json, by name.
     """
 
     title: str
@@ -66,7 +66,7 @@ class ReportContext:
     tables: Sequence[ReportTable] = field(default=())
     warnings: Sequence[str] = field(default=())
     rig: Sequence[RigTrial] = field(default=())
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    further_numbers: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
@@ -129,7 +129,11 @@ def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]
     tables = [
         asdict(table) | {"section": table.section.value} for table in context.tables
     ]
-    further = {"findings": plain_findings(results), "tables": tables, **context.facts}
+    further = {
+        "findings": plain_findings(results),
+        "tables": tables,
+        **context.further_numbers,
+    }
     return to_fits(results.study) | to_plain(further)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.figures.style import Picture
 
 

@@ -1,8 +1,8 @@
-"""What the report says in words and tables, before any markup."""
+"""Summary, verdicts and tables of the paper, as text without markup."""
 
 from collections.abc import Sequence
 
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.report.page_model import ReportTable
 from analysis.study.fits import flag_counts, tustin_medians
 from analysis.study.models import FITTERS, TITLES, TUSTIN

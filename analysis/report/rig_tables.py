@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import RigTrial
 from analysis.report.page_model import ReportTable

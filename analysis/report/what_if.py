@@ -7,7 +7,7 @@ from typing import Any
 
 from acquisition.errors import SettingsError
 from analysis.data.load import Frame
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.report.further_tables import paired_cell
 from analysis.report.page_model import ReportTable
 from analysis.study.metrics import PairedComparison, compare

@@ -15,7 +15,7 @@ from analysis.data.prepare import PreparedTrial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Indices
 from analysis.study.metrics import Score, mean_absolute_error, score
-from analysis.study.models import TITLES, FitOptions, FittedModel, fit_model
+from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
 Prepared = Mapping[str, Sequence[PreparedTrial]]
 
@@ -106,11 +106,12 @@ def run_fold(task: FoldTask) -> FoldResult:
     """Return the models of one fold and their errors."""
     chosen = choose_rows(task)
     training = TrainingSet(task.training, task.lengths, chosen)
+    fitter = ModelFitter(training, task.options)
     models: dict[str, ModelFold] = {}
     notes: list[str] = []
     for name in task.options.models:
         try:
-            model = fit_model(name, training, task.options)
+            model = fitter.fit(name)
         except TractionError as error:
             notes.append(
                 f"{task.terrain}, fold {task.fold + 1}, {TITLES[name]}: {error.message}"

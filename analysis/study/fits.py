@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,26 @@ _OTHER_UNITS = {
 }
 
 
+class CsvRow(NamedTuple):
+    """One line of fits.csv; an empty cell stands for all.
+
+    Attributes:
+        terrain: its name.
+        model: name of the model.
+        fold: number of the fold, from 1.
+        quantity: what the value is.
+        value: the number.
+        unit: its unit.
+    """
+
+    terrain: str
+    model: str
+    fold: str
+    quantity: str
+    value: float
+    unit: str
+
+
 def to_fits(study: Study) -> dict[str, Any]:
     """Return the study as a dictionary that is valid JSON: a missing number is None."""
     fits = {
@@ -53,12 +73,12 @@ def to_fits(study: Study) -> dict[str, Any]:
     return to_plain(fits)
 
 
-def to_csv(study: Study, further: Iterable[Sequence[Any]] = ()) -> str:
+def to_csv(study: Study, further: Iterable[CsvRow] = ()) -> str:
     """Return one line per terrain, model, fold and quantity, with its unit.
 
     Args:
         study: the study.
-        further: more lines of the same six columns; an empty cell is "all".
+        further: more lines.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -75,7 +95,11 @@ def to_csv(study: Study, further: Iterable[Sequence[Any]] = ()) -> str:
                     for key, value in values.items()
                 )
     writer.writerows(
-        [_safe(str(cell)) for cell in row[:4]] + [repr(row[4]), row[5]]
+        [
+            *(_safe(c) for c in (row.terrain, row.model, row.fold, row.quantity)),
+            repr(row.value),
+            row.unit,
+        ]
         for row in further
     )
     return text.getvalue()

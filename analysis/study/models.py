@@ -6,7 +6,6 @@ Gaussian process chosen per fold.
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field
-from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -172,75 +171,87 @@ class GpModel:
         return mean if self.curve is None else mean + self.curve.mean(F_n, v_t)
 
 
-Fitter = Callable[[TrainingSet, FitOptions], FittedModel]
+class ModelFitter:
+    """Fits models by name to one training set; they share one Tustin fit.
+
+    Args:
+        training: rows that the models are fitted to.
+        options: how they are fitted.
+    """
+
+    def __init__(self, training: TrainingSet, options: FitOptions) -> None:
+        self.training, self.options = training, options
+        self._curve: TustinFit | None = None
+
+    def curve(self) -> TustinFit:
+        """Return the Tustin fit of all training rows; the first call makes it.
+
+        Raises:
+            SettingsError: fewer than 20 rows.
+        """
+        if self._curve is None:
+            rows, options = self.training.rows, self.options
+            self._curve = fit_tustin(
+                rows.F_n, rows.v_t, rows.F_t, options.bounds, options.form
+            )
+        return self._curve
+
+    def fit(self, name: str) -> FittedModel:
+        """Return the model `name` fitted to the training rows.
+
+        Raises:
+            SettingsError: no such model, or rows that it cannot be fitted to.
+        """
+        fit = FITTERS.get(name) or BEYOND.get(name)
+        if fit is None:
+            raise SettingsError(
+                f"There is no model {name!r}.",
+                hint=f"The models are {', '.join(TITLES)}.",
+            )
+        return fit(self)
+
+    def gp(self, kernel: Kernel) -> GpModel:
+        """Return a Gaussian process with constant noise on the chosen rows."""
+        subset = self.training.subset
+        return GpModel(fit_gp(subset.inputs, subset.F_t, kernel))
+
+    def gp_around_tustin(self, kernel: Kernel) -> GpModel:
+        """Return the Tustin curve with a zero-mean process on its residuals.
+
+        The curve comes from all rows, the residuals from the chosen ones.
+        """
+        curve, subset = self.curve(), self.training.subset
+        residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
+        process = fit_gp(subset.inputs, residual, kernel, is_centred=False)
+        return GpModel(process, curve)
+
+    def gp_with_chosen_noise(self) -> GpModel:
+        """Return a Gaussian process whose noise is chosen among the training trials."""
+        training, options = self.training, self.options
+        choice = choose_noise(training, options.gp_points, options.seed)
+        noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
+        subset = training.subset
+        process = fit_gp(subset.inputs, subset.F_t, None, noise)
+        tails = (
+            TailedNoise.of(process, training) if choice.chosen == "student" else None
+        )
+        return GpModel(process, tails=tails, choice=choice)
+
+    @property
+    def nn_kernel(self) -> Arcsine:
+        """The neural-network kernel of eq. (5), by the options as printed."""
+        return Arcsine(as_printed=self.options.is_nn_as_printed)
 
 
-@lru_cache(maxsize=1)  # three models of a fold share it
-def tustin_of(training: TrainingSet, options: FitOptions) -> TustinFit:
-    """Return the Tustin fit of all training rows."""
-    rows = training.rows
-    return fit_tustin(rows.F_n, rows.v_t, rows.F_t, options.bounds, options.form)
-
-
-def _fit_tustin(training: TrainingSet, options: FitOptions) -> FittedModel:
-    return TustinModel(tustin_of(training, options))
-
-
-def _fit_gp(kernel: Kernel, training: TrainingSet) -> GpModel:
-    return GpModel(fit_gp(training.subset.inputs, training.subset.F_t, kernel))
-
-
-def _fit_around_tustin(
-    kernel: Kernel, training: TrainingSet, options: FitOptions
-) -> GpModel:
-    """Tustin by all rows, then a zero-mean process on the residuals of the chosen."""
-    curve, subset = tustin_of(training, options), training.subset
-    residual = subset.F_t - curve.mean(subset.F_n, subset.v_t)
-    process = fit_gp(subset.inputs, residual, kernel, is_centred=False)
-    return GpModel(process, curve)
-
-
-def _fit_with_chosen_noise(training: TrainingSet, options: FitOptions) -> FittedModel:
-    choice = choose_noise(training, options.gp_points, options.seed)
-    noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
-    process = fit_gp(training.subset.inputs, training.subset.F_t, None, noise)
-    tails = None
-    if choice.chosen == "student":
-        tails = TailedNoise.of(process, training)
-    return GpModel(process, tails=tails, choice=choice)
-
-
-def _nn(options: FitOptions) -> Arcsine:
-    return Arcsine(as_printed=options.is_nn_as_printed)
-
-
-_SE = SquaredExponential()
+Fitter = Callable[[ModelFitter], FittedModel]
 
 # the five of Fig. 9, in its order
 FITTERS: Mapping[str, Fitter] = {
-    TUSTIN: _fit_tustin,
-    GP_SE: lambda training, _: _fit_gp(_SE, training),
-    GP_NN: lambda training, options: _fit_gp(_nn(options), training),
-    GP_SE_TUSTIN: lambda training, options: _fit_around_tustin(_SE, training, options),
-    GP_NN_TUSTIN: lambda training, options: _fit_around_tustin(
-        _nn(options), training, options
-    ),
+    TUSTIN: lambda fitter: TustinModel(fitter.curve()),
+    GP_SE: lambda fitter: fitter.gp(SquaredExponential()),
+    GP_NN: lambda fitter: fitter.gp(fitter.nn_kernel),
+    GP_SE_TUSTIN: lambda fitter: fitter.gp_around_tustin(SquaredExponential()),
+    GP_NN_TUSTIN: lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel),
 }
 # beyond the paper, where FitOptions.models asks for them
-BEYOND: Mapping[str, Fitter] = {
-    GP_SE_NOISE: _fit_with_chosen_noise,
-}
-
-
-def fit_model(name: str, training: TrainingSet, options: FitOptions) -> FittedModel:
-    """Return the model `name` fitted to the training rows.
-
-    Raises:
-        SettingsError: no such model, or rows that it cannot be fitted to.
-    """
-    fit = FITTERS.get(name) or BEYOND.get(name)
-    if fit is None:
-        raise SettingsError(
-            f"There is no model {name!r}.", hint=f"The models are {', '.join(TITLES)}."
-        )
-    return fit(training, options)
+BEYOND: Mapping[str, Fitter] = {GP_SE_NOISE: ModelFitter.gp_with_chosen_noise}

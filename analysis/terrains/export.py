@@ -13,7 +13,7 @@ from analysis.data.prepare import PreparedTrial, PrepareOptions
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.study.jobs import Store, Workers, run_tasks
-from analysis.study.models import BEYOND, FITTERS, GP_SE, TITLES, FitOptions
+from analysis.study.models import GP_SE, TITLES, FitOptions, ModelFitter
 from analysis.study.study import Study
 from analysis.terrains.database import FORMAT, VERSION
 from analysis.terrains.identify import Identification
@@ -47,20 +47,12 @@ def tabulate(task: TableTask) -> dict[str, Any]:
 
     A model that cannot be fitted is left out.
     """
-    columns = [(rows.F_n, rows.v_t, rows.F_t) for rows in task.trials]
-    rows = SampleTable(
-        *(np.concatenate(column) for column in zip(*columns, strict=True))
-    )
-    key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
-    count = min(task.options.gp_points, rows.count)
-    chosen = np.random.default_rng(key).choice(rows.count, count, replace=False)
-    training = TrainingSet(rows, tuple(trial.count for trial in task.trials), chosen)
     F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
+    fitter = ModelFitter(training_set(task), task.options)
     models: dict[str, Any] = {}
     for name in task.options.models:
-        fit = FITTERS[name] if name in FITTERS else BEYOND[name]
         try:
-            model = fit(training, task.options)
+            model = fitter.fit(name)
         except TractionError:
             continue
         prediction = model.predict(F_n, v_t)
@@ -71,6 +63,15 @@ def tabulate(task: TableTask) -> dict[str, Any]:
             "sd": _rounded(prediction.sd, task.axes),
         }
     return models
+
+
+def training_set(task: TableTask) -> TrainingSet:
+    """Return the samples of all trials, the rows of the processes chosen at random."""
+    rows = SampleTable.joined(task.trials)
+    key = (task.options.seed, zlib.crc32(task.terrain.encode()), _STREAM)
+    count = min(task.options.gp_points, rows.count)
+    chosen = np.random.default_rng(key).choice(rows.count, count, replace=False)
+    return TrainingSet(rows, tuple(trial.count for trial in task.trials), chosen)
 
 
 def database_of(

@@ -184,5 +184,5 @@ class ScoreTask:
 
 
 def run_score(task: ScoreTask) -> TerrainScores:
-    """Return how the trial fits what every expert expects."""
+    """Return how the trial fits the prediction of every expert."""
     return score_trial(task.trial, task.experts)

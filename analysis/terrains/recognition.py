@@ -11,7 +11,7 @@ NONE = "none"  # of the known terrains
 
 @dataclass(frozen=True, slots=True)
 class WindowEvidence:
-    """What one window says.
+    """The evidence of one window.
 
     Attributes:
         t: time of its last sample [s].
@@ -26,11 +26,11 @@ class WindowEvidence:
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """What a trial says about its ground.
+    """The terrain that a trial is attributed to.
 
     Attributes:
         terrains: names, in the database's order.
-        moments: window by window.
+        moments: evidence window by window.
         posterior: probability of each terrain after the whole trial.
         best: the verdict on the whole trial: a terrain or "none".
         least_error: the paper's rule: the terrain with the smallest error.

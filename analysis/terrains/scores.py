@@ -22,13 +22,13 @@ from analysis.study.metrics import Prediction
 
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N
-_SPIKE = 10.0  # standard deviations beyond which a sample says no more
+_SPIKE = 10.0  # standard deviations beyond which a larger error adds nothing
 Predictor = Callable[[Array, Array], Prediction]
 
 
 @dataclass(frozen=True, slots=True)
 class Expert:
-    """What one terrain would say.
+    """The prediction of one terrain's model.
 
     Attributes:
         predict: F_t of given (F_n, v_t).
@@ -121,7 +121,7 @@ class TerrainScores:
 
 
 def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
-    """Return how `trial` fits what every expert expects."""
+    """Return how `trial` fits the prediction of every expert."""
     predictions = [
         (expert.predict(trial.F_n, trial.v_t), expert.rho)
         for expert in experts.values()

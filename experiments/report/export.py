@@ -23,7 +23,14 @@ _WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
 _OF_TRIAL, _OF_SAMPLES = "T01.csv", "T01.kept.csv"
 _BASE, _TERRAIN = "arm's base", "terrain"
 _Columns = NDArray[np.float64]
-_FACTS = ("operator", "started_utc", "incline_deg", "stone_size", "tread", "simulated")
+_METADATA = (
+    "operator",
+    "started_utc",
+    "incline_deg",
+    "stone_size",
+    "tread",
+    "simulated",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,12 +162,12 @@ def export_sessions(
         (to / session.path.name).mkdir(exist_ok=True)
         write_new_text(to / f"{name}.csv", trial_table(trial))
         write_new_text(to / f"{name}.kept.csv", samples_table(trial))
-        facts = trial.metadata["trial"]
-        values = [facts.get(key, "") for key in _FACTS]
+        metadata = trial.metadata["trial"]
+        values = [metadata.get(key, "") for key in _METADATA]
         rows.append([f"{name}.csv", session.id, trial.terrain, *values])
         rows[-1].append(sha256_of(path))
         console.say(f"{name}: {len(trial.t)} rows")
-    header = ["table", "session", "terrain", *_FACTS, "sha256 of the recording"]
+    header = ["table", "session", "terrain", *_METADATA, "sha256 of the recording"]
     write_new_text(to / INDEX, _csv([header, *rows]))
     write_new_text(to / DICTIONARY, data_dictionary())
     _write_sums(to)

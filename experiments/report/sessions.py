@@ -1,4 +1,4 @@
-"""From sessions to a report: which trials, what is said about them."""
+"""From sessions to a report: the trials, their study and the page."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -79,9 +79,9 @@ def choose_sessions(
         )
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
-        message, facts = CATALOGUE["mixed"], {"session": simulated[0].id}
+        message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
         raise SessionError(
-            message.what.format_map(facts), hint=message.do.format_map(facts)
+            message.what.format_map(values), hint=message.do.format_map(values)
         )
     return sessions
 
@@ -162,18 +162,22 @@ def study_sessions(
 
 
 def repeated(
-    done: StudySession, choice: StudyVariant, data: Path, console: Console
+    analysed: StudySession, choice: StudyVariant, data: Path, console: Console
 ) -> Study:
     """Return the study once more under a choice."""
     console.say(f"What if {choice.text}: fitting ...")
     series = {
         name: [t.series(choice.frame) for t in group]
-        for name, group in done.trials.items()
+        for name, group in analysed.trials.items()
     }
-    options = choice.options(done.study.options)
+    options = choice.options(analysed.study.options)
     with fitting(console) as progress:
         return run_study(
-            series, options, done.study.simulated, progress, ResultStore(data / FOLDS)
+            series,
+            options,
+            analysed.study.simulated,
+            progress,
+            ResultStore(data / FOLDS),
         )
 
 
@@ -191,8 +195,8 @@ def export_terrains(
         TrialFileError: `out` exists or cannot be written.
     """
     judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
-    done = study_sessions(sessions, data, order, console, judged)
-    study = done.study
+    analysed = study_sessions(sessions, data, order, console, judged)
+    study = analysed.study
     options = replace(study.options, fit=FitOptions(seed=order.seed, draws=0))
     text = database_of(
         replace(study, options=options),
@@ -218,9 +222,9 @@ def report_sessions(
         SessionError: no session has a kept trial.
     """
     fit = FitOptions(seed=order.seed, models=REPORTED)
-    done = study_sessions(sessions, data, order, console, fit)
-    study, trials = done.study, done.trials
-    others = [(c, repeated(done, c, data, console)) for c in order.choices]
+    analysed = study_sessions(sessions, data, order, console, fit)
+    study, trials = analysed.study, analysed.trials
+    others = [(c, repeated(analysed, c, data, console)) for c in order.choices]
     count = sum(len(group) for group in trials.values())
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
@@ -234,8 +238,10 @@ def report_sessions(
             *truth_tables(study, trials),
             *report_tables(sessions, trials),
         ],
-        facts={"what_if": [plain_choice(c, study, other) for c, other in others]},
-        warnings=done.problems,
+        further_numbers={
+            "what_if": [plain_choice(c, study, other) for c, other in others]
+        },
+        warnings=analysed.problems,
         rig=rig_health([trial for group in trials.values() for trial in group]),
     )
     return write_report(study, out, context)

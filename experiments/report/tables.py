@@ -1,10 +1,10 @@
-"""What a report says of sessions, settings and provenance, beyond the models."""
+"""Tables of sessions, checks, settings and provenance in a report."""
 
 from collections.abc import Mapping, Sequence
 from typing import cast
 
 from analysis.data.load import RecordedTrial
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.report.page_model import ReportTable
 from experiments.session.store import SessionFolder, read_json
 
@@ -57,14 +57,14 @@ def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
     rows = [
         (
             s.id,
-            f"{facts.get('trial', '?')} attempt {facts.get('attempt', '?')}",
-            str(facts.get("status", "")),
-            str(facts.get("reason", "")),
-            str(facts.get("who", "")),
-            str(facts.get("when", "")),
+            f"{sidecar.get('trial', '?')} attempt {sidecar.get('attempt', '?')}",
+            str(sidecar.get("status", "")),
+            str(sidecar.get("reason", "")),
+            str(sidecar.get("who", "")),
+            str(sidecar.get("when", "")),
         )
         for s in sessions
-        for facts in s.rejected_sidecars()
+        for sidecar in s.rejected_sidecars()
     ]
     return ReportTable(
         "Acceptance: rejected and interrupted trials",
@@ -76,18 +76,18 @@ def _rejected_table(sessions: Sequence[SessionFolder]) -> ReportTable:
 
 
 def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
-    said: dict[tuple[str, ...], list[str]] = {}
+    sessions_of: dict[tuple[str, ...], list[str]] = {}
     for session in sessions:
         checks = read_json(session.path / "preflight.json").get("checks", [])
         for check in cast("list[object]", checks) if isinstance(checks, list) else []:
             if isinstance(check, dict):
-                facts = cast("dict[str, object]", check)
-                found = tuple(str(facts.get(k, "")) for k in ("name", "mark", "text"))
-                said.setdefault(found, []).append(session.id)
+                values = cast("dict[str, object]", check)
+                result = tuple(str(values.get(k, "")) for k in ("name", "mark", "text"))
+                sessions_of.setdefault(result, []).append(session.id)
     return ReportTable(
         "Checks before the sessions",
         ("check", "", "found", "sessions"),
-        [(*found, ", ".join(ids)) for found, ids in sorted(said.items())],
+        [(*result, ", ".join(ids)) for result, ids in sorted(sessions_of.items())],
         section=ReportSection.HEALTH,
     )
 
@@ -114,11 +114,11 @@ def _matrix_table(trials: Mapping[str, Sequence[RecordedTrial]]) -> ReportTable:
 
 
 def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
-    facts: dict[str, set[str]] = {}
+    values: dict[str, set[str]] = {}
     for trial in trials:
         for key, value in trial.metadata["provenance"].items():
-            facts.setdefault(key, set()).add(value)
-    rows = [(key, _few(values)) for key, values in facts.items()]
+            values.setdefault(key, set()).add(value)
+    rows = [(key, _few(different)) for key, different in values.items()]
     return ReportTable(
         "Provenance",
         ("what", "value"),
@@ -139,8 +139,8 @@ def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
     rows: list[tuple[str, str, str]] = []
     for session in sessions:
         for path in sorted(session.trials.glob("T*.json")):
-            facts = read_json(path)
+            sidecar = read_json(path)
             name = f"{session.path.name}/trials/{path.stem}.mcap"
-            digest, size = (str(facts.get(key, "?")) for key in ("sha256", "size"))
+            digest, size = (str(sidecar.get(key, "?")) for key in ("sha256", "size"))
             rows.append((name, size, digest))
     return ReportTable("Trial files", ("file", "bytes", "SHA-256"), rows)

@@ -10,7 +10,7 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import moving_average
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.report.page_model import ReportTable
 from analysis.study.study import Study, TerrainResult
 
@@ -63,16 +63,16 @@ def truth_errors(trial: RecordedTrial) -> TruthErrors | None:
     )
 
 
-def _parameters(facts: Mapping[str, str]) -> dict[str, float]:
-    """Return the true parameters among the facts of a trial; no number, no entry."""
-    found: dict[str, float] = {}
-    for key, text in facts.items():
+def _parameters(metadata: Mapping[str, str]) -> dict[str, float]:
+    """Return the true parameters in a trial's metadata; other texts are left out."""
+    parameters: dict[str, float] = {}
+    for key, text in metadata.items():
         if key.startswith(_PREFIX):
             try:
-                found[key.removeprefix(_PREFIX)] = float(text)
+                parameters[key.removeprefix(_PREFIX)] = float(text)
             except ValueError:
                 continue
-    return found
+    return parameters
 
 
 def _smooth(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -116,8 +116,8 @@ def _measured(errors: Mapping[str, list[tuple[str, TruthErrors]]]) -> ReportTabl
                 f"{error.F_t:.2f}",
                 f"{error.F_n:.2f}",
             )
-            for terrain, found in errors.items()
-            for name, error in found
+            for terrain, of_terrain in errors.items()
+            for name, error in of_terrain
         ],
         note="Simulated trials only; after the same smoothing on both.",
         section=ReportSection.REACH,
@@ -129,8 +129,8 @@ def _recovered(
 ) -> ReportTable:
     rows = [
         row
-        for terrain, found in errors.items()
-        for row in _rows(study.terrains[terrain], [error for _, error in found])
+        for terrain, of_terrain in errors.items()
+        for row in _rows(study.terrains[terrain], [error for _, error in of_terrain])
     ]
     return ReportTable(
         "True parameters beside the recovered ones",

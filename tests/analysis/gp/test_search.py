@@ -57,46 +57,46 @@ def test_search_begins_at_the_most_promising_point_and_far_from_it():
 def test_first_starts_follow_the_rough_score():
     objective = hill((np.zeros(4), 5.0, 1.0))
     goal = np.log([0.1, 3.5] * ROWS.std(axis=0))
-    found = search(objective, rough=lambda theta: -np.abs(theta[1:3] - goal).sum())
-    np.testing.assert_allclose(found.began[0][1:3], goal)
+    optimum = search(objective, rough=lambda theta: -np.abs(theta[1:3] - goal).sum())
+    np.testing.assert_allclose(optimum.began[0][1:3], goal)
 
 
 def test_last_start_finds_a_top_that_the_others_miss():
     low = np.array([0.0, -1.0, 0.5, -0.5])
     high = low + np.array([0.0, 0.0, 2.5, 0.0])  # one length apart
     # rough: all that a part of the rows knows of is the lower top
-    found = search(
+    optimum = search(
         hill((low, 5.0, 0.6), (high, 9.0, 0.6)),
         rough=lambda theta: -np.abs(theta - low).sum(),
     )
-    np.testing.assert_allclose(found.theta[1:3], high[1:3], atol=0.1)
-    assert [start.lml > 8 for start in found.starts] == [False, False, True]
+    np.testing.assert_allclose(optimum.theta[1:3], high[1:3], atol=0.1)
+    assert [start.lml > 8 for start in optimum.starts] == [False, False, True]
 
 
 @pytest.mark.parametrize("length", [0.5, 5.5])
 def test_a_last_start_is_far_from_known_tops(length):
-    found = search(hill((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
-    tops = np.array([start.theta for start in found.starts[:2]])
+    optimum = search(hill((np.array([0.0, -1.0, length, -0.5]), 5.0, 3.0)))
+    tops = np.array([start.theta for start in optimum.starts[:2]])
     # lengths beyond e^3 standard deviations are all the same
-    gaps = np.minimum(tops, 3.0) - np.minimum(found.began[2], 3.0)
+    gaps = np.minimum(tops, 3.0) - np.minimum(optimum.began[2], 3.0)
     assert np.abs(gaps)[:, 1:3].max(axis=1).min() >= 1.0
 
 
 def test_the_best_end_is_climbed_on_and_counts_as_one_start(monkeypatch):
-    climb, climbs = search_module._climb, []
+    original, climbs = search_module.climb, []
 
     def watched(objective, start, box, known):
-        climbs.append((start, climb(objective, start, box, known)))
+        climbs.append((start, original(objective, start, box, known)))
         return climbs[-1][1]
 
-    monkeypatch.setattr(search_module, "_climb", watched)
-    found = search(hill((np.array([0.0, -1.0, 0.5, -0.5]), 5.0, 1.0)))
+    monkeypatch.setattr(search_module, "climb", watched)
+    optimum = search(hill((np.array([0.0, -1.0, 0.5, -0.5]), 5.0, 1.0)))
     *ends, (again, _) = climbs
     best = max((end for _, end in ends), key=lambda end: end.lml)
     np.testing.assert_array_equal(again, best.theta)
-    assert found.lml >= best.lml
+    assert optimum.lml >= best.lml
     spent = sum(end.evaluations for _, end in climbs)
-    assert sum(start.evaluations for start in found.starts) == spent
+    assert sum(start.evaluations for start in optimum.starts) == spent
 
 
 def test_points_without_a_likelihood_are_no_starts():
@@ -107,9 +107,9 @@ def test_points_without_a_likelihood_are_no_starts():
             raise SettingsError("none")
         return plain(theta)
 
-    found = search(objective)
-    assert len(found.starts) == 3
-    assert all(start[1] >= -1 for start in found.began)
+    optimum = search(objective)
+    assert len(optimum.starts) == 3
+    assert all(start[1] >= -1 for start in optimum.began)
 
 
 @pytest.mark.parametrize("name", list(KERNELS))
@@ -118,11 +118,11 @@ def test_points_without_a_likelihood_are_no_starts():
 def test_every_kernel_is_searched_from_three_starts(name, noise, rows):
     X, kernel = ROWS[:rows], KERNELS[name]
     y = np.sin(X[:, 0]) + np.random.default_rng(1).normal(0, 0.1, rows)
-    found = posterior_search((kernel, noise), X, y)
-    assert len(found.starts) == len(found.began) == 3
-    assert found.lml == max(start.lml for start in found.starts)
+    optimum = posterior_search((kernel, noise), X, y)
+    assert len(optimum.starts) == len(optimum.began) == 3
+    assert optimum.lml == max(start.lml for start in optimum.starts)
     again = posterior_search((kernel, noise), X, y)
-    np.testing.assert_array_equal(again.theta, found.theta)
+    np.testing.assert_array_equal(again.theta, optimum.theta)
 
 
 @pytest.mark.parametrize("dimensions", [1, 3])
@@ -130,15 +130,15 @@ def test_kernels_of_other_dimensions_are_searched_too(dimensions):
     X = np.random.default_rng(2).normal(size=(40, dimensions))
     y = np.sin(2 * X[:, 0]) + np.random.default_rng(3).normal(0, 0.1, 40)
     for kernel in (SquaredExponential(dimensions), Arcsine(dimensions)):
-        found = posterior_search((kernel, ConstantNoise()), X, y)
+        optimum = posterior_search((kernel, ConstantNoise()), X, y)
         # a constant of the outputs' own spread explains nothing
-        assert found.lml > -0.5 * 40 * (1 + np.log(2 * np.pi * y.var())) + 10
+        assert optimum.lml > -0.5 * 40 * (1 + np.log(2 * np.pi * y.var())) + 10
 
 
 def test_an_input_that_does_not_vary_is_searched():
     X = ROWS * [1.0, 0.0]
-    found = posterior_search(MODEL, X, np.sin(X[:, 0]))
-    assert np.isfinite(found.lml)
+    optimum = posterior_search(MODEL, X, np.sin(X[:, 0]))
+    assert np.isfinite(optimum.lml)
 
 
 def test_moves_of_a_sum_are_those_of_one_part_at_a_time():

@@ -1,6 +1,6 @@
 import pytest
 
-from analysis.figures.spec import ReportSection
+from analysis.figures.sections import ReportSection
 from analysis.figures.style import styled
 from analysis.figures.surfaces import distinct_labels
 from analysis.findings.findings import compute_results

@@ -9,12 +9,13 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.study.metrics import Prediction
-from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
 from analysis.terrains.database import load
-from analysis.terrains.export import database_of
+from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
 from analysis.terrains.recognition import recognise
 from analysis.terrains.scores import (
@@ -234,16 +235,10 @@ def test_more_traction_than_there_is_is_a_risk(path):
 
 
 def test_the_tables_are_close_to_the_model_between_their_points(study, path):
-    from analysis.data.samples import SampleTable, TrainingSet
-    from analysis.study.models import FITTERS
-    from analysis.terrains.export import _STREAM, zlib
-
-    trials = study.terrains["S0"].trials
-    rows = SampleTable.of(trials)
-    key = (study.options.fit.seed, zlib.crc32(b"S0"), _STREAM)
-    chosen = np.random.default_rng(key).choice(rows.count, 60, replace=False)
-    lengths = tuple(trial.kept for trial in trials)
-    model = FITTERS[GP_SE](TrainingSet(rows, lengths, chosen), study.options.fit)
+    trials = tuple(SampleTable.of([t]) for t in study.terrains["S0"].trials)
+    no_axes = (np.zeros(0), np.zeros(0))
+    training = training_set(TableTask("S0", trials, no_axes, study.options.fit))
+    model = ModelFitter(training, study.options.fit).fit(GP_SE)
     F_n = np.linspace(2.6, 4.4, 37)
     v_t = np.linspace(0.021, 0.079, 37)
     exact = model.predict(F_n, v_t)
