@@ -1,6 +1,7 @@
 """What the preflight says of the computer and of the running force sensor."""
 
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,6 +16,14 @@ CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
 OLD_MS = 6.0  # ms, a force sample that is older counts as stale
 NOISY = 0.5  # N, several times what a quiet sensor shows
+
+
+DiskProbe = Callable[[Path], int]  # a folder in, free bytes there out
+
+
+def free_bytes(folder: Path) -> int:
+    """Return how much room is left where `folder` is [bytes]."""
+    return shutil.disk_usage(folder).free
 
 
 @dataclass(frozen=True, slots=True)

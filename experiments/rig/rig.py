@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from acquisition.clock import Clock, SystemClock
@@ -28,11 +25,6 @@ from experiments.settings.matrix import TerrainRow
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
-
-
-def free_bytes(folder: Path) -> int:
-    """Return how much room is left where `folder` is [bytes]."""
-    return shutil.disk_usage(folder).free
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +61,6 @@ class Rig:
         gravity_text: the gravity calibration in use; empty for none.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
-        free_bytes: tells how much room is left where a folder is.
     """
 
     clock: Clock
@@ -84,7 +75,6 @@ class Rig:
     gravity_text: str
     simulation: SimulationControl | None
     is_stepped: bool
-    free_bytes: Callable[[Path], int] = free_bytes
 
     @property
     def is_simulated(self) -> bool:

@@ -1,4 +1,4 @@
-"""What a session may ask of a simulation and never of a rig."""
+"""What a simulated rig offers beyond a real one, and the hand of its operator."""
 
 import base64
 from typing import Literal, Protocol
@@ -8,6 +8,7 @@ import numpy as np
 from acquisition.ipc.child import Child
 from acquisition.sample import Record
 from acquisition.schema import TRUTH
+from experiments.operator.prompts import Prompt, PromptState
 
 
 class SimulationControl(Protocol):
@@ -124,3 +125,37 @@ class RemoteSimulation:
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground."""
         return self._child.ask("parameters")
+
+
+_ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
+
+
+class SimulatedHand:
+    """Moves the simulated hand and pendant as the prompts ask."""
+
+    def __init__(self, simulation: SimulationControl) -> None:
+        self._simulation = simulation
+        self._seen: tuple[Prompt, int, int] | None = None
+
+    def follow(self, state: PromptState) -> None:
+        """Do what a person would do at this prompt; once per prompt."""
+        key = (state.prompt, state.trial, state.attempt)
+        if key == self._seen or state.prompt in _ASIDE:
+            return
+        self._seen = key
+        if state.prompt is Prompt.SUPPORT:
+            self._simulation.lift()
+            self._simulation.pendant("activate")
+        elif state.prompt is Prompt.LIFT:
+            self._simulation.lift()
+        elif state.prompt is Prompt.CLEAR:
+            self._simulation.let_go()
+        elif state.prompt is Prompt.TOUCH:
+            self._simulation.touch(state.trial)
+        elif state.prompt is Prompt.READY:
+            self._simulation.prepare(state.trial + 1000 * (state.attempt - 1))
+            self._simulation.put_down()
+        elif state.prompt is Prompt.RECORDING:
+            self._simulation.push()
+        elif state.prompt is Prompt.REVIEW:
+            self._simulation.rest()

@@ -12,7 +12,7 @@ from experiments.operator.feedback import (
     FeedbackSignal,
     OperatorFeedback,
     SpeechOutput,
-    build_cues,
+    build_feedback,
     find_speech,
 )
 from experiments.settings.rig import OperatorSection
@@ -42,7 +42,7 @@ class Words:
 
 def rung(stream, *, bell=True):
     with contextlib.redirect_stdout(stream):
-        feedback = build_cues(OperatorSection(bell=bell), Console())
+        feedback = build_feedback(OperatorSection(bell=bell), Console())
         for cue in FeedbackSignal:
             feedback.give(cue)
     return stream.getvalue()
@@ -74,8 +74,8 @@ def test_nobody_speaks_unless_asked(monkeypatch):
     monkeypatch.setattr(
         "experiments.operator.feedback.find_speech", lambda: "/bin/speak"
     )
-    assert build_cues(OperatorSection(), Console())._speaker is None
-    speaking = build_cues(OperatorSection(speech=True), Console())
+    assert build_feedback(OperatorSection(), Console())._speaker is None
+    speaking = build_feedback(OperatorSection(speech=True), Console())
     assert speaking._speaker.program == "/bin/speak"
 
 
