@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from acquisition.errors import SettingsError
+from acquisition.simulation import SimulationControl
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
-from experiments.rig.simulation import SimulationControl
 
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"

@@ -9,6 +9,7 @@ from typing import Any
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
+from acquisition.simulation import SimulationControl
 from experiments.arguments import FRICTION
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
@@ -18,7 +19,7 @@ from experiments.rig.build import (
 from experiments.rig.fake import SimulatedRig, stepped
 from experiments.rig.gravity import build_law_model, read_gravity
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
-from experiments.rig.simulation import RemoteSimulation, SimulationControl
+from experiments.rig.simulation import connect_simulation
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
@@ -114,7 +115,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
             _jobs(settings, row, gravity_text, facts), shared, clock
         )
         if backend.fake is not None:
-            simulation = RemoteSimulation(backend.fake)
+            simulation = connect_simulation(backend.fake)
     payload = payload_of(tool)
     return Rig(
         clock=clock,
