@@ -1,11 +1,44 @@
 """Arguments that more than one command takes; imports nothing slow."""
 
 import shlex
-from argparse import ArgumentParser, ArgumentTypeError
+from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError
 from pathlib import Path
 
 FRICTION = 0.02  # of the simulated joints, as a share of another arm's
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
+
+
+def add_global_options(
+    parser: ArgumentParser, *, is_after_command: bool = False
+) -> None:
+    """Declare the options that stand before or after the command; the last one wins.
+
+    Args:
+        parser: of the program, or of one command.
+        is_after_command: of a command: what is left out there stays as it stood before.
+    """
+    left_out = SUPPRESS if is_after_command else None
+    group = parser.add_argument_group("global options")
+    group.add_argument(
+        "--config", type=Path, default=left_out, metavar="FILE", help="a rig.toml"
+    )
+    group.add_argument(
+        "--data",
+        type=Path,
+        default=left_out or Path("data"),
+        metavar="DIR",
+        help="data folder",
+    )
+    group.add_argument(
+        "-v",
+        "--verbose",
+        action="store_true",
+        default=left_out or False,
+        help="name the cause of an error",
+    )
+    group.add_argument(
+        "--no-color", action="store_true", default=left_out or False, help="plain text"
+    )
 
 
 def whole_number(text: str) -> int:

@@ -5,9 +5,9 @@ import argparse
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from acquisition.errors import TractionError
+from experiments.arguments import add_global_options
 
 COMMANDS = {
     "check": "is the rig fit to run? one graded page",
@@ -42,16 +42,6 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands; imports no slow library."""
-    common = argparse.ArgumentParser(add_help=False)
-    group = common.add_argument_group("global options")
-    group.add_argument("--config", type=Path, metavar="FILE", help="a rig.toml")
-    group.add_argument(
-        "--data", type=Path, default=Path("data"), metavar="DIR", help="data folder"
-    )
-    group.add_argument(
-        "-v", "--verbose", action="store_true", help="name the cause of an error"
-    )
-    group.add_argument("--no-color", action="store_true", help="plain text")
     parser = argparse.ArgumentParser(
         prog="traction",
         description="Measures how a robotic foot grips loose stones.",
@@ -59,6 +49,7 @@ def build_parser() -> argparse.ArgumentParser:
         + EXIT_CODES,
         formatter_class=_Formatter,
     )
+    add_global_options(parser)
     parser.add_argument("--version", action="version", version=f"traction {_version()}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, help_text in COMMANDS.items():
@@ -69,8 +60,8 @@ def build_parser() -> argparse.ArgumentParser:
             description=help_text[0].upper() + help_text[1:] + ".",
             epilog=f"examples:\n{module.EXAMPLES}\n\n{EXIT_CODES}",
             formatter_class=_Formatter,
-            parents=[common],
         )
+        add_global_options(child, is_after_command=True)
         module.add_arguments(child)
         child.set_defaults(run=module.run)
     return parser

@@ -27,14 +27,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-import fakes.world.rig
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.session.reducer import replay
 from experiments.session.store import find_session
 from fakes.clock import START_NS
-from fakes.world.rig import FakeRig
+from tests.experiments.built import Built, watch_builds
 from tests.experiments.program import (
     Done,
     journal,
@@ -88,7 +87,7 @@ class Soak:
     Attributes:
         folder: where the sessions are.
         rng: draws terrains, faults and moments.
-        rigs: the simulated rigs of the present session.
+        built: what was built for the present session.
         simulated_ns: how much time has passed in all simulations.
         counts: sessions, trials, resumes, faults by name.
         base: descriptors and memory after the first sessions.
@@ -96,7 +95,7 @@ class Soak:
 
     folder: Path
     rng: np.random.Generator
-    rigs: list[FakeRig] = field(default_factory=list)
+    built: Built = field(default_factory=Built)
     simulated_ns: int = 0
     counts: Counter = field(default_factory=Counter)
     base: tuple[int, int] | None = None
@@ -119,8 +118,8 @@ class Soak:
         assert done.code in CODES, done.err
         for line in done.err.splitlines():
             assert is_known(line), line
-        rig = self.rigs[-1]
-        is_braked = rig.plant._is_held or rig.network.safety_mode is SafetyMode.E_STOP
+        rig = self.built.rig
+        is_braked = rig.plant.is_held or rig.network.safety_mode is SafetyMode.E_STOP
         assert is_braked, (rig.network.safety_mode, done.err)
         assert not children(), children()
 
@@ -174,7 +173,7 @@ def run_session(soak: Soak, config: Path) -> None:
     rng = soak.rng
     number = soak.counts["sessions"]
     soak.data = soak.folder / f"{number:05d}"
-    soak.rigs.clear()
+    soak.built.forget()
     options = ["--trials", TRIALS, "--seed", int(rng.integers(1 << 30))]
     if rng.random() < FAULT_SHARE:
         name = str(rng.choice(FAULTS))
@@ -198,8 +197,8 @@ def run_session(soak: Soak, config: Path) -> None:
     assert len(kept_and_sound(only_session(soak.data))) == TRIALS
     assert journal(only_session(soak.data))[-1]["reason"] == "complete"
     soak.counts["sessions"] += 1
-    soak.simulated_ns += sum(rig._clock.now_ns() - START_NS for rig in soak.rigs)
-    soak.rigs.clear()
+    soak.simulated_ns += sum(clock.now_ns() - START_NS for clock in soak.built.clocks)
+    soak.built.forget()
     remove(soak.data)
     soak.check_growth()
 
@@ -217,11 +216,7 @@ def remove(folder: Path) -> None:
 def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
     """Keep hold of every simulated rig; look at the files before every trial."""
 
-    class Seen(fakes.world.rig.FakeRig):
-        def __init__(self, *given: object, **named: object) -> None:
-            super().__init__(*given, **named)
-            soak.rigs.append(self)
-
+    soak.built = watch_builds(patch)
     seen: list[tuple[int, int]] = []
 
     def answer(_: AutoOperator, asked) -> str:
@@ -231,7 +226,6 @@ def watch(patch: pytest.MonkeyPatch, soak: Soak) -> None:
             soak.check_files()
         return press(asked)
 
-    patch.setattr(fakes.world.rig, "FakeRig", Seen)
     patch.setattr(AutoOperator, "answer", answer)
 
 

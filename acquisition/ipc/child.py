@@ -1,7 +1,7 @@
 """Processes beside the console: spawned, watched, stopped; they die with it.
 
-A child is a new interpreter that is given three descriptors - board, channel, a file
-for its last words - and nothing else: no terminal, no signals of the terminal's group.
+A child is a new interpreter that inherits three descriptors - shared memory, channel,
+a file for its standard error - and nothing else: no terminal, no signals of its group.
 """
 
 import ctypes
@@ -18,9 +18,10 @@ from typing import Any
 
 from acquisition.control_loop.realtime import die_with_parent
 from acquisition.errors import TractionError
+from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import SharedMemory
-from acquisition.ipc.rpc import Channel, ChannelClosedError
+from acquisition.ipc.rpc import send_call
 
 _ROOT = str(Path(__file__).parents[2])
 _START = (
@@ -30,7 +31,7 @@ _START = (
 # One thread per process: a pool of the linear algebra library would preempt the loop.
 _ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
-_LAST_WORDS = 4000  # characters of a child's standard error
+_STDERR_CHARACTERS = 4000  # characters of a child's standard error
 _PATIENCE = 3.0  # s a child gets to end by itself
 
 
@@ -54,12 +55,12 @@ class ProcessLostError(TractionError):
 
 @dataclass(frozen=True, slots=True)
 class ChildContext:
-    """What a child works with.
+    """What a child process gets at its start.
 
     Attributes:
-        board: the shared memory.
+        shared: the shared memory.
         channel: to the console.
-        settings: what it was told at the start.
+        settings: its configuration.
     """
 
     shared: SharedLayout
@@ -84,7 +85,7 @@ class Child:
     ) -> None:
         self.name = name
         self.channel, theirs = Channel.pair()
-        self._words = os.memfd_create(f"traction-{name}", os.MFD_CLOEXEC)
+        self._stderr = os.memfd_create(f"traction-{name}", os.MFD_CLOEXEC)
         descriptors = (shared.memory.descriptor, theirs.fileno())
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", _START, _ROOT, target]
@@ -92,7 +93,7 @@ class Child:
             pass_fds=descriptors,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            stderr=self._words,
+            stderr=self._stderr,
             start_new_session=True,
             env={**os.environ, **_ONE_THREAD},
         )
@@ -109,15 +110,15 @@ class Child:
         """Whether it runs."""
         return self._process.poll() is None
 
-    def ask(self, question: str, argument: object = None) -> Any:  # noqa: ANN401
-        """Put a question to it and return the answer.
+    def call(self, method: str, arguments: dict[str, Any]) -> Any:  # noqa: ANN401
+        """Call a method of its `RpcServer`; what `make_proxy` sends with.
 
         Raises:
             TractionError: what it raised.
             ProcessLostError: it has ended.
         """
         try:
-            return self.channel.ask(question, argument)
+            return send_call(self.channel, method, arguments)
         except ChannelClosedError:
             self._wait(_PATIENCE)
             raise ProcessLostError(self.name, self.how_it_ended()) from None
@@ -127,15 +128,17 @@ class Child:
         code = self._process.poll()
         if code is not None and code < 0:
             return f"killed by {signal.Signals(-code).name}"
-        words = self.last_words().strip().splitlines()
+        words = self.stderr_text().strip().splitlines()
         raised = [line for line in words if _RAISED.match(line)]
         return (raised or words or [f"exit code {code}"])[-1]
 
-    def last_words(self) -> str:
+    def stderr_text(self) -> str:
         """Return the end of what it wrote to its standard error."""
-        size = os.fstat(self._words).st_size
-        start = max(0, size - _LAST_WORDS)
-        return os.pread(self._words, _LAST_WORDS, start).decode(errors="replace")
+        size = os.fstat(self._stderr).st_size
+        start = max(0, size - _STDERR_CHARACTERS)
+        return os.pread(self._stderr, _STDERR_CHARACTERS, start).decode(
+            errors="replace"
+        )
 
     def stop(self) -> None:
         """Hang up and wait until it ends; after 3 s it is killed. Safe to repeat."""
@@ -143,9 +146,9 @@ class Child:
         if not self._wait(_PATIENCE):
             self._process.kill()
             self._process.wait()
-        if self._words >= 0:
-            os.close(self._words)
-            self._words = -1
+        if self._stderr >= 0:
+            os.close(self._stderr)
+            self._stderr = -1
 
     def _wait(self, seconds: float) -> bool:
         try:
@@ -156,7 +159,7 @@ class Child:
 
 
 def main(arguments: list[str]) -> None:
-    """Run one child: TARGET, descriptors of board and channel, number of the parent."""
+    """Run one child: TARGET, descriptors of memory and channel, pid of the parent."""
     target, shared, channel, parent = arguments
     die_with_parent(signal.SIGTERM)
     if os.getppid() != int(parent):

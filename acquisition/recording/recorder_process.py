@@ -4,45 +4,38 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
 from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
 from acquisition.errors import TrialFileError
+from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import Child, ChildContext, name_process
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import give_back_heap
-from acquisition.ipc.rpc import ChannelClosedError, Handler
-from acquisition.recording.recorder import Recorder
+from acquisition.ipc.rpc import RpcServer, bind, make_proxy
+from acquisition.recording.recorder import Recorder, TrialRecording
 from acquisition.trial_file.verify import VerifiedFile
 from acquisition.trial_file.writer import TrialHeader
 
 DRAIN_S = 0.02
 NICE = 5
-_HEADER = TypeAdapter(TrialHeader)
-_VERIFIED = TypeAdapter(VerifiedFile)
 
 
-def main(station: ChildContext) -> None:
-    """Record what the board shows until the console hangs up.
+def main(context: ChildContext) -> None:
+    """Record what the shared memory gets until the console hangs up.
 
     A trial that is open then is ended properly: nothing is lost with the console.
     """
     name_process("traction-record")
-    request(RealtimeRequest(nice=NICE, core=station.settings.get("core")))
-    recorder = Recorder(station.shared, SystemClock())
-    handlers: dict[str, Handler] = {
-        "start": lambda told: recorder.start(
-            Path(told["path"]), _HEADER.validate_python(told["header"])
-        ),
-        "event": lambda told: recorder.event(*told),
-        "finish": lambda reason: _finish(recorder, reason),
-        "abandon": lambda _: recorder.abandon(),
-    }
+    request(RealtimeRequest(nice=NICE, core=context.settings.get("core")))
+    recorder = Recorder(context.shared, SystemClock())
+    server = RpcServer(bind(TrialRecording, recorder))
     try:
         while True:
-            if station.channel.is_readable(DRAIN_S):
-                station.channel.answer(handlers)
+            if context.channel.is_readable(DRAIN_S):
+                was_recording = recorder.is_recording
+                server.answer(context.channel)
+                if was_recording and not recorder.is_recording:
+                    give_back_heap()
             recorder.drain()
             recorder.publish_state()
     except ChannelClosedError:
@@ -51,17 +44,15 @@ def main(station: ChildContext) -> None:
             recorder.finish("console lost")
 
 
-def _finish(recorder: Recorder, reason: str) -> dict[str, Any]:
-    verified = _VERIFIED.dump_python(recorder.finish(reason))
-    give_back_heap()
-    return verified
-
-
 class RemoteRecorder:
-    """A recorder in another process (implements TrialRecording)."""
+    """A recorder in another process; implements `TrialRecording`.
+
+    What it says while a trial runs is in the shared memory: no call waits for it.
+    """
 
     def __init__(self, child: Child, shared: SharedLayout) -> None:
         self._child = child
+        self._remote = make_proxy(TrialRecording, child.call)
         self._shared = shared
         self._is_recording = False
 
@@ -72,26 +63,24 @@ class RemoteRecorder:
 
     def start(self, path: Path, header: TrialHeader) -> None:
         """Begin a file with the last second of samples."""
-        told = {"path": str(path.resolve())}
-        told["header"] = _HEADER.dump_python(header, mode="json")
-        self._child.ask("start", told)
+        self._remote.start(path.resolve(), header)
         self._is_recording = True
 
     def event(self, level: int, name: str, text: str) -> None:
         """Write an event of now into the file, if one is open."""
-        self._child.ask("event", [level, name, text])
+        self._remote.event(level, name, text)
 
     def finish(self, stop_reason: str) -> VerifiedFile:
         """End, verify and publish the file."""
         self._is_recording = False
-        return _VERIFIED.validate_python(self._child.ask("finish", stop_reason))
+        return self._remote.finish(stop_reason)
 
     def abandon(self) -> None:
         """Stop recording; what there is goes to the disk and stays as `.partial`."""
         if self._is_recording:
             self._is_recording = False
             if self._child.is_alive:
-                self._child.ask("abandon")
+                self._remote.abandon()
 
     @property
     def largest_backlog(self) -> int:

@@ -37,7 +37,7 @@ class GravityGuide:
     def __init__(self, console_loop: ConsoleLoop) -> None:
         self._walk = PoseWalk(console_loop)
         self._rig = console_loop.rig
-        self._console = console_loop.company.console
+        self._console = console_loop.console
 
     def run(self, count: int, *, is_forced: bool) -> GravityCalibration:
         """Measure in `count` poses and return the calibration.
@@ -49,7 +49,7 @@ class GravityGuide:
         Raises:
             SettingsError: no safe way, or the fit is bad.
             PreflightError: not activated, or touched while it was weighed.
-            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
+            StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
         model = self._rig.model
 

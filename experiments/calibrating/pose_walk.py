@@ -9,7 +9,7 @@ from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator.prompts import Prompt
 from experiments.run.activation import activate
 from experiments.run.console_loop import TICK, ConsoleLoop
-from experiments.run.participants import ArmFaultError, StopRequestedError
+from experiments.run.stop import ArmFaultError, StopRequestedError
 from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
 from wam.control.joint_move import JointMove
 from wam.model.constants import Array
@@ -25,17 +25,17 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
     Every way out leaves the arm idle: after a stop it holds first, or damps when the
     stop was asked for twice.
     """
-    console = console_loop.company.console
+    console = console_loop.console
     try:
         work()
     except StopRequestedError:
-        console_loop.obey_stop()
-        console_loop.control.advance(_HOLD)
+        console_loop.stop_arm()
+        console_loop.loop_client.advance(_HOLD)
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
         place = FaultContext(
-            "The calibration", is_bus_down=console_loop.control.loop.is_bus_down
+            "The calibration", is_bus_down=console_loop.loop_client.loop.is_bus_down
         )
         console.problem(fault_text(fault.verdict, place, _NOTHING))
         return 4
@@ -66,7 +66,7 @@ class PoseWalk:
     def __init__(self, console_loop: ConsoleLoop) -> None:
         self.console_loop = console_loop
         self._rig = console_loop.rig
-        self._console = console_loop.company.console
+        self._console = console_loop.console
         self._here = np.zeros(7)
 
     def begin(
@@ -82,13 +82,13 @@ class PoseWalk:
         Raises:
             SettingsError: no safe way.
             PreflightError: not activated.
-            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
+            StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
         activate(self.console_loop)
         start = self._rig.backend.loop_client.latest()["position"][0].copy()
         rows = self._rig.settings.matrix.terrains
         floor = max(row.far_end[2] for row in rows) + CLEARANCE
-        halts = self.console_loop.aside(lambda: plan(start, floor))
+        halts = self.console_loop.run_aside(lambda: plan(start, floor))
         number = len({halt.pose for halt in halts} - {None})
         stops = len(halts) * SETTLE + number * seconds_per_pose
         # Held by position: the weight may not be known yet, and the hand lets go.

@@ -25,7 +25,7 @@ class SensorGuide:
     def __init__(self, console_loop: ConsoleLoop) -> None:
         self._walk = PoseWalk(console_loop)
         self._rig = console_loop.rig
-        self._console = console_loop.company.console
+        self._console = console_loop.console
 
     def run(
         self, count: int, mounting: tuple[float, float] | None, *, is_forced: bool
@@ -42,7 +42,7 @@ class SensorGuide:
         Raises:
             SettingsError: no safe way, or the fit is bad.
             PreflightError: not activated, touched meanwhile, or too few readings.
-            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
+            StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
         model = self._rig.model
 

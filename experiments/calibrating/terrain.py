@@ -7,7 +7,7 @@ from acquisition.errors import PreflightError
 from experiments.operator.prompts import Prompt
 from experiments.run.activation import activate
 from experiments.run.console_loop import ConsoleLoop
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.fit import (
     CORNERS,
     ContainerFit,
@@ -25,9 +25,9 @@ class TerrainGuide:
     """Asks a person to touch the corners of a container, and takes the points."""
 
     def __init__(self, console_loop: ConsoleLoop) -> None:
-        self._stage = console_loop
+        self._console_loop = console_loop
         self._rig = console_loop.rig
-        self._console = console_loop.company.console
+        self._console = console_loop.console
 
     def run(self, *, is_forced: bool) -> tuple[ContainerFit, list[Array]]:
         """Return the container as touched, and the points [m], shape (3,) each.
@@ -38,16 +38,16 @@ class TerrainGuide:
         Raises:
             SettingsError: the corners make no container, or not this one.
             PreflightError: not activated.
-            StopAskedError, FaultedError: as `ConsoleLoop.tick`.
+            StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
-        activate(self._stage)
-        self._stage.control.request(ArmState.FLOAT)
+        activate(self._console_loop)
+        self._console_loop.loop_client.request(ArmState.FLOAT)
         points = self._touch()
-        self._stage.control.request(ArmState.HOLD)
+        self._console_loop.loop_client.request(ArmState.HOLD)
         self._console.say("Support the arm, it goes idle. [space]")
-        while self._stage.tick(Prompt.SUPPORT) != " ":
+        while self._console_loop.tick(Prompt.SUPPORT) != " ":
             pass
-        self._stage.make_safe()
+        self._console_loop.make_safe()
         fit = fit_terrain(np.array(points))
         self._say(fit, len(points))
         check_terrain(fit, self._rig.frame, is_forced=is_forced)
@@ -75,7 +75,7 @@ class TerrainGuide:
     def _point(self, name: TrialName, *, is_corner: bool) -> Array | None:
         """Return the sole's mean position [m], shape (3,); None = no more."""
         while True:
-            key = self._stage.tick(Prompt.TOUCH, name)
+            key = self._console_loop.tick(Prompt.TOUCH, name)
             if key == "d" and not is_corner:
                 return None
             if key != " ":
@@ -86,8 +86,8 @@ class TerrainGuide:
                 self._console.say(str(error))
 
     def _at_rest(self) -> Array:
-        self._stage.control.advance(AVERAGE)
-        at = self._stage.control.last(AVERAGE)["foot_position"]
+        self._console_loop.loop_client.advance(AVERAGE)
+        at = self._console_loop.loop_client.last(AVERAGE)["foot_position"]
         moved = float(np.ptp(at, axis=0).max())
         if moved > STILL:
             raise PreflightError(

@@ -53,14 +53,14 @@ def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
     from experiments.calibrating.pose_walk import guided
     from experiments.operator.console import Console
-    from experiments.operator.prompts import SimulatedHand
-    from experiments.operator.select import choose_keys
+    from experiments.operator.scripted import choose_operator
     from experiments.operator.terminal import keyboard
     from experiments.preflight.preflight import connect_rig, run_preflight
     from experiments.rig.bus_log import logging_bus
     from experiments.rig.rig import FakeOptions
+    from experiments.rig.simulation import SimulatedHand
     from experiments.run.console_loop import ConsoleLoop
-    from experiments.run.participants import Company, StopFlag, signals_ask
+    from experiments.run.stop import StopFlag, handle_signals
     from experiments.settings.load import load_settings
 
     _check_arguments(args)
@@ -70,16 +70,16 @@ def run(args: argparse.Namespace) -> int:
     out = args.out or _place(args.what, settings, row, is_fake=args.fake)
     _check_out(out)
     console = Console(color=not args.no_color)
-    keys = choose_keys(args.operator_script, is_fake=args.fake)
+    operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake = FakeOptions(args.fast, seed=1) if args.fake else None
     rig = connect_rig(settings, row, fake)
     kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
     stop = StopFlag()
-    with logging_bus(rig, None, console), signals_ask(stop), keyboard(keys):
+    with logging_bus(rig, None, console), handle_signals(stop), keyboard(operator):
         run_preflight(rig, Path(args.data), console)
         hand = SimulatedHand(rig.simulation) if rig.simulation else None
-        console_loop = ConsoleLoop(rig, Company(keys, console, stop, hand))
+        console_loop = ConsoleLoop(rig, console, operator, stop, hand)
         return guided(console_loop, lambda: _WORK[args.what](console_loop, args, out))
 
 
@@ -130,7 +130,7 @@ def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _say_use(console_loop: ConsoleLoop, out: Path, line: str, file: str) -> None:
-    console_loop.company.console.say(f"Written: {out}. To use it: {line} of {file}.")
+    console_loop.console.say(f"Written: {out}. To use it: {line} of {file}.")
 
 
 _WORK = {"gravity": _gravity, "sensor": _sensor, "foot": _sensor, "terrain": _terrain}

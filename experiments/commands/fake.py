@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.rig.bus_log import open_bus_log
     from experiments.rig.fake import build_server
-    from experiments.run.participants import StopFlag, signals_ask
+    from experiments.run.stop import StopFlag, handle_signals
     from experiments.settings.load import load_settings
     from experiments.tools.pendant import PRESSES, Lines, Pendant
 
@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     if bus is None:
         return _serve_sensor(settings, line, console)
     with (
-        signals_ask(stop),
+        handle_signals(stop),
         open_bus_log(args.can_log, clock, "fake0", console) as log,
         closing(build_server(settings, bus, line, is_idle=args.idle_first)) as server,
     ):
@@ -97,7 +97,7 @@ def _serve_sensor(
     """Serve a sensor without an arm until told to stop."""
     from acquisition.errors import SettingsError
     from experiments.rig.fake import build_sensor_server
-    from experiments.run.participants import StopFlag, signals_ask
+    from experiments.run.stop import StopFlag, handle_signals
 
     if line is None:
         raise SettingsError(
@@ -105,7 +105,7 @@ def _serve_sensor(
             hint="Name --can INTERFACE:CHANNEL, --serial PATH, or both.",
         )
     stop = StopFlag()
-    with signals_ask(stop), closing(build_sensor_server(settings, line)) as server:
+    with handle_signals(stop), closing(build_sensor_server(settings, line)) as server:
         console.say(f"ready: {server.name}")
         while not stop.count:
             server.wait()

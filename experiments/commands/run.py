@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
     from experiments.operator.console import Console
-    from experiments.operator.select import choose_keys
+    from experiments.operator.scripted import choose_operator
     from experiments.rig.rig import FakeOptions
     from experiments.run.resume import resume
     from experiments.run.session import OpenMode, SessionRequest, run_session
@@ -79,8 +79,8 @@ def run(args: argparse.Namespace) -> int:
         config=args.config,
         row=settings.row(args.terrain),
         fake=fake,
-        operator=args.operator,
-        keys=choose_keys(args.operator_script, is_fake=args.fake),
+        operator_name=args.operator,
+        operator=choose_operator(args.operator_script, is_fake=args.fake),
         console=Console(color=not args.no_color),
         faults=tuple(args.fault),
         can_log=args.can_log,
@@ -96,7 +96,7 @@ def run(args: argparse.Namespace) -> int:
 def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | None:
     """Return the session to be resumed instead, None when none is in the way."""
     from experiments.run.resume import close
-    from experiments.run.resume_prompt import ResumeChoice, choose
+    from experiments.run.resume_prompt import ResumeChoice, choose_resume
     from experiments.session.unfinished import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
@@ -109,7 +109,9 @@ def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | 
         choice = ResumeChoice.CLOSE
         if not is_new:
             data = data_option(request.data)
-            choice = choose(found, terrain, data, request.keys, request.console)
+            choice = choose_resume(
+                found, terrain, data, request.operator, request.console
+            )
         newest = found.pop()
         if choice is ResumeChoice.RESUME:
             return newest
@@ -126,7 +128,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
         console=request.console,
         is_fast=args.fast,
         is_fake=args.fake,
-        operator=request.operator,
+        operator=request.operator_name,
         script=args.operator_script,
         can_log=request.can_log,
         faults=request.faults,

@@ -1,4 +1,4 @@
-"""What can befall the computer of a rehearsed session: disk, lock, kill, bug."""
+"""Faults of the computer in a rehearsed session: disk, lock, kill, bug."""
 
 import fcntl
 import os
@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from experiments.preflight.host_checks import free_bytes
 from experiments.rig.rig import Rig
 from experiments.session.lock import LOCK_FILE, sign
 from experiments.session.store import SessionFolder
@@ -24,47 +25,53 @@ class InjectedBugError(Exception):
 
 @dataclass(slots=True)
 class HostFaults:
-    """Lets the computer fail as it does in earnest, and ends it all in `undo`.
+    """Injects faults of the computer; `restore` ends them all.
 
     Attributes:
-        rig: whose computer it is.
-        folder: of the session; None before there is one.
-        is_locked: another process has the session open before this one does.
+        rig: whose recorder is hit.
     """
 
     rig: Rig
-    folder: SessionFolder | None = None
-    is_locked: bool = False
-    _undo: ExitStack = field(default_factory=ExitStack)
+    _folder: SessionFolder | None = field(default=None, init=False)
+    _is_locked: bool = field(default=False, init=False)
+    _is_disk_full: bool = field(default=False, init=False)
+    _restore: ExitStack = field(default_factory=ExitStack, init=False)
 
     def inject(self, name: str, trial: int) -> None:
-        """Let a fault happen while `trial` is recorded, or before everything (0)."""
+        """Inject a fault while `trial` is recorded, or before the preflight (0)."""
         if name == "crash":
             os.kill(os.getpid(), signal.SIGKILL)
         elif name == "locked":
-            self.is_locked = True
+            self._is_locked = True
         elif name == "disk-full" and trial == 0:
-            self.rig.free_bytes = lambda _: _ALMOST_NOTHING
+            self._is_disk_full = True
         elif name == "disk-full":
-            self._undo.enter_context(_full_disk(self.rig, self._partial(trial)))
+            self._restore.enter_context(_full_disk(self.rig, self._partial(trial)))
         elif name == "write-failed":
             _flip_a_bit(self._partial(trial))
         else:
             raise InjectedBugError("rehearsed")
 
-    def undo(self) -> None:
+    def restore(self) -> None:
         """End what has not ended by itself; safe to repeat."""
-        self._undo.close()
+        self._restore.close()
+
+    def free_bytes(self, folder: Path) -> int:
+        """Return how much room is left where `folder` is [bytes]; a `DiskProbe`."""
+        return _ALMOST_NOTHING if self._is_disk_full else free_bytes(folder)
+
+    def enter_session(self, folder: SessionFolder) -> None:
+        """Let faults hit the files of the session in `folder` from here on."""
+        self._folder = folder
 
     def hold_lock(self, folder: SessionFolder) -> None:
         """Hold the lock of a new session, as another process would, if planned."""
-        self.folder = folder
-        if self.is_locked:
-            self._undo.enter_context(_occupied(folder.path / LOCK_FILE))
+        if self._is_locked:
+            self._restore.enter_context(_occupied(folder.path / LOCK_FILE))
 
     def _partial(self, trial: int) -> Path:
-        assert self.folder is not None
-        return self.folder.trials / f"T{trial:02d}.mcap.partial"
+        assert self._folder is not None
+        return self._folder.trials / f"T{trial:02d}.mcap.partial"
 
 
 @contextmanager

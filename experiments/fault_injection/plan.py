@@ -1,4 +1,4 @@
-"""Which faults a rehearsal raises, and when."""
+"""Which faults a rehearsal injects, and when."""
 
 import re
 from collections.abc import Sequence
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from acquisition.errors import SettingsError
+from acquisition.simulation import SimulationControl
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
-from experiments.rig.simulation import SimulationControl
 
 _PATTERN = re.compile(
     r"^(?P<name>[a-z0-9-]+)(@T(?P<trial>\d+)\+(?P<seconds>\d+(\.\d+)?)s?)?$"
@@ -49,39 +49,39 @@ class FaultPlan:
         """What it comes into."""
         return FaultTrigger.TARE if self.name in _AT_TARE else FaultTrigger.RECORDING
 
-    def text(self) -> str:
+    def to_text(self) -> str:
         """Return it as it is written on the command line."""
         return f"{self.name}@T{self.trial}+{self.seconds:g}s"
 
 
 @dataclass(slots=True)
-class Faults:
-    """The faults of a rehearsal, raised one by one as their moments come.
+class PlannedFaults:
+    """The faults of a rehearsal, injected one by one when they are due.
 
     Attributes:
         plans: those that have not come yet.
         devices: what fails in the simulated rig.
-        computer: what befalls the computer.
+        host_faults: what fails in the computer.
     """
 
     plans: list[FaultPlan]
     devices: SimulationControl
     host_faults: HostFaults
 
-    def raise_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
-        """Raise what is due `seconds` after the beginning of a moment in `trial`."""
+    def inject_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
+        """Inject what is due `seconds` after the beginning of a moment in `trial`."""
         for plan in [p for p in self.plans if (p.trial, p.moment) == (trial, moment)]:
             if seconds >= plan.seconds:
                 self.plans.remove(plan)
-                self._raise(plan)
+                self._inject(plan)
 
-    def raise_first(self) -> None:
-        """Raise those that come before the preflight."""
+    def inject_first(self) -> None:
+        """Inject those that come before the preflight."""
         for plan in [plan for plan in self.plans if plan.trial == 0]:
             self.plans.remove(plan)
-            self._raise(plan)
+            self._inject(plan)
 
-    def _raise(self, plan: FaultPlan) -> None:
+    def _inject(self, plan: FaultPlan) -> None:
         if plan.name in COMPUTER_FAULTS:
             self.host_faults.inject(plan.name, plan.trial)
         else:
@@ -112,8 +112,8 @@ def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
 
 def plan_faults(
     texts: Sequence[str], simulation: SimulationControl | None, host_faults: HostFaults
-) -> Faults | None:
-    """Return the faults of a rehearsal; those of the preflight are raised at once.
+) -> PlannedFaults | None:
+    """Return the faults of a rehearsal; those of the preflight are injected at once.
 
     Raises:
         SettingsError: as `parse_fault`.
@@ -121,6 +121,8 @@ def plan_faults(
     if simulation is None:
         return None
     known = (*simulation.fault_names, *COMPUTER_FAULTS)
-    faults = Faults([parse_fault(t, known) for t in texts], simulation, host_faults)
-    faults.raise_first()
+    faults = PlannedFaults(
+        [parse_fault(t, known) for t in texts], simulation, host_faults
+    )
+    faults.inject_first()
     return faults

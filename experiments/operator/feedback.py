@@ -45,7 +45,7 @@ class OperatorFeedback:
             self._speaker.close()
 
 
-def build_cues(settings: OperatorSection, console: Console) -> OperatorFeedback:
+def build_feedback(settings: OperatorSection, console: Console) -> OperatorFeedback:
     """Return the cues as [operator] of rig.toml wants them."""
     program = find_speech() if settings.speech else None
     speech = SpeechOutput(program) if program is not None else None

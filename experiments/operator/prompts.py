@@ -1,4 +1,4 @@
-"""What is asked for, and who answers without a person: keys and hand of a rehearsal."""
+"""Prompts, who answers them, and the operator of a rehearsal, who is no person."""
 
 from __future__ import annotations
 
@@ -6,17 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
-
-from experiments.rig.simulation import SimulationControl
-
-REJECT_REASONS = {
-    "1": "foot left the bed",
-    "2": "too fast",
-    "3": "touched the frame",
-    "4": "sensor",
-    "5": "other",
-}
-
 
 # The automatic operator touches so many points, waits so long for the foot to rest.
 TOUCHES, TOUCH_SECONDS, READY_SECONDS = 12, 9.0, 2.2
@@ -61,18 +50,18 @@ class PromptState:
 
 
 class OperatorInput(Protocol):
-    """Answers prompts with keys: space, k, r and a digit, q; and notes with a line."""
+    """Answers prompts with keys of `operator.keys`, and notes with a line."""
 
     @property
     def draft(self) -> str:
         """What has been typed of a line so far."""
         ...
 
-    def answer(self, asked: PromptState) -> str:
+    def answer(self, state: PromptState) -> str:
         """Return the keys pressed since the last call, "" for none."""
         ...
 
-    def line(self, asked: PromptState) -> str | None:
+    def line(self, state: PromptState) -> str | None:
         """Return the line that was typed, "" where it was given up, None before."""
         ...
 
@@ -85,36 +74,36 @@ class AutoOperator:
 
     draft = ""
 
-    def answer(self, asked: PromptState) -> str:
+    def answer(self, state: PromptState) -> str:
         """Return a key as soon as it makes sense."""
-        answer = _AUTOMATIC.get(asked.prompt)
-        return answer(asked) if answer is not None else ""
+        answer = _AUTOMATIC.get(state.prompt)
+        return answer(state) if answer is not None else ""
 
-    def line(self, asked: PromptState) -> str | None:
+    def line(self, state: PromptState) -> str | None:
         """Return nothing: it never has anything to note."""
-        del asked
+        del state
         return ""
 
 
-def _lift_key(asked: PromptState) -> str:
-    return "q" if asked.since > AUTO_PATIENCE else ""
+def _lift_key(state: PromptState) -> str:
+    return "q" if state.since > AUTO_PATIENCE else ""
 
 
-def _ready_key(asked: PromptState) -> str:
-    return " " if asked.since > READY_SECONDS else ""
+def _ready_key(state: PromptState) -> str:
+    return " " if state.since > READY_SECONDS else ""
 
 
-def _review_key(asked: PromptState) -> str:
-    if asked.is_complete:
+def _review_key(state: PromptState) -> str:
+    if state.is_complete:
         return "k"
-    return "r5" if asked.attempt < AUTO_ATTEMPTS else "q"
+    return "r5" if state.attempt < AUTO_ATTEMPTS else "q"
 
 
-def _touch_key(asked: PromptState) -> str:
+def _touch_key(state: PromptState) -> str:
     """Touch a dozen points, each until the foot is at rest."""
-    if asked.since < TOUCH_SECONDS:
+    if state.since < TOUCH_SECONDS:
         return ""
-    return " " if asked.trial <= TOUCHES else "d"
+    return " " if state.trial <= TOUCHES else "d"
 
 
 _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
@@ -127,37 +116,3 @@ _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.REVIEW: _review_key,
     Prompt.FOOT: lambda _: " ",
 }
-
-
-_ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
-
-
-class SimulatedHand:
-    """Moves the simulated hand and pendant as the prompts ask."""
-
-    def __init__(self, simulation: SimulationControl) -> None:
-        self._simulation = simulation
-        self._seen: tuple[Prompt, int, int] | None = None
-
-    def follow(self, asked: PromptState) -> None:
-        """Do what a person would do at this prompt; once per prompt."""
-        key = (asked.prompt, asked.trial, asked.attempt)
-        if key == self._seen or asked.prompt in _ASIDE:
-            return
-        self._seen = key
-        if asked.prompt is Prompt.SUPPORT:
-            self._simulation.lift()
-            self._simulation.pendant("activate")
-        elif asked.prompt is Prompt.LIFT:
-            self._simulation.lift()
-        elif asked.prompt is Prompt.CLEAR:
-            self._simulation.let_go()
-        elif asked.prompt is Prompt.TOUCH:
-            self._simulation.touch(asked.trial)
-        elif asked.prompt is Prompt.READY:
-            self._simulation.prepare(asked.trial + 1000 * (asked.attempt - 1))
-            self._simulation.put_down()
-        elif asked.prompt is Prompt.RECORDING:
-            self._simulation.push()
-        elif asked.prompt is Prompt.REVIEW:
-            self._simulation.rest()

@@ -7,13 +7,12 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.operator.prompts import REJECT_REASONS
+from experiments.operator.keys import STOP_KEYS, screen_keys
+from experiments.operator.prompts import Prompt
 
 _BARS = "▁▂▃▄▅▆▇█"
 _ABSURD = 1e9  # nothing a sensor or an encoder can mean
 _NARROW, _WIDE = 10, 40  # characters of a sparkline
-READY_KEYS = "[space] record   [n]ote   [v]iew last   [p]ause   [q]uit after this"
-NOTE_KEYS = "Type the note: Enter ends it, Esc gives it up."
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +78,7 @@ def recording_lines(view: RecordingView, width: int) -> list[str]:
         "   ".join(
             f"{name} {sparkline(values, bars)} {text}" for name, values, text in columns
         ),
-        "[space] stop early    Ctrl-C finish safely, twice = stop now",
+        f"{screen_keys(Prompt.RECORDING)}    {STOP_KEYS}",
     ]
 
 
@@ -103,12 +102,6 @@ def live_line(
         f"● REC {trial}  {seconds:4.1f} s  {displacement:.2f} of {travel:.2f} m  "
         f"F_n {F_n:.1f} N  F_t {F_t:.1f} N  v_t {v_t:.3f} m/s  late {late}"
     )
-
-
-def review_keys() -> str:
-    """Return the keys of the review; there is no default on purpose."""
-    reasons = "  ".join(f"{key} {why}" for key, why in REJECT_REASONS.items())
-    return f"[k]eep   [r]edo: {reasons}   [n]ote"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,26 +1,44 @@
-"""A scripted operator: one line of a file for every key worth mentioning."""
+"""Who answers the prompts: a person at the keyboard, a script, or nobody (auto)."""
 
+import sys
 from pathlib import Path
 
 from acquisition.errors import SettingsError
+from experiments.messages import CATALOGUE
+from experiments.operator.keys import REJECT_REASONS, Operand, script_keys
 from experiments.operator.prompts import (
     READY_SECONDS,
-    REJECT_REASONS,
     AutoOperator,
+    OperatorInput,
     Prompt,
     PromptState,
 )
+from experiments.operator.terminal import TerminalInput
 
-# word of a line: the key it presses
-_BEFORE = {"pause": "p", "note": "n", "view": "v", "last": "q"}  # between trials
-_AFTER = {"keep": "k", "quit": "q", "remark": "n", "redo": "r"}  # at the review
-_TOLD = frozenset({"note", "remark"})  # a text follows
-_KEYS = {Prompt.READY: _BEFORE, Prompt.REVIEW: _AFTER}
+_WORDS = script_keys(Prompt.READY) | script_keys(Prompt.REVIEW)
 _LARGEST = 1_000_000  # bytes; a script has a few hundred
 
 
+def choose_operator(script: str | None, *, is_fake: bool) -> OperatorInput:
+    """Return who answers: a script, `auto`, or the keyboard.
+
+    Raises:
+        SettingsError: a real session without a terminal, or a bad script.
+    """
+    stdin = sys.stdin
+    has_person = stdin is not None and stdin.isatty()
+    if script == "auto" or (script is None and is_fake and not has_person):
+        return AutoOperator()
+    if script is not None:
+        return ScriptedOperator(Path(script))
+    if stdin is None or not has_person:
+        message = CATALOGUE["nobody"]
+        raise SettingsError(message.what, hint=message.do)
+    return TerminalInput(stdin.fileno())
+
+
 class ScriptedOperator:
-    """Presses keys line by line, each at its own prompt; the rest like AutoKeys.
+    """Presses keys line by line, each at its own prompt; the rest like `AutoOperator`.
 
     At a review: `keep`, `redo REASON` (1-5), `remark TEXT` (a note on the trial),
     `quit`. Between trials, before the next one begins: `pause`, `note TEXT`, `view`,
@@ -40,21 +58,22 @@ class ScriptedOperator:
         self._lines = [_parse(path, number, words) for number, words in bare if words]
         self._text = ""
 
-    def answer(self, asked: PromptState) -> str:
-        """Return the key of the next line where it is its turn."""
-        keys = _KEYS.get(asked.prompt, {})
+    def answer(self, state: PromptState) -> str:
+        """Return the key of the next line where this is its prompt."""
+        keys = script_keys(state.prompt)
         word, rest = self._lines[0] if self._lines else ("", "")
         if word not in keys:
-            return self._auto.answer(asked)
-        if asked.prompt is Prompt.READY and asked.since <= READY_SECONDS:
+            return self._auto.answer(state)
+        if state.prompt is Prompt.READY and state.since <= READY_SECONDS:
             return ""
         self._lines.pop(0)
         self._text = rest
-        return keys[word] + (rest if word == "redo" else "")
+        entry = keys[word]
+        return entry.key + (rest if entry.operand is Operand.REASON else "")
 
-    def line(self, asked: PromptState) -> str | None:
+    def line(self, state: PromptState) -> str | None:
         """Return the text of the line that asked for the note."""
-        del asked
+        del state
         return self._text
 
 
@@ -72,14 +91,16 @@ def _read(path: Path) -> str:
 
 def _parse(path: Path, number: int, words: list[str]) -> tuple[str, str]:
     word, rest = words[0], " ".join(words[1:])
-    if word in _TOLD and rest:
-        return word, rest
-    if word == "redo" and rest in REJECT_REASONS:
-        return word, rest
-    if word in {**_BEFORE, **_AFTER} and word not in {"redo", *_TOLD} and not rest:
+    if word in _WORDS and _is_operand(_WORDS[word].operand, rest):
         return word, rest
     raise SettingsError(
         f"{path}, line {number}: {' '.join(words)!r} - expected keep, redo 1..5 or "
         "quit; remark TEXT; or between trials pause, note TEXT, view or last.",
         hint="Nothing was started.",
     )
+
+
+def _is_operand(operand: Operand, text: str) -> bool:
+    if operand is Operand.REASON:
+        return text in REJECT_REASONS
+    return bool(text) is (operand is Operand.TEXT)

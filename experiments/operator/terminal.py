@@ -10,13 +10,16 @@ import tty
 from types import TracebackType
 from typing import Self
 
-from experiments.operator.prompts import (
+from acquisition.clock import SystemClock
+from experiments.operator.keys import (
     REJECT_REASONS,
-    OperatorInput,
-    Prompt,
-    PromptState,
+    KeyAction,
+    awaits_reason,
+    key_action,
 )
+from experiments.operator.prompts import OperatorInput, Prompt, PromptState
 
+_POLL_NS = 50_000_000  # between two looks at the keyboard while no loop runs
 _AT_ONCE = 256  # bytes
 LONGEST_LINE = 500  # characters of a note
 _ESCAPE, _BACKSPACE = "\x1b", "\x7f\x08"
@@ -59,11 +62,21 @@ class Cbreak:
                 termios.tcsetattr(self._descriptor, termios.TCSADRAIN, before)
 
 
-def keyboard(keys: OperatorInput) -> contextlib.AbstractContextManager[object]:
-    """Return what switches the terminal over while `keys` come from it."""
-    if isinstance(keys, TerminalInput):
-        return Cbreak(keys.descriptor)
+def keyboard(operator: OperatorInput) -> contextlib.AbstractContextManager[object]:
+    """Return what switches the terminal over while `operator` types there."""
+    if isinstance(operator, TerminalInput):
+        return Cbreak(operator.descriptor)
     return contextlib.nullcontext()
+
+
+def wait_for_key(operator: OperatorInput, prompt: Prompt) -> KeyAction:
+    """Wait for a key of `prompt` while no loop runs; return what it does."""
+    clock = SystemClock()
+    state = PromptState(prompt, 0, 0, is_complete=False, since=0.0)
+    with keyboard(operator):
+        while (action := key_action(prompt, operator.answer(state))) is None:
+            clock.sleep_until(clock.now_ns() + _POLL_NS)
+        return action
 
 
 class TerminalInput:
@@ -86,25 +99,25 @@ class TerminalInput:
         self._is_rejecting = False
         self._prompt: Prompt | None = None
 
-    def answer(self, asked: PromptState) -> str:
+    def answer(self, state: PromptState) -> str:
         """Return the next key that was pressed, "" for none, q when all have gone.
 
         What was typed before the prompt came was not meant for it and is forgotten.
         """
-        self._hear(asked.prompt)
+        self._receive(state.prompt)
         while self._waiting:
-            found = self._take(self._next().lower(), asked.prompt)
+            found = self._take(self._next().lower(), state.prompt)
             if found:
                 return found
         return "q" if self._is_end else ""
 
-    def line(self, asked: PromptState) -> str | None:
+    def line(self, state: PromptState) -> str | None:
         """Return the line when Enter ends it, "" when Esc gives it up, None before.
 
         Backspace takes a character back. An arrow key, which begins like Esc, does
         nothing.
         """
-        self._hear(asked.prompt)
+        self._receive(state.prompt)
         while self._waiting:
             key = self._next()
             if key in "\r\n":
@@ -119,7 +132,7 @@ class TerminalInput:
                 self.draft += key
         return "" if self._is_end else None
 
-    def _hear(self, prompt: Prompt) -> None:
+    def _receive(self, prompt: Prompt) -> None:
         """Read what is there; what came before `prompt` is forgotten."""
         self._read()
         if prompt is not self._prompt:
@@ -155,7 +168,7 @@ class TerminalInput:
         if self._is_rejecting:
             self._is_rejecting = False
             return f"r{key}" if key in REJECT_REASONS else ""
-        if key == "r" and prompt is Prompt.REVIEW:
+        if awaits_reason(prompt, key):
             self._is_rejecting = True
             return ""
         return key if key.isprintable() else ""

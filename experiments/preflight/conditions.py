@@ -1,19 +1,28 @@
-"""Under which conditions a session was recorded, and whether they are the same now."""
+"""The conditions a session was recorded under, compared with those of now."""
 
 import hashlib
 from collections.abc import Mapping
-from typing import cast
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, TypeAdapter
 
 from acquisition.errors import SessionError
 from experiments.operator.console import WARNING, Console
 from experiments.rig.rig import Rig
 from experiments.session.store import SessionFolder, read_json, write_json
+from experiments.settings.matrix import TerrainRow
 from experiments.settings.origins import flatten
+from experiments.settings.rig import RigSettings
 
 FILE = "conditions.json"
+VERSION = 2  # of the file; 1 had no number
+FOOT = "terrain.foot"  # name of a condition
+_VERSION_KEY = "version"
+_GRAVITY, _NO_GRAVITY = "gravity calibration", "none"
 _SENSOR = ("model", "serial_number", "firmware", "filter")
-# What no recorded number depends on.
-_FREE = (
+# Settings that no recorded number depends on.
+_EXEMPT = (
     "rig.can.",
     "rig.loop.",
     "rig.operator.",
@@ -27,23 +36,33 @@ _FREE = (
 _SHOWN = 8  # differences that are listed
 
 
-def conditions_of(rig: Rig) -> dict[str, str]:
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What conditions.json of a session says.
+
+    Attributes:
+        version: of the file.
+        values: of the conditions by name.
+    """
+
+    version: int
+    values: Mapping[str, str]
+
+
+def rig_conditions(rig: Rig) -> dict[str, str]:
     """Return settings as calibrated, foot, terrain and gravity model by name."""
-    named = {
-        "rig": rig.settings.rig.model_dump(mode="json"),
-        "terrain": rig.row.model_dump(mode="json"),
-    }
-    found = {
-        name: str(value)
-        for name, value in flatten(named).items()
-        if not name.startswith(_FREE)
-    }
+    values = _texts(
+        {
+            "rig": rig.settings.rig.model_dump(mode="json"),
+            "terrain": rig.row.model_dump(mode="json"),
+        }
+    )
     digest = hashlib.sha256(rig.gravity_text.encode()).hexdigest()
-    return {**found, "gravity calibration": digest if rig.gravity_text else "none"}
+    return {**values, _GRAVITY: digest if rig.gravity_text else _NO_GRAVITY}
 
 
 def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
-    """Return which sensor it is, from what the preflight found."""
+    """Return which sensor it is, from what the preflight read."""
     return {
         f"sensor {key}": devices[f"ft_sensor:{key}"]
         for key in _SENSOR
@@ -51,43 +70,98 @@ def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def write_conditions(folder: SessionFolder, found: Mapping[str, str]) -> None:
-    """Keep the conditions of a new session.
+def default_conditions() -> dict[str, str]:
+    """Return the conditions of settings that are left out, by name.
+
+    A setting that a session of an older version does not have had this value then.
+    """
+    defaults = {
+        "rig": _defaults(RigSettings),
+        "terrain": _defaults(TerrainRow),
+    }
+    return {**_texts(defaults), _GRAVITY: _NO_GRAVITY}
+
+
+def write_conditions(folder: SessionFolder, values: Mapping[str, str]) -> None:
+    """Write the conditions of a new session.
 
     Raises:
         TrialFileError: the disk is full or gone.
     """
-    write_json(folder.path / FILE, found)
+    write_json(folder.path / FILE, {_VERSION_KEY: VERSION, **values})
 
 
-def differences(then: Mapping[str, object], now: Mapping[str, str]) -> list[str]:
-    """Return in words what is not as it was, of what is known now."""
+def read_conditions(folder: SessionFolder) -> Conditions:
+    """Return the conditions of a session, none where the file is damaged."""
+    entries = read_json(folder.path / FILE)
+    version = entries.pop(_VERSION_KEY, 1)
+    values = {name: str(value) for name, value in entries.items()}
+    return Conditions(version if isinstance(version, int) else 1, values)
+
+
+def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
+    """Return in words which conditions of `now` are not as they were.
+
+    A condition that was not written then had its default value. One that is not known
+    any more is left out: no setting can bring it back.
+    """
+    before = {**default_conditions(), **then}
     return [
-        f"{name} was {then.get(name, 'not there')}, is {value}"
+        f"{name} was {before.get(name, 'not there')}, is {value}"
         for name, value in now.items()
-        if str(then.get(name, "")) != value
+        if before.get(name, "") != value
     ]
 
 
 def check_conditions(
     folder: SessionFolder, now: Mapping[str, str], console: Console, *, is_forced: bool
 ) -> list[str]:
-    """Hold `now` against the conditions of the session; return what differs.
+    """Compare `now` with the conditions of the session; return what differs.
 
     Raises:
-        SessionError: something differs and it is not forced.
+        SessionError: something differs and it is not forced, or the file was written
+            by a newer version of the program.
     """
-    then = cast("dict[str, object]", read_json(folder.path / FILE))
-    found = differences(then, now)
-    for text in found[:_SHOWN]:
-        console.say(f"{WARNING} {text}")
-    if len(found) > _SHOWN:
-        console.say(f"{WARNING} and {len(found) - _SHOWN} more")
-    if found and not is_forced:
-        count = "1 condition is" if len(found) == 1 else f"{len(found)} conditions are"
+    then = read_conditions(folder)
+    if then.version > VERSION:
         raise SessionError(
-            f"{count} not as in {folder.id}: {found[0]}.",
+            f"{folder.path / FILE} is of version {then.version}, known is {VERSION}.",
+            hint="Use the newer Traction. Nothing was recorded.",
+        )
+    changed = differences(then.values, now)
+    for text in changed[:_SHOWN]:
+        console.say(f"{WARNING} {text}")
+    if len(changed) > _SHOWN:
+        console.say(f"{WARNING} and {len(changed) - _SHOWN} more")
+    if changed and not is_forced:
+        count = (
+            "1 condition is" if len(changed) == 1 else f"{len(changed)} conditions are"
+        )
+        raise SessionError(
+            f"{count} not as in {folder.id}: {changed[0]}.",
             hint="Restore them, or add --force to record all the same. Nothing was "
             "recorded.",
         )
-    return found
+    return changed
+
+
+def _texts(tables: Mapping[str, object]) -> dict[str, str]:
+    """Return the values of tables as text by dotted name, without exempt ones."""
+    return {
+        name: str(value)
+        for name, value in flatten(tables).items()
+        if not name.startswith(_EXEMPT)
+    }
+
+
+def _defaults(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the defaults of a model's fields, nested; required fields are left out."""
+    defaults: dict[str, Any] = {}
+    for name, field in model.model_fields.items():
+        kind: Any = field.annotation
+        if not field.is_required():
+            value: Any = field.get_default(call_default_factory=True)
+            defaults[name] = TypeAdapter[Any](kind).dump_python(value, mode="json")
+        elif isinstance(kind, type) and issubclass(kind, BaseModel):
+            defaults[name] = _defaults(kind)
+    return defaults

@@ -1,63 +1,70 @@
-"""Is the foot mounted that the terrain needs? A person says so when it changes."""
+"""Is the foot mounted that the terrain needs? A person confirms every change."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.errors import SessionError
 from experiments.messages import CATALOGUE
 from experiments.operator.console import GOOD, WARNING, Console
+from experiments.operator.keys import KeyAction
 from experiments.operator.prompts import OperatorInput, Prompt
-from experiments.preflight.conditions import FILE
+from experiments.operator.terminal import wait_for_key
+from experiments.preflight.conditions import FOOT, read_conditions
 from experiments.preflight.host_checks import CheckResult
-from experiments.run.resume_prompt import ask
-from experiments.session.store import SessionFolder, list_sessions, read_json
+from experiments.session.store import SessionFolder, list_sessions
 from experiments.settings.matrix import TerrainRow
 
-_FOOT = "terrain.foot"  # in the conditions of a session
+
+@dataclass(frozen=True, slots=True)
+class MountedFoot:
+    """The foot of the session that was open last.
+
+    Attributes:
+        folder: of the session.
+        foot: "tread" or "bare".
+    """
+
+    folder: SessionFolder
+    foot: str
 
 
-def foot_before(data: Path, *, is_simulated: bool) -> tuple[SessionFolder, str] | None:
-    """Return the session that was open last and its foot, None before the first.
+def last_foot(data: Path, *, is_simulated: bool) -> MountedFoot | None:
+    """Return the foot of the session that was open last, None before the first.
 
     Args:
         data: the data folder.
-        is_simulated: which kind of sessions; the others say nothing about this rig.
+        is_simulated: kind of sessions; the other kind has another rig.
     """
-    found: list[tuple[int, SessionFolder, str]] = []
+    mounted: list[tuple[int, str, MountedFoot]] = []
     for folder in list_sessions(data):
         journal = folder.path / "events.jsonl"
-        foot = read_json(folder.path / FILE).get(_FOOT)
-        if (
-            folder.is_simulated is is_simulated
-            and isinstance(foot, str)
-            and journal.is_file()
-        ):
-            found.append((journal.stat().st_mtime_ns, folder, foot))
-    if not found:
-        return None
-    _, folder, foot = max(found, key=lambda entry: (entry[0], entry[1].path.name))
-    return folder, foot
+        foot = read_conditions(folder).values.get(FOOT)
+        if folder.is_simulated is is_simulated and foot and journal.is_file():
+            order = journal.stat().st_mtime_ns, folder.path.name
+            mounted.append((*order, MountedFoot(folder, foot)))
+    return max(mounted, key=lambda entry: entry[:2])[2] if mounted else None
 
 
 def confirm_foot(
     row: TerrainRow,
-    before: tuple[SessionFolder, str] | None,
-    keys: OperatorInput,
+    before: MountedFoot | None,
+    operator: OperatorInput,
     console: Console,
 ) -> CheckResult:
-    """Return the line about the foot for the page; ask when it is another one.
+    """Return the line about the foot for the page; ask when it has changed.
 
     Raises:
         SessionError: nobody confirmed it.
     """
-    if before is None or before[1] == row.foot:
+    if before is None or before.foot == row.foot:
         return CheckResult(GOOD, "foot", row.foot)
-    folder, foot = before
+    session = before.folder.id
     message = CATALOGUE["foot-changed"]
-    facts = {"session": folder.id, "before": foot, "terrain": row.name}
-    facts["foot"] = row.foot
-    what = message.what.format_map(facts)
-    console.say(f"{WARNING} {what} {message.do.format_map(facts)}")
-    if ask(keys, Prompt.FOOT, {" ", "q"}) == "q":
+    details = {"session": session, "before": before.foot, "terrain": row.name}
+    details["foot"] = row.foot
+    what = message.what.format_map(details)
+    console.say(f"{WARNING} {what} {message.do.format_map(details)}")
+    if wait_for_key(operator, Prompt.FOOT) is KeyAction.QUIT:
         raise SessionError(what, hint="Nothing was started.")
-    text = f"{row.foot}, mounted since {folder.id} ({foot}), as confirmed"
+    text = f"{row.foot}, mounted since {session} ({before.foot}), as confirmed"
     return CheckResult(GOOD, "foot", text)

@@ -1,6 +1,7 @@
 """What the preflight says of the computer and of the running force sensor."""
 
-from collections.abc import Mapping
+import shutil
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +15,14 @@ from ft_sensor.serial_line.sensor import BURSTY
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
 NOISY = 0.5  # N, several times what a quiet sensor shows
+
+
+DiskProbe = Callable[[Path], int]  # a folder in, free bytes there out
+
+
+def free_bytes(folder: Path) -> int:
+    """Return how much room is left where `folder` is [bytes]."""
+    return shutil.disk_usage(folder).free
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,10 +19,12 @@ from experiments.messages import preflight_error
 from experiments.operator.console import BAD, GOOD, WARNING, Console
 from experiments.preflight.host_checks import (
     CheckResult,
+    DiskProbe,
     check_code,
     check_governor,
     check_stream,
     check_wrenches,
+    free_bytes,
     reach_words,
 )
 from experiments.rig.backend import EXCHANGE_CYCLES
@@ -40,24 +42,14 @@ SESSION_GB = 0.9
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
-    """One line of the page: mark, name, what was found."""
-
-    mark: str
-    name: str
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Preflight:
     """The page, and what the devices said about themselves."""
 
-    checks: tuple[Check, ...]
+    checks: tuple[CheckResult, ...]
     devices: dict[str, str]
 
-    def after(self, finding: CheckResult) -> "Preflight":
-        """Return the page with what was found before it."""
-        first = Check(finding.mark, finding.name, finding.text)
+    def after(self, first: CheckResult) -> "Preflight":
+        """Return the page with the result of a check before it."""
         return replace(self, checks=(first, *self.checks))
 
     def as_dict(self) -> dict[str, object]:
@@ -78,30 +70,41 @@ def connect_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -
 
 
 def run_preflight(
-    rig: Rig, data: Path, console: Console, seconds: float = LOOP_TEST
+    rig: Rig,
+    data: Path,
+    console: Console,
+    seconds: float = LOOP_TEST,
+    probe: DiskProbe = free_bytes,
 ) -> Preflight:
     """Check configuration, arm, sensor, loop and disk; print one line each.
 
-    The loop runs afterwards, the arm idle. `seconds`: how long it is tested.
+    The loop runs afterwards, the arm idle.
+
+    Args:
+        rig: with its bus open.
+        data: the data folder.
+        console: where the page is printed.
+        seconds: how long the loop is tested [s].
+        probe: tells how much room is left on the disk.
 
     Raises:
         PreflightError: a check failed.
     """
-    checks: list[Check] = []
+    checks: list[CheckResult] = []
 
     def add(mark: str, name: str, text: str) -> None:
-        checks.append(Check(mark, name, text))
+        checks.append(CheckResult(mark, name, text))
         console.check(mark, name, text)
 
-    def note(finding: CheckResult) -> None:
-        add(finding.mark, finding.name, finding.text)
+    def add_result(result: CheckResult) -> None:
+        add(result.mark, result.name, result.text)
 
     weight = gravity_words(rig.settings.rig, rig.gravity_text, rig.row.foot)
     add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, gravity {weight}")
-    note(check_code(provenance.collect()))
+    add_result(check_code(provenance.collect()))
     if not rig.is_stepped:
-        note(check_governor())
-    check_disk(rig, data, add)
+        add_result(check_governor())
+    check_disk(rig, data, add, probe)
     _check_arm(rig, add)
     sensor = _check_sensor(rig, add)
     _check_exchange(rig, add)
@@ -110,8 +113,8 @@ def run_preflight(
     rig.backend.begin()
     _check_loop(rig, seconds, add)
     stale_ms = rig.settings.rig.limits.ft_stale_ms
-    note(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
-    _check_stream(rig, note)
+    add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
+    _check_stream(rig, add_result)
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
     return Preflight(tuple(checks), {**devices, **grants})
 
@@ -159,14 +162,14 @@ def _lever(rig: Rig) -> float:
     return float(tool.sole[2] - tool.sensor_height)
 
 
-def _check_stream(rig: Rig, note: Callable[[CheckResult], None]) -> None:
+def _check_stream(rig: Rig, add_result: Callable[[CheckResult], None]) -> None:
     """Grade what became of the sensor's stream while the loop was tested."""
     facts = rig.backend.sensor_facts()
-    found = check_stream(facts)
-    if found is None:
+    result = check_stream(facts)
+    if result is None:
         return
-    note(found)
-    if found.mark == BAD:
+    add_result(result)
+    if result.mark == BAD:
         raise preflight_error("ft-lost", why=facts["trouble"].rstrip("."))
 
 
@@ -237,7 +240,7 @@ def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     add(WARNING if is_late else GOOD, f"loop {seconds:g} s", text)
 
 
-def check_disk(rig: Rig, data: Path, add: Add) -> None:
+def check_disk(rig: Rig, data: Path, add: Add, probe: DiskProbe = free_bytes) -> None:
     """Grade the free space below `data`.
 
     Raises:
@@ -246,7 +249,7 @@ def check_disk(rig: Rig, data: Path, add: Add) -> None:
     folder = data
     while not folder.exists():
         folder = folder.parent
-    free = rig.free_bytes(folder) / 1e9
+    free = probe(folder) / 1e9
     limit = rig.settings.rig.limits.free_disk_gb
     if free < max(limit, SESSION_GB):
         add(BAD, "disk", f"{free:.1f} GB free")

@@ -1,9 +1,7 @@
-"""What the console asks of those who work a rig, whoever they are."""
+"""The seam between the console and the devices, in this process or in others."""
 
 from collections.abc import Sequence
 from typing import Protocol
-
-from pydantic import TypeAdapter
 
 from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.realtime import Grant
@@ -13,15 +11,14 @@ from acquisition.recording.recorder import TrialRecording
 from wam.driver.arm import WamArm
 from wam.driver.startup import ArmInfo
 
-ARM_INFO = TypeAdapter(ArmInfo)
 EXCHANGE_CYCLES = 100
 
 
 class RigBackend(Protocol):
-    """What the console asks of those who work the rig.
+    """Arm, sensor, loop and recorder as the console uses them.
 
     Attributes:
-        desk: the console's side of the loop.
+        loop_client: the console's side of the loop.
     """
 
     loop_client: LoopClient

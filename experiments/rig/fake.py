@@ -9,6 +9,7 @@ from acquisition.clock import Clock, SystemClock
 from acquisition.devices import WrenchSensor
 from acquisition.errors import SettingsError
 from acquisition.ipc.layout import SharedLayout
+from acquisition.simulation import SimulationControl
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
     LoopConfig,
@@ -19,7 +20,6 @@ from experiments.rig.build import (
     terrain_frame,
 )
 from experiments.rig.inline import InProcessBackend
-from experiments.rig.simulation import SimulationControl
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings

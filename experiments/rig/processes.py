@@ -1,10 +1,8 @@
-"""Who works a rig with one process for each job."""
+"""The rig's backend with one process for each job."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
-
-from pydantic import TypeAdapter
 
 from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.realtime import Grant, choose_cores
@@ -13,16 +11,18 @@ from acquisition.errors import TractionError
 from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.loop_client import LoopClient
+from acquisition.ipc.rpc import make_proxy
 from acquisition.recording.recorder_process import RemoteRecorder
-from experiments.rig.backend import ARM_INFO
+from acquisition.simulation import DeviceServer
+from experiments.rig.services import ArmService, SensorService
 from wam.driver.startup import ArmInfo
 
-_GRANTS = TypeAdapter(list[Grant])
+_CONTROL, _READER = "control", "sensor reader"  # names of processes
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerConfigs:
-    """What the processes are told at their start.
+    """Configurations of the processes.
 
     Attributes:
         control: settings of the process that has the arm.
@@ -47,7 +47,7 @@ class MultiProcessBackend:
         self._shared = shared
         self._clock = clock
         self._children: dict[str, Child] = {}
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         loop_core, other_core = choose_cores()
         self._jobs = jobs
         self.fake: Child | None = None
@@ -55,27 +55,30 @@ class MultiProcessBackend:
             self.fake = self._spawn(
                 "fake rig", "fakes.serving.rig_process:main", jobs.fake
             )
-            devices = self.fake.ask("hello")
-            jobs.control["can"] = devices["can"]
+            served = make_proxy(DeviceServer, self.fake.call).devices()
+            jobs.control["can"] = {
+                "interface": served.interface,
+                "channel": served.channel,
+                "bitrate": served.bitrate,
+            }
             if jobs.reader is not None:
-                jobs.reader["port"] = devices["port"]
+                jobs.reader["port"] = served.port
         jobs.control["core"] = loop_core
-        self._control = self._spawn(
-            "control", "experiments.rig.workers:control", jobs.control
-        )
+        self._control = self._spawn_control()
+        self._arm = make_proxy(ArmService, self._control.call)
         recorder = self._spawn(
             "recorder",
             "acquisition.recording.recorder_process:main",
             {"core": other_core},
         )
-        self._reader: Child | None = None
+        self._sensor: SensorService | None = None
         if jobs.reader is not None:
             jobs.reader["core"] = other_core
-            self._reader = self._spawn(
-                "sensor reader", "experiments.rig.workers:reader", jobs.reader
-            )
+            target = "experiments.rig.workers:reader"
+            reader = self._spawn(_READER, target, jobs.reader)
+            self._sensor = make_proxy(SensorService, reader.call)
         self.recorder = RemoteRecorder(recorder, shared)
-        self.loop_client = LoopClient(shared, clock, self._pass)
+        self.loop_client = LoopClient(shared, clock, self._advance)
 
     @property
     def recorder_pid(self) -> int:
@@ -84,40 +87,40 @@ class MultiProcessBackend:
 
     def start_arm(self) -> ArmInfo:
         """Find, wake and question the arm; raises as `WamArm.start`."""
-        return ARM_INFO.validate_python(self._control.ask("start"))
+        return self._arm.start_arm()
 
     def measure_exchange(self) -> list[int]:
         """Ask 100 times for the positions, without torque."""
-        return self._control.ask("exchange")
+        return self._arm.measure_exchange()
 
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""
-        return (self._reader or self._control).ask("open")
+        return (self._sensor or self._arm).open_sensor()
 
     def sensor_facts(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text.
 
         Nothing for a sensor on the arm's bus, whose process has a loop to run.
         """
-        return self._reader.ask("stream") if self._reader is not None else {}
+        return self._sensor.sensor_facts() if self._sensor is not None else {}
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
-        self._control.ask("define", list(q))
+        self._arm.define_position(list(q))
 
     def begin(self) -> None:
         """Let the loop run from here on."""
         self.loop_client.beat()
-        self._control.ask("begin")
+        self._arm.begin()
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return what the kernel granted to each process."""
-        asked = [self._control, *([self._reader] if self._reader else [])]
-        return {
-            child.name: _GRANTS.validate_python(child.ask("grants"))
-            for child in asked
-            if not (child is self._control and self.loop_client.loop.is_running)
-        }
+        grants: dict[str, list[Grant]] = {}
+        if not self.loop_client.loop.is_running:
+            grants[_CONTROL] = self._arm.grants()
+        if self._sensor is not None:
+            grants[_READER] = self._sensor.grants()
+        return grants
 
     @property
     def bus_path(self) -> str:
@@ -140,13 +143,13 @@ class MultiProcessBackend:
             return self._rescue()
         if self.loop_client.loop.is_running:
             return self.loop_client.idle()
-        return bool(self._control.ask("idle"))
+        return self._arm.idle()
 
     def safety_mode(self) -> SafetyMode:
         """Return what the safety module said last."""
         if self.loop_client.loop.is_running or not self._control.is_alive:
             return self.loop_client.status.safety
-        return SafetyMode(self._control.ask("mode"))
+        return self._arm.safety_mode()
 
     def close(self) -> None:
         """Brake the arm, let the processes end, the simulated rig last."""
@@ -164,27 +167,30 @@ class MultiProcessBackend:
             self._children.clear()
             self._shared.close()
 
+    def _spawn_control(self) -> Child:
+        target = "experiments.rig.workers:control"
+        return self._spawn(_CONTROL, target, self._jobs.control)
+
     def _spawn(self, name: str, target: str, settings: dict[str, Any]) -> Child:
         child = Child(name, target, settings, self._shared)
         self._children[name] = child
         return child
 
-    def _pass(self, cycles: int) -> None:
+    def _advance(self, cycles: int) -> None:
         """Let time pass; raise once for every process that has died meanwhile."""
         self._clock.sleep_until(self._clock.now_ns() + cycles * PERIOD_NS)
         for name, child in self._children.items():
-            if name not in self._told and not child.is_alive:
-                self._told.add(name)
+            if name not in self._reported and not child.is_alive:
+                self._reported.add(name)
                 raise ProcessLostError(name, child.how_it_ended())
         self.recorder.check()
 
     def _rescue(self) -> bool:
         """Brake the arm of a dead process through a new one."""
-        self._children.pop("control").stop()
-        self._control = self._spawn(
-            "control", "experiments.rig.workers:control", self._jobs.control
-        )
+        self._children.pop(_CONTROL).stop()
+        self._control = self._spawn_control()
+        self._arm = make_proxy(ArmService, self._control.call)
         try:
-            return bool(self._control.ask("idle"))
+            return self._arm.idle()
         except TractionError:
             return False

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.ipc.layout import SharedLayout
+from acquisition.simulation import SimulationControl
 from experiments.arguments import FRICTION
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
@@ -21,18 +19,13 @@ from experiments.rig.build import (
 from experiments.rig.fake import SimulatedRig, stepped
 from experiments.rig.gravity import build_law_model, read_gravity
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
-from experiments.rig.simulation import RemoteSimulation, SimulationControl
+from experiments.rig.simulation import connect_simulation
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from ft_sensor.payload import Payload, TerrainFrame, payload_of
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
-
-
-def free_bytes(folder: Path) -> int:
-    """Return how much room is left where `folder` is [bytes]."""
-    return shutil.disk_usage(folder).free
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +62,6 @@ class Rig:
         gravity_text: the gravity calibration in use; empty for none.
         rehearsal: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
-        free_bytes: tells how much room is left where a folder is.
     """
 
     clock: Clock
@@ -84,7 +76,6 @@ class Rig:
     gravity_text: str
     simulation: SimulationControl | None
     is_stepped: bool
-    free_bytes: Callable[[Path], int] = free_bytes
 
     @property
     def is_simulated(self) -> bool:
@@ -124,7 +115,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
             _jobs(settings, row, gravity_text, facts), shared, clock
         )
         if backend.fake is not None:
-            simulation = RemoteSimulation(backend.fake)
+            simulation = connect_simulation(backend.fake)
     payload = payload_of(tool)
     return Rig(
         clock=clock,

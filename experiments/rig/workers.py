@@ -1,26 +1,26 @@
-"""What the processes beside the console do: one has the arm, one the sensor."""
+"""The processes beside the console: one drives the arm, one reads the sensor."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import signal
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import RealtimeRequest, request
-from acquisition.devices import WrenchSensor
+from acquisition.control_loop.realtime import Grant, RealtimeRequest, request
+from acquisition.devices import SafetyMode, WrenchSensor
 from acquisition.errors import TractionError
+from acquisition.ipc.channel import ChannelClosedError
 from acquisition.ipc.child import ChildContext, name_process
 from acquisition.ipc.layout import ProcessRole
 from acquisition.ipc.loop_server import LoopServer
-from acquisition.ipc.rpc import ChannelClosedError
+from acquisition.ipc.rpc import RpcServer, bind
 from acquisition.ipc.shared_sensor import SharedSensor, publish
-from experiments.rig.backend import ARM_INFO, measure_exchange
+from experiments.rig.backend import measure_exchange
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
@@ -30,6 +30,7 @@ from experiments.rig.build import (
     open_bus_sensor,
 )
 from experiments.rig.gravity import build_law_model
+from experiments.rig.services import ArmService, SensorService
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import open_port
@@ -37,6 +38,7 @@ from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_facts
 from ft_sensor.serial_line.sensor import SerialSensor
 from wam.bus.link import CanLink, open_bus
 from wam.driver.arm import WamArm
+from wam.driver.startup import ArmInfo
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 
@@ -45,18 +47,18 @@ READER_PRIORITY = 60
 READ_NS = 20_000_000  # the reader shows being alive this often
 
 
-def control(station: ChildContext) -> None:
+def control(context: ChildContext) -> None:
     """Drive the arm: answer the console, then run the loop until it says so."""
     name_process("traction-control")
-    ControlWorker(station).serve()
+    ControlWorker(context).serve()
 
 
 class ControlWorker:
-    """The process that has the arm; one thread."""
+    """The process that drives the arm, one thread; implements `ArmService`."""
 
-    def __init__(self, station: ChildContext) -> None:
-        settings = station.settings
-        self._station = station
+    def __init__(self, context: ChildContext) -> None:
+        settings = context.settings
+        self._context = context
         self._rig = RigSettings.model_validate(settings["rig"])
         self._clock = SystemClock(round(self._rig.loop.spin_us * 1e3))
         self._row = TerrainRow.model_validate(settings["row"])
@@ -73,7 +75,7 @@ class ControlWorker:
         self._constants = constants
         self._arm: WamArm | None = None
         self._link: CanLink | None = None
-        self._sensor: WrenchSensor = SharedSensor(station.shared.wrenches)
+        self._sensor: WrenchSensor = SharedSensor(context.shared.wrenches)
         self._loop_server: LoopServer | None = None
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
@@ -82,21 +84,10 @@ class ControlWorker:
 
     def serve(self) -> None:
         """Answer until the console hangs up; the arm is braked then."""
-        handlers: dict[str, Callable[[Any], Any]] = {
-            "start": lambda _: ARM_INFO.dump_python(
-                self._opened().start(), mode="json"
-            ),
-            "exchange": lambda _: measure_exchange(self._opened(), self._clock),
-            "define": lambda q: self._opened().define_position(np.array(q)),
-            "begin": lambda _: self._prepare(self._opened()),
-            "idle": lambda _: self._opened().idle(),
-            "mode": lambda _: int(self._opened().safety_mode()),
-            "open": lambda _: self._open_sensor(),
-            "grants": lambda _: [grant.as_dict() for grant in self._grants],
-        }
+        server = RpcServer(bind(ArmService, self))
         try:
             while not self._is_orphaned:
-                self._station.channel.answer(handlers)
+                server.answer(self._context.channel)
                 if self._loop_server is not None:
                     self._run(self._loop_server)
                     self._loop_server = None
@@ -106,8 +97,32 @@ class ControlWorker:
             if self._arm is not None:
                 self._arm.close()
 
-    def _open_sensor(self) -> dict[str, str]:
-        """Open a wrist sensor on the arm's bus."""
+    def start_arm(self) -> ArmInfo:
+        """Discover, wake and query the arm; raises as `WamArm.start`."""
+        return self._opened().start()
+
+    def measure_exchange(self) -> list[int]:
+        """Return how long 100 exchanges took [ns]."""
+        return measure_exchange(self._opened(), self._clock)
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Set the joint positions to `q` [rad]; see `WamArm`."""
+        self._opened().define_position(np.array(q))
+
+    def idle(self) -> bool:
+        """Brake the arm; return whether that is confirmed."""
+        return self._opened().idle()
+
+    def safety_mode(self) -> SafetyMode:
+        """Return the mode that the safety module reported last."""
+        return self._opened().safety_mode()
+
+    def grants(self) -> list[Grant]:
+        """Return what the kernel granted."""
+        return self._grants
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open a wrist sensor on the arm's bus; return its description."""
         arm = self._opened()
         assert self._link is not None
         self._sensor = open_bus_sensor(arm, self._link, self._clock)
@@ -116,15 +131,17 @@ class ControlWorker:
     def _opened(self) -> WamArm:
         """Return the arm, its bus open; raises LinkError."""
         if self._arm is None:
-            can = self._station.settings["can"]
+            can = self._context.settings["can"]
             link = self._link = CanLink(
                 open_bus(can["interface"], can["channel"], can["bitrate"])
             )
-            shared = self._station.shared
+            shared = self._context.shared
             self._arm = build_arm(self._rig, self._constants, link, shared, self._clock)
         return self._arm
 
-    def _prepare(self, arm: WamArm) -> None:
+    def begin(self) -> None:
+        """Run the loop once this call is answered."""
+        arm = self._opened()
         parts = LoopConfig(
             rig=self._rig,
             row=self._row,
@@ -132,7 +149,7 @@ class ControlWorker:
             law_model=self._law_model,
             arm=arm,
             sensor=self._sensor,
-            shared=self._station.shared,
+            shared=self._context.shared,
             clock=self._clock,
             is_simulated=self._is_simulated,
             ring=self._ring_bell,
@@ -141,7 +158,7 @@ class ControlWorker:
 
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, the arm is braked."""
-        self._station.shared.memory.touch()
+        self._context.shared.memory.touch()
         loop = Loop(loop_server, self._clock)
         loop_server.stats = loop.stats
         try:
@@ -154,7 +171,7 @@ class ControlWorker:
 
     def _ring_bell(self) -> None:
         """Ring the bell of the console's terminal, if it has one."""
-        path = self._station.settings.get("terminal")
+        path = self._context.settings.get("terminal")
         if not path:
             return
         with contextlib.suppress(OSError):
@@ -166,60 +183,61 @@ class ControlWorker:
         self._is_orphaned = True
 
 
-def reader(station: ChildContext) -> None:
-    """Read a serial wrist sensor and put every sample onto the board."""
+def reader(context: ChildContext) -> None:
+    """Read a serial wrist sensor and put every sample into the shared memory."""
     name_process("traction-reader")
-    SensorWorker(station).serve()
+    SensorWorker(context).serve()
 
 
 class SensorWorker:
-    """The process that has the sensor's port."""
+    """The process that reads the sensor's port; implements `SensorService`."""
 
-    def __init__(self, station: ChildContext) -> None:
-        self._station = station
+    def __init__(self, context: ChildContext) -> None:
+        self._context = context
         self._clock = SystemClock()
         self._reconnecting = ReconnectingSensor(self._connect, self._clock)
         self._is_open = False
         self._grants = request(
-            RealtimeRequest(READER_PRIORITY, station.settings.get("core"))
+            RealtimeRequest(READER_PRIORITY, context.settings.get("core"))
         )
 
     def serve(self) -> None:
         """Answer the console and read what comes until it hangs up."""
-        channel = self._station.channel
-        handlers: dict[str, Callable[[Any], Any]] = {
-            "open": lambda _: self._open(),
-            "stream": lambda _: self._stream(),
-            "grants": lambda _: [grant.as_dict() for grant in self._grants],
-        }
+        channel = self._context.channel
+        server = RpcServer(bind(SensorService, self))
         try:
             while True:
                 if not self._is_open or channel.is_readable():
-                    channel.answer(handlers)
+                    server.answer(channel)
                 else:
                     self._read()
         except ChannelClosedError:
             self._reconnecting.close()
 
-    def _open(self) -> dict[str, str]:
+    def open_sensor(self) -> dict[str, str]:
+        """Open the sensor; return its description."""
         facts = self._reconnecting.open()
         self._is_open = True
         return facts
 
     def _connect(self) -> SerialSensor:
-        settings = self._station.settings
+        settings = self._context.settings
         rig = RigSettings.model_validate(settings["rig"])
         port = open_port(settings["port"], rig.ft_sensor.baudrate).port
         is_simulated = bool(settings["is_simulated"])
         return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
 
-    def _stream(self) -> dict[str, str]:
-        """Return what became of the stream, as text."""
+    def sensor_facts(self) -> dict[str, str]:
+        """Return the statistics of the stream, as text."""
         return stream_facts(self._reconnecting)
+
+    def grants(self) -> list[Grant]:
+        """Return what the kernel granted."""
+        return self._grants
 
     def _read(self) -> None:
         """Publish what arrives within 20 ms; what is lost is looked for."""
-        clock, shared = self._clock, self._station.shared
+        clock, shared = self._clock, self._context.shared
         deadline_ns = clock.now_ns() + READ_NS
         if self._reconnecting.sensor is None:
             clock.sleep_until(deadline_ns)

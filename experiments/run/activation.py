@@ -17,13 +17,13 @@ def activate(console_loop: ConsoleLoop) -> None:
     Raises:
         PreflightError: no torques can be made ready, or the arm was not activated
             within two minutes.
-        StopAskedError, FaultedError: as `ConsoleLoop.tick`.
+        StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
     """
-    control, clock = console_loop.control, console_loop.rig.clock
+    control, clock = console_loop.loop_client, console_loop.rig.clock
     control.request(ArmState.HOLD)
     control.advance(_READY_SECONDS)
     _require_torques(console_loop)
-    console_loop.company.console.say(
+    console_loop.console.say(
         "Press Shift-activate on the pendant, support the arm, then [space]."
     )
     is_ready = False
@@ -41,7 +41,7 @@ def _require_torques(console_loop: ConsoleLoop) -> None:
 
     Hold begins with a complete reading; without one no torque would be there.
     """
-    control = console_loop.control
+    control = console_loop.loop_client
     loop = control.loop
     if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
         return  # ready, or the next tick tells why not

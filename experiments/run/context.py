@@ -1,119 +1,162 @@
-"""One opening of a session as far as it has come: who takes part, what was said."""
+"""What the parts of a session's flow share: rig, operator, journal, progress."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from acquisition.control_loop.faults import GuardVerdict
 from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.messages import FaultContext, fault_text
-from experiments.operator.feedback import OperatorFeedback
+from experiments.operator.console import Console
+from experiments.operator.feedback import OperatorFeedback, build_feedback
+from experiments.operator.prompts import OperatorInput
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
-from experiments.run.participants import ArmFaultError
+from experiments.run.stop import ArmFaultError, StopFlag
 from experiments.session.journal import Journal
 from experiments.session.states import Event
+from experiments.session.trial_name import TrialName
 from experiments.trial.files import TrialArchive
-from experiments.trial.header import SessionFacts, TrialName
+from experiments.trial.header import SessionMetadata
 
 
 @dataclass(slots=True)
 class RunContext:
-    """What the parts of the flow share.
+    """One opening of a session, from activation to the arm at rest.
 
     Attributes:
-        stage: where time passes.
-        facts: of the session.
-        book: journal and state.
+        console_loop: lets time pass.
+        rig: the rig, its loop running.
+        console: where everything is printed.
+        operator: answers the prompts.
+        stop: requests to stop.
+        metadata: of the session.
+        journal: events and state.
         archive: the trials' files.
-        cues: what is rung and spoken.
-        begun_ns: when it was opened [ns].
+        feedback: bells and speech.
+        opened_ns: when it was opened [ns].
         kept_before: how many trials were kept until then.
-        place: where a fault would come now.
+        fault_context: where in the session a fault would occur now.
         page: the newest review, line by line.
-        is_last: no trial is begun after this one.
-        estimate: how long it looked like taking after the first kept trial [s].
+        is_last: no trial begins after this one.
+        estimate: expected duration, as of the first kept trial [s].
     """
 
     console_loop: ConsoleLoop
-    facts: SessionFacts
+    rig: Rig
+    console: Console
+    operator: OperatorInput
+    stop: StopFlag
+    metadata: SessionMetadata
     journal: Journal
     archive: TrialArchive
     feedback: OperatorFeedback
-    begun_ns: int
+    opened_ns: int
     kept_before: int
-    place: FaultContext
+    fault_context: FaultContext = field(default_factory=FaultContext)
     page: tuple[str, ...] = ()
     is_last: bool = False
     estimate: float | None = None
 
     @property
-    def rig(self) -> Rig:
-        """The rig it runs on."""
-        return self.console_loop.rig
-
-    @property
-    def control(self) -> LoopClient:
+    def loop_client(self) -> LoopClient:
         """The console's side of the loop."""
-        return self.console_loop.control
+        return self.console_loop.loop_client
 
     @property
     def elapsed(self) -> float:
         """How long it has been open [s]."""
-        return (self.rig.clock.now_ns() - self.begun_ns) * 1e-9
+        return (self.rig.clock.now_ns() - self.opened_ns) * 1e-9
 
     @property
     def time_left(self) -> float | None:
-        """How long the missing trials will take at this pace [s]; None = who knows."""
+        """Expected time for the missing trials [s]; None before the first kept one."""
         kept = len(self.journal.state.kept) - self.kept_before
         missing = self.journal.state.wanted - len(self.journal.state.kept)
         return self.elapsed / kept * missing if kept > 0 else None
 
     def say(self, text: str) -> None:
-        """Say one line."""
-        self.console_loop.company.console.say(text)
+        """Print one line."""
+        self.console.say(text)
 
     def say_page(self, lines: Iterable[str]) -> None:
-        """Say lines that can be looked at again."""
+        """Print lines that can be viewed again."""
         self.page = tuple(lines)
         for line in self.page:
             self.say(line)
 
-    def tell(self, error: TractionError) -> None:
-        """Say what went wrong, and what is safe."""
-        self.console_loop.company.console.problem(f"{error} {self.journal.saved()}")
+    def report_error(self, error: TractionError) -> None:
+        """Print an error, and what is safe."""
+        self.console.problem(f"{error} {self.journal.saved()}")
 
-    def tell_fault(self, verdict: GuardVerdict) -> None:
-        """Say why the guard stopped the arm, and what is safe."""
-        self.console_loop.company.console.problem(self.fault_text(verdict))
+    def report_fault(self, verdict: GuardVerdict) -> None:
+        """Print why the guard stopped the arm, and what is safe."""
+        self.console.problem(self.fault_text(verdict))
 
     def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""
-        found = replace(self.place, is_bus_down=self.control.loop.is_bus_down)
-        return fault_text(verdict, found, self.journal.saved())
+        is_bus_down = self.loop_client.loop.is_bus_down
+        context = replace(self.fault_context, is_bus_down=is_bus_down)
+        return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:
-        """Say why the guard stopped the arm, which holds, and go on.
+        """Report a fault after which the arm holds, and go on.
 
         Raises:
-            FaultedError: no trial can follow: the arm has gone.
+            ArmFaultError: no trial can follow: the arm is not under control.
         """
-        verdict = self.console_loop.worst(fault.verdict)
+        verdict = self.console_loop.worst_verdict(fault.verdict)
         if verdict.ends_session:
             raise ArmFaultError(verdict) from fault
-        self.tell_fault(verdict)
+        self.report_fault(verdict)
         self.console_loop.clear_faults()
 
-    def judge(self, event: Event, name: TrialName, why: str) -> None:
-        """Write a verdict into the journal; the files of the trial follow it."""
-        self.journal.note(
+    def update_estimate(self) -> None:
+        """Estimate the duration once, when the first trial is kept."""
+        left = self.time_left
+        if self.estimate is None and left is not None:
+            self.estimate = self.elapsed + left
+
+    def append(self, event: Event, **details: object) -> None:
+        """Append an event to the journal while the console's heartbeat goes on.
+
+        A slow disk must not keep the console from watching the arm.
+
+        Raises:
+            SessionError, TrialFileError: as `Journal.append`.
+        """
+        self.console_loop.run_aside(lambda: self.journal.append(event, **details))
+
+    def record_verdict(self, event: Event, name: TrialName, reason: str) -> None:
+        """Append a verdict to the journal; the files of the trial follow it."""
+        self.append(
             event,
             trial=name.number,
             attempt=name.attempt,
-            reason=why,
-            who=self.facts.operator,
+            reason=reason,
+            who=self.metadata.operator,
         )
 
-    def reject(self, name: TrialName, why: str) -> None:
-        """Put a trial among the rejected ones."""
-        self.judge(Event.TRIAL_REJECTED, name, why)
+    def reject(self, name: TrialName, reason: str) -> None:
+        """Reject a trial."""
+        self.record_verdict(Event.TRIAL_REJECTED, name, reason)
+
+
+def open_context(
+    console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
+) -> RunContext:
+    """Return the context of a session that is opened now."""
+    rig, console = console_loop.rig, console_loop.console
+    return RunContext(
+        console_loop=console_loop,
+        rig=rig,
+        console=console,
+        operator=console_loop.operator,
+        stop=console_loop.stop,
+        metadata=metadata,
+        journal=journal,
+        archive=TrialArchive(rig, metadata),
+        feedback=build_feedback(rig.settings.rig.operator, console),
+        opened_ns=rig.clock.now_ns(),
+        kept_before=len(journal.state.kept),
+    )

@@ -6,14 +6,15 @@ from dataclasses import replace
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
 from experiments.operator.double_tap import FootKeys
+from experiments.operator.keys import NOTE_KEYS, KeyAction, key_action, screen_keys
 from experiments.operator.prompts import Prompt
-from experiments.operator.screens import NOTE_KEYS, READY_KEYS, ReadyView, ready_lines
+from experiments.operator.screens import ReadyView, ready_lines
 from experiments.run.context import RunContext
-from experiments.run.participants import ArmFaultError
+from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.annotations import LONGEST_TEXT, clean_text
 from experiments.session.states import Event
 from experiments.session.trial_files import add_remark
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 from experiments.trial.quality import review_trial
 
 
@@ -21,25 +22,26 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
     """Wait until the trial is to begin, by key or by a double tap of the foot.
 
     Raises:
-        FaultedError, StopAskedError: as `ConsoleLoop.tick`.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
     console_loop, feet = context.console_loop, FootKeys(context.rig)
     while True:
         _show(context)
-        key = ""
-        while key not in _KEYS and key != " ":
+        action = None
+        while action is None:
             key = console_loop.tick(Prompt.READY, name) or feet.key(" ")
-        console_loop.look(None)
-        if key == " ":
+            action = key_action(Prompt.READY, key)
+        console_loop.show(None)
+        if action is KeyAction.RECORD:
             return
-        _KEYS[key](context, name)
+        _ACTIONS[action](context, name)
 
 
 def ready_view(context: RunContext) -> ReadyView:
     """Return what the screen between two trials shows now."""
     state = context.journal.state
     return ReadyView(
-        session=context.facts.folder.id,
+        session=context.metadata.folder.id,
         terrain=context.rig.row.name,
         trial=state.next_trial,
         wanted=state.wanted,
@@ -61,18 +63,16 @@ def take_note(context: RunContext, name: TrialName, *, is_on_trial: bool) -> Non
         is_on_trial: it goes into the trial's sidecar too.
 
     Raises:
-        FaultedError: as `ConsoleLoop.line`.
+        ArmFaultError: as `ConsoleLoop.line`.
     """
     console_loop = context.console_loop
     context.say(NOTE_KEYS)
-    console_loop.look(
-        lambda _: [f"Note: {console_loop.company.keys.draft}▏", NOTE_KEYS]
-    )
+    console_loop.show(lambda _: [f"Note: {context.operator.draft}▏", NOTE_KEYS])
     try:
         while (text := console_loop.line(name)) is None:
             pass
     finally:
-        console_loop.look(None)
+        console_loop.show(None)
     try:
         text = clean_text(text[:LONGEST_TEXT])
     except SessionError:  # nothing but spaces
@@ -82,23 +82,23 @@ def take_note(context: RunContext, name: TrialName, *, is_on_trial: bool) -> Non
 
 
 def _write_note(context: RunContext, name: TrialName | None, text: str) -> None:
-    journal, who = context.journal, context.facts.operator
+    who = context.metadata.operator
     if name is None:
-        journal.note(Event.NOTED, text=text, who=who)
-        context.say(f"Noted on {context.facts.folder.id}: {text}")
+        context.append(Event.NOTED, text=text, who=who)
+        context.say(f"Noted on {context.metadata.folder.id}: {text}")
         return
-    journal.note(
+    context.append(
         Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
     )
-    place = add_remark(context.facts.folder, name, text, who)
+    place = add_remark(context.metadata.folder, name, text, who)
     context.say(f"Noted on {place}: {text}")
 
 
 def _show(context: RunContext) -> None:
     """Show the screen: it stays and goes on counting where there is a terminal."""
     view = ready_view(context)
-    lines = [*ready_lines(view), READY_KEYS]
-    if not context.console_loop.company.console.is_live:
+    lines = [*ready_lines(view), screen_keys(Prompt.READY)]
+    if not context.console.is_live:
         for line in lines:
             context.say(line)
         return
@@ -106,21 +106,21 @@ def _show(context: RunContext) -> None:
     def now(width: int) -> list[str]:
         del width
         newer = replace(view, elapsed=context.elapsed, left=context.time_left)
-        return [*ready_lines(newer), READY_KEYS]
+        return [*ready_lines(newer), screen_keys(Prompt.READY)]
 
-    context.console_loop.look(now)
+    context.console_loop.show(now)
 
 
 def _note(context: RunContext, name: TrialName) -> None:
     """Take a note on the session, the arm holding meanwhile."""
-    context.control.request(ArmState.HOLD)
+    context.loop_client.request(ArmState.HOLD)
     take_note(context, name, is_on_trial=False)
-    context.control.request(ArmState.FLOAT)
+    context.loop_client.request(ArmState.FLOAT)
 
 
 def _pause(context: RunContext, name: TrialName) -> None:
-    context.control.request(ArmState.HOLD)
-    context.journal.note(Event.PAUSED)
+    context.loop_client.request(ArmState.HOLD)
+    context.append(Event.PAUSED)
     is_over = False
     while not is_over:
         context.say("Paused. ARM: holding. [space] to go on.")
@@ -130,21 +130,22 @@ def _pause(context: RunContext, name: TrialName) -> None:
             is_over = True
         except ArmFaultError as fault:
             context.clear_faults(fault)  # and nobody is there: the pause goes on
-    context.journal.note(Event.CONTINUED)
-    context.control.request(ArmState.FLOAT)
+    context.append(Event.CONTINUED)
+    context.loop_client.request(ArmState.FLOAT)
 
 
 def _view_last(context: RunContext, name: TrialName) -> None:
     """Say the newest review again, or that of the last kept trial on the disk."""
     del name
     if not context.page:
-        kept = sorted(context.facts.folder.trials.glob("T??.mcap"))
+        kept = sorted(context.metadata.folder.trials.glob("T??.mcap"))
         if not kept:
             context.say("There is no trial to look at yet.")
             return
-        review = context.console_loop.aside(lambda: review_trial(kept[-1]))
+        review = context.console_loop.run_aside(lambda: review_trial(kept[-1]))
         lines = [f" {mark} {text}" for mark, text in review.lines()]
-        context.page = (f"{kept[-1].stem}, recorded before:", *lines)
+        context.say_page([f"{kept[-1].stem}, recorded before:", *lines])
+        return
     context.say_page(context.page)
 
 
@@ -152,17 +153,17 @@ def _quit_after(context: RunContext, name: TrialName) -> None:
     """Let the next trial be the last one; the second time, end now.
 
     Raises:
-        StopAskedError: it was asked for twice.
+        StopRequestedError: it was asked for twice.
     """
     if context.is_last:
-        context.console_loop.leave()
+        raise StopRequestedError
     context.is_last = True
     context.say(f"{name.kept} will be the last one for now. [q] again: quit at once.")
 
 
-_KEYS: Mapping[str, Callable[[RunContext, TrialName], None]] = {
-    "n": _note,
-    "p": _pause,
-    "v": _view_last,
-    "q": _quit_after,
+_ACTIONS: Mapping[KeyAction, Callable[[RunContext, TrialName], None]] = {
+    KeyAction.NOTE: _note,
+    KeyAction.PAUSE: _pause,
+    KeyAction.VIEW: _view_last,
+    KeyAction.QUIT: _quit_after,
 }

@@ -18,10 +18,11 @@ from experiments.operator.screens import RecordingView, live_line, recording_lin
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
-from experiments.run.participants import ArmFaultError, StopRequestedError
+from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.session.sidecar import TrialOutcome
 from experiments.session.states import Event
-from experiments.trial.files import TrialOutcome
-from experiments.trial.header import EndDetector, PaceMonitor, TrialName, trial_header
+from experiments.session.trial_name import TrialName
+from experiments.trial.header import EndDetector, PaceMonitor, trial_header
 from experiments.trial.quality import review_trial
 
 HISTORY = 5.0  # s of traction in the sparklines
@@ -72,11 +73,11 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
     An interrupted trial is rejected, its files sealed.
 
     Raises:
-        FaultedError, StopAskedError: it was interrupted.
+        ArmFaultError, StopRequestedError: it was interrupted.
         TrialLostError: the disk is full or gone, or the file is not what was written.
         ProcessLostError: a process has died.
     """
-    header = trial_header(context.rig, context.facts, name)
+    header = trial_header(context.rig, context.metadata, name)
     outcome = TrialOutcome("bug")
     try:
         _record(context, name, header, outcome)
@@ -86,7 +87,7 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
         raise
     except StopRequestedError:
         outcome.reason = "interrupted"
-        context.console_loop.obey_stop()
+        context.console_loop.stop_arm()
         _end(context, name, header, outcome)
         raise
     except ProcessLostError as lost:
@@ -96,7 +97,7 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
         raise
     except TrialFileError as error:
         raise _lost("disk-lost", context, name, error) from error
-    context.control.request(ArmState.HOLD)
+    context.loop_client.request(ArmState.HOLD)
     _end(context, name, header, outcome)
     return outcome
 
@@ -105,20 +106,20 @@ def _record(
     context: RunContext, name: TrialName, header: TrialHeader, outcome: TrialOutcome
 ) -> None:
     """Record until the trial is over; `outcome` is kept up to date."""
-    path = context.facts.folder.trials / f"{name.kept}.mcap"
+    path = context.metadata.folder.trials / f"{name.kept}.mcap"
     recorder, console_loop = context.rig.backend.recorder, context.console_loop
     _set_aside(context, name.number)
     facts = {"trial": name.number, "attempt": name.attempt}
-    context.journal.note(Event.TRIAL_STARTED, **facts)
+    context.append(Event.TRIAL_STARTED, **facts)
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
-    context.control.watch_trial(is_recording=True)
+    context.loop_client.watch_trial(is_recording=True)
     context.feedback.give(FeedbackSignal.START)
-    console_loop.look(recording_screen(context.rig, name.kept, outcome))
+    console_loop.show(recording_screen(context.rig, name.kept, outcome))
     try:
         _follow(context, name, outcome)
     finally:
-        console_loop.look(None)
+        console_loop.show(None)
         context.feedback.give(FeedbackSignal.DONE)
 
 
@@ -126,7 +127,7 @@ def _set_aside(context: RunContext, number: int) -> None:
     """Make room for the repetition of a kept trial."""
     attempt = context.journal.state.kept_attempt(number)
     if attempt:
-        context.judge(Event.SET_ASIDE, TrialName(number, attempt), "redone")
+        context.record_verdict(Event.SET_ASIDE, TrialName(number, attempt), "redone")
 
 
 def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
@@ -137,25 +138,22 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
     said = 0.0
     while True:
         outcome.seconds = (rig.clock.now_ns() - start) * 1e-9
-        context.place = FaultContext(name.kept, outcome.seconds)
+        context.fault_context = FaultContext(name.kept, outcome.seconds)
         key = console_loop.tick(Prompt.RECORDING, name)
-        record = context.control.latest()[0]
+        record = context.loop_client.latest()[0]
         outcome.displacement = float(rig.frame.displacement(record["foot_position"]))
-        console_loop.raise_faults(FaultTrigger.RECORDING, name.number, outcome.seconds)
+        console_loop.inject_faults(FaultTrigger.RECORDING, name.number, outcome.seconds)
         over = watch.reason(outcome.seconds, outcome.displacement)
         if key == " " or over:
             outcome.reason = over or "key"
             return
         if pace.is_too_fast(outcome.seconds, outcome.displacement):
             context.feedback.give(FeedbackSignal.TOO_FAST)
-        if (
-            not console_loop.company.console.is_live
-            and outcome.seconds >= said + LIVE_SECONDS
-        ):
+        if not context.console.is_live and outcome.seconds >= said + LIVE_SECONDS:
             said = outcome.seconds
             v_t, F_t, F_n = record["traction"].tolist()
             where = (outcome.seconds, outcome.displacement, rig.frame.travel)
-            late = context.control.late_cycles
+            late = context.loop_client.late_cycles
             context.say(live_line(name.kept, where, (v_t, F_t, F_n), late))
 
 
@@ -164,26 +162,26 @@ def _end(
 ) -> None:
     """Seal the files, say what they are worth; an interrupted one is rejected."""
     archive, recorder = context.archive, context.rig.backend.recorder
-    context.control.watch_trial(is_recording=False)
-    context.control.advance(TICK)  # what the devices said until now is written down
-    recorder.event(20, "link", context.control.device_facts().get("link", ""))
+    context.loop_client.watch_trial(is_recording=False)
+    context.loop_client.advance(TICK)  # what the devices said until now is written down
+    recorder.event(20, "link", context.loop_client.device_facts().get("link", ""))
     recorder.event(20, "stop", outcome.reason)
     try:
-        verified = context.console_loop.aside(
+        verified = context.console_loop.run_aside(
             lambda: archive.seal(header, name, outcome.reason)
         )
     except TrialFileError as error:
         raise _lost("write-failed", context, name, error) from error
     archive.write_sidecar(name, verified, outcome)
     facts = {"trial": name.number, "attempt": name.attempt}
-    context.journal.note(Event.TRIAL_RECORDED, **facts)
+    context.append(Event.TRIAL_RECORDED, **facts)
     written = (
         f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · {verified.cycles} "
         "samples · written and verified"
     )
     if outcome.status == "complete":
-        path = context.facts.folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.aside(lambda: review_trial(path))
+        path = context.metadata.folder.trials / f"{name.kept}.mcap"
+        review = context.console_loop.run_aside(lambda: review_trial(path))
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
         context.say_page([written, *lines])
         archive.write_sidecar(name, verified, outcome, review)
@@ -199,13 +197,13 @@ def _lost(
     message: str, context: RunContext, name: TrialName, error: TrialFileError
 ) -> TrialLostError:
     """Let the arm hold and return what is said of a trial the disk did not take."""
-    context.control.request(ArmState.HOLD)
-    seconds = context.place.seconds
+    context.loop_client.request(ArmState.HOLD)
+    seconds = context.fault_context.seconds
     facts = {
         "trial": name.kept,
         "when": "" if seconds is None else f" at {seconds:.2f} s",
         "detail": error.reason,
-        "path": context.facts.folder.trials / f"{name.kept}.mcap.partial",
+        "path": context.metadata.folder.trials / f"{name.kept}.mcap.partial",
     }
     found = CATALOGUE[message]
     return TrialLostError(

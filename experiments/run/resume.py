@@ -1,4 +1,4 @@
-"""Sessions that are on the disk, opened once more: resumed, redone, or closed."""
+"""Sessions on the disk that are opened again: resumed, redone, or closed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from acquisition.errors import SessionError, SettingsError
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
 from experiments.operator.console import Console
-from experiments.operator.select import choose_keys
+from experiments.operator.scripted import choose_operator
 from experiments.rig.rig import FakeOptions
 from experiments.run.session import OpenMode, SessionRequest, run_session
 from experiments.session.crash_recovery import recover_session
@@ -29,19 +29,19 @@ _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
 @dataclass(frozen=True, slots=True)
 class ResumeRequest:
-    """What the command line says about a session to be opened once more.
+    """How a session is opened again, as on the command line.
 
     Attributes:
         data: the data folder.
         config: a rig.toml; None = the one of the session.
-        console: where it is said.
+        console: where everything is printed.
         is_fast: on stepped time, whatever it was before.
         is_fake: a simulated session is meant.
-        is_forced: other conditions are no obstacle.
-        operator: name of the person; empty = the one of the session.
-        script: who answers the reviews; None = whoever is there.
-        can_log: where the bus is written to.
-        faults: to be raised in the simulation, as on the command line.
+        is_forced: record under other conditions, too.
+        operator: name; empty = the one of the session.
+        script: of an operator; None = the keyboard.
+        can_log: file that the bus is logged to.
+        faults: to be injected into the simulation.
     """
 
     data: Path
@@ -56,32 +56,36 @@ class ResumeRequest:
     faults: tuple[str, ...] = ()
 
 
-def resume(folder: SessionFolder, how: ResumeRequest) -> int:
+def resume(folder: SessionFolder, request: ResumeRequest) -> int:
     """Continue a session that is not finished; return the exit code.
 
     Raises:
         SessionError: it is open elsewhere, not to be resumed, or of the other kind.
     """
-    _check_kind(folder, how)
+    _check_kind(folder, request)
     with session_lock(folder):
-        journal = _settled(folder, how.console)
+        journal = _recovered(folder, request.console)
         if journal.state.phase is SessionPhase.CRASHED and journal.state.is_complete:
-            journal.note(Event.ENDED, reason="complete")
-            how.console.say(CATALOGUE["complete"].text({"session": folder.id}))
+            journal.append(Event.ENDED, reason="complete")
+            request.console.say(CATALOGUE["complete"].text({"session": folder.id}))
             return 0
-        return _reopen(journal, how, Event.RESUMED, {})
+        return _reopen(journal, request, Event.RESUMED, {})
 
 
-def redo(folder: SessionFolder, number: int, reason: str, how: ResumeRequest) -> int:
+def redo(
+    folder: SessionFolder, number: int, reason: str, request: ResumeRequest
+) -> int:
     """Record trial `number` once more; return the exit code.
 
     Raises:
         SessionError: it is open elsewhere, has no such trial, or is of the other kind.
     """
-    _check_kind(folder, how)
+    _check_kind(folder, request)
     with session_lock(folder):
-        journal = _settled(folder, how.console)
-        return _reopen(journal, how, Event.REDO, {"trial": number, "reason": reason})
+        journal = _recovered(folder, request.console)
+        return _reopen(
+            journal, request, Event.REDO, {"trial": number, "reason": reason}
+        )
 
 
 def close(folder: SessionFolder, reason: str, console: Console) -> None:
@@ -91,32 +95,32 @@ def close(folder: SessionFolder, reason: str, console: Console) -> None:
         SessionError: it is open elsewhere.
     """
     with session_lock(folder):
-        journal = _settled(folder, console)
+        journal = _recovered(folder, console)
         if journal.state.is_complete:
-            journal.note(Event.ENDED, reason="complete")
+            journal.append(Event.ENDED, reason="complete")
         else:
-            journal.note(Event.GIVEN_UP, reason=reason)
+            journal.append(Event.GIVEN_UP, reason=reason)
     console.say(f"{folder.id} is closed with {len(journal.state.kept)} kept trials.")
 
 
-def _settled(folder: SessionFolder, console: Console) -> Journal:
+def _recovered(folder: SessionFolder, console: Console) -> Journal:
     journal = open_journal(folder, SystemClock())
-    said = recover_session(journal)
-    if said:
-        facts = {"session": folder.id, "redone": f" {said}"}
-        console.say(CATALOGUE["put-away"].text(facts))
+    redone = recover_session(journal)
+    if redone:
+        details = {"session": folder.id, "redone": f" {redone}"}
+        console.say(CATALOGUE["put-away"].text(details))
     return journal
 
 
-def _check_kind(folder: SessionFolder, how: ResumeRequest) -> None:
+def _check_kind(folder: SessionFolder, request: ResumeRequest) -> None:
     if folder.is_simulated:
         return
-    if how.is_fake:
+    if request.is_fake:
         raise SessionError(
             f"{folder.id} is a session with the real arm.",
             hint="Leave --fake out. Simulated and real trials do not mix.",
         )
-    if how.is_fast or how.script or how.faults:
+    if request.is_fast or request.script or request.faults:
         raise SettingsError(
             "--fast, --fault and --operator-script work only with a simulated session.",
             hint="Nothing was started.",
@@ -124,55 +128,58 @@ def _check_kind(folder: SessionFolder, how: ResumeRequest) -> None:
 
 
 def _reopen(
-    journal: Journal, how: ResumeRequest, event: Event, asked: Mapping[str, object]
+    journal: Journal,
+    request: ResumeRequest,
+    event: Event,
+    details: Mapping[str, object],
 ) -> int:
-    folder, console = journal.folder, how.console
-    reason = refusal(journal.state, {"event": event, **asked})
+    folder, console = journal.folder, request.console
+    reason = refusal(journal.state, {"event": event, **details})
     if reason:
         raise SessionError(
             f"{folder.id} cannot be opened: {reason}.", hint="Nothing was started."
         )
-    before = _last_asked(journal)
-    config = how.config or _config_of(before)
+    before = _last_opening(journal)
+    config = request.config or _config_of(before)
     settings = load_settings(config)
-    fake = _fake_of(before, how) if folder.is_simulated else None
-    request = SessionRequest(
-        data=how.data,
+    fake = _fake_of(before, request) if folder.is_simulated else None
+    session = SessionRequest(
+        data=request.data,
         settings=settings,
         config=config,
         row=settings.row(folder.terrain),
         fake=fake,
-        operator=how.operator or str(before.get("operator") or ""),
-        keys=choose_keys(how.script, is_fake=folder.is_simulated),
+        operator_name=request.operator or str(before.get("operator") or ""),
+        operator=choose_operator(request.script, is_fake=folder.is_simulated),
         console=console,
-        faults=how.faults,
-        can_log=how.can_log,
+        faults=request.faults,
+        can_log=request.can_log,
     )
     kept = len(journal.state.kept)
     console.say(f"session {folder.id}: {kept} of {journal.state.wanted} kept")
-    return run_session(request, OpenMode(event, asked, journal, how.is_forced))
+    return run_session(session, OpenMode(event, details, journal, request.is_forced))
 
 
-def _last_asked(journal: Journal) -> dict[str, Any]:
-    """Return what was asked for when the session was opened last."""
-    found: dict[str, Any] = {}
+def _last_opening(journal: Journal) -> dict[str, Any]:
+    """Return the event with which the session was opened last."""
+    opening: dict[str, Any] = {}
     for event in journal.folder.events():
         if event.get("event") in _OPENINGS:
-            found = event
-    return found
+            opening = event
+    return opening
 
 
-def _config_of(asked: Mapping[str, Any]) -> Path | None:
-    config = asked.get("config")
+def _config_of(opening: Mapping[str, Any]) -> Path | None:
+    config = opening.get("config")
     return Path(config) if isinstance(config, str) and config else None
 
 
-def _fake_of(asked: Mapping[str, Any], how: ResumeRequest) -> FakeOptions:
+def _fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, on stepped time if that is asked for."""
     try:
-        before = _FAKE.validate_python(asked.get("fake"))
+        before = _FAKE.validate_python(opening.get("fake"))
     except ValidationError:
         before = FakeOptions(is_fast=False, seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]
-    is_fast = how.is_fast or before.is_fast
+    is_fast = request.is_fast or before.is_fast
     return FakeOptions(is_fast, before.seed, before.friction, pace)

@@ -4,47 +4,45 @@ import traceback
 
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError
+from analysis.data.prepare import MINIMUM_TRAVEL_SHARE
 from experiments.messages import CATALOGUE, FaultContext, rest_text
-from experiments.operator.feedback import build_cues
+from experiments.operator.double_tap import FootKeys
+from experiments.operator.keys import (
+    REJECT_REASONS,
+    KeyAction,
+    key_action,
+    screen_keys,
+)
+from experiments.operator.prompts import Prompt
 from experiments.operator.screens import EndView, end_lines
 from experiments.run.activation import activate
 from experiments.run.console_loop import ConsoleLoop
-from experiments.run.context import RunContext
-from experiments.run.participants import ArmFaultError, StopRequestedError
-from experiments.run.ready import wait_ready
+from experiments.run.context import RunContext, open_context
+from experiments.run.ready import take_note, wait_ready
 from experiments.run.record import record_trial
+from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.tare import take_end_tare, take_tare
-from experiments.run.verdict import ask_verdict
-from experiments.session.journal import Journal, at_once
+from experiments.session.journal import Journal
+from experiments.session.sidecar import TrialOutcome
 from experiments.session.states import Event
 from experiments.session.store import write_text
-from experiments.trial.files import TrialArchive
-from experiments.trial.header import SessionFacts, TrialName
+from experiments.session.trial_name import TrialName
+from experiments.trial.header import SessionMetadata
 
-FAULTS_IN_A_ROW = 5  # end the session: something is wrong that redoing cannot mend
+FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
+_ENDED = "session ended at the review"
 
 
 class SessionRunner:
     """Runs one session on a rig that passed its preflight."""
 
     def __init__(
-        self, console_loop: ConsoleLoop, facts: SessionFacts, journal: Journal
+        self, console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
     ) -> None:
-        self._sitting = RunContext(
-            console_loop=console_loop,
-            facts=facts,
-            journal=journal,
-            archive=TrialArchive(console_loop.rig, facts),
-            feedback=build_cues(
-                console_loop.rig.settings.rig.operator, console_loop.company.console
-            ),
-            begun_ns=console_loop.rig.clock.now_ns(),
-            kept_before=len(journal.state.kept),
-            place=FaultContext(),
-        )
+        self._context = open_context(console_loop, metadata, journal)
         self._faults = 0
 
-    def run(self, opening: Event, **asked: object) -> int:
+    def run(self, opening: Event, **details: object) -> int:
         """Record until nothing is left to record; return the exit code.
 
         Every way out - complete, stop, fault, bug - leaves the arm idle and what was
@@ -52,11 +50,10 @@ class SessionRunner:
 
         Args:
             opening: how the session is opened: started, resumed, or for a redo.
-            asked: what the journal keeps of it.
+            details: what the journal records of it.
         """
-        context = self._sitting
-        context.journal.note(opening, **asked)
-        context.journal.aside = context.console_loop.aside
+        context = self._context
+        context.journal.append(opening, **details)
         code, reason = 1, "bug"
         try:
             self._record_all()
@@ -64,86 +61,81 @@ class SessionRunner:
             reason = "complete" if context.journal.state.is_complete else "unfinished"
         except StopRequestedError:
             code, reason = CATALOGUE["interrupted"].exit_code, "unfinished"
-            self._tell_stop()
+            context.say(CATALOGUE["interrupted"].text({}, context.journal.saved()))
         except ArmFaultError as fault:
             code, reason = 4, fault.verdict.reason
-            context.tell_fault(fault.verdict)
+            context.report_fault(fault.verdict)
         except TractionError as error:
             code, reason = error.exit_code, "error"
-            context.tell(error)
-        except Exception:  # the arm first, then the person, the traceback to the log
-            self._tell_bug(self._make_safe(), traceback.format_exc())
+            context.report_error(error)
+        except Exception:  # the arm first, then the message, the traceback to the log
+            self._report_bug(self._make_safe(), traceback.format_exc())
         finally:
             context.feedback.close()
             context.say(self._make_safe())
-            context.journal.aside = at_once  # the arm is idle: nobody has to look
-            context.journal.note(Event.ENDED, reason=reason)
+            # The arm is idle: the disk may take its time.
+            context.journal.append(Event.ENDED, reason=reason)
             if not code:
-                self._say_end()
+                self._print_end()
         return code
 
     def _record_all(self) -> None:
-        context, state = self._sitting, self._sitting.journal
+        context = self._context
         activate(context.console_loop)
-        state.note(Event.ACTIVATED)
-        while not state.state.is_over:
+        context.append(Event.ACTIVATED)
+        while not context.journal.state.is_over:
             self._try_trial()
-            if context.estimate is None and (left := context.time_left) is not None:
-                context.estimate = context.elapsed + left
-            if context.is_last and not state.state.is_over:
-                context.console_loop.leave()
+            context.update_estimate()
+            if context.is_last and not context.journal.state.is_over:
+                raise StopRequestedError
         take_end_tare(context)
 
     def _try_trial(self) -> None:
         """One trial; a fault that leaves the arm holding does not end the session."""
-        context = self._sitting
-        context.place = FaultContext()
+        context = self._context
+        context.fault_context = FaultContext()
         try:
-            self._one_trial()
+            self._run_trial()
         except ArmFaultError as fault:
             self._faults += 1
             if self._faults >= FAULTS_IN_A_ROW:
-                raise ArmFaultError(
-                    context.console_loop.worst(fault.verdict)
-                ) from fault
+                verdict = context.console_loop.worst_verdict(fault.verdict)
+                raise ArmFaultError(verdict) from fault
             context.clear_faults(fault)
         else:
             self._faults = 0
 
-    def _one_trial(self) -> None:
-        context = self._sitting
+    def _run_trial(self) -> None:
+        context = self._context
         number = context.journal.state.next_trial
         name = TrialName(number, context.journal.state.attempt(number) + 1)
         take_tare(context, name)
-        context.control.request(ArmState.FLOAT)
+        context.loop_client.request(ArmState.FLOAT)
         wait_ready(context, name)
         outcome = record_trial(context, name)
         ask_verdict(context, name, outcome)
 
-    # --- words --------------------------------------------------------------------
+    # --- messages -----------------------------------------------------------------
 
     def _make_safe(self) -> str:
-        """Idle the arm and return where it is; the second call does nothing more."""
-        console_loop = self._sitting.console_loop
-        confirmed = console_loop.make_safe()
-        return rest_text(console_loop.rig.backend.safety_mode(), is_confirmed=confirmed)
+        """Idle the arm and return its state in words; safe to repeat."""
+        context = self._context
+        is_confirmed = context.console_loop.make_safe()
+        mode = context.rig.backend.safety_mode()
+        return rest_text(mode, is_confirmed=is_confirmed)
 
-    def _tell_stop(self) -> None:
-        context = self._sitting
-        context.say(CATALOGUE["interrupted"].text({}, context.journal.saved()))
+    def _report_bug(self, arm_text: str, trace: str) -> None:
+        """Print where the arm is and what is safe; the traceback goes to the log."""
+        context = self._context
+        log = context.metadata.folder.path / "log.txt"
+        details = {"error": trace.splitlines()[-1], "rest": arm_text, "log": log}
+        message = CATALOGUE["bug"].text(details, context.journal.saved())
+        context.console.problem(message)
+        write_text(log, trace)
 
-    def _tell_bug(self, rest: str, text: str) -> None:
-        """Say where the arm is and what is safe; the traceback goes to the log."""
-        context = self._sitting
-        log = context.facts.folder.path / "log.txt"
-        facts = {"error": text.splitlines()[-1], "rest": rest, "log": log}
-        message = CATALOGUE["bug"].text(facts, context.journal.saved())
-        context.console_loop.company.console.problem(message)
-        write_text(log, text)
-
-    def _say_end(self) -> None:
-        context = self._sitting
-        state, folder = context.journal.state, context.facts.folder
+    def _print_end(self) -> None:
+        context = self._context
+        state, folder = context.journal.state, context.metadata.folder
         view = EndView(
             session=folder.id,
             terrain=state.terrain,
@@ -156,3 +148,51 @@ class SessionRunner:
         )
         for line in end_lines(view):
             context.say(line)
+
+
+def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
+    """Ask until a trial is kept or rejected; the verdict is the operator's alone.
+
+    Raises:
+        ArmFaultError: the arm is not under control; the trial is rejected.
+        StopRequestedError: the session is to end; the trial is rejected.
+    """
+    context.say(screen_keys(Prompt.REVIEW))
+    context.fault_context = FaultContext(name.kept)
+    is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
+    feet = FootKeys(context.rig)
+    while True:
+        try:
+            key = context.console_loop.tick(Prompt.REVIEW, name, is_complete=is_whole)
+            if key_action(Prompt.REVIEW, key) is KeyAction.NOTE:
+                take_note(context, name, is_on_trial=True)
+                context.say(screen_keys(Prompt.REVIEW))
+        except ArmFaultError as fault:
+            try:
+                context.clear_faults(fault)
+            except ArmFaultError:
+                # The trial is whole, but nobody can give a verdict any more.
+                context.reject(name, _ENDED)
+                raise
+            continue
+        if _apply_key(context, name, key or feet.key("k")):
+            return
+
+
+def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
+    """Return whether `key` was a verdict.
+
+    Raises:
+        StopRequestedError: it, or Ctrl-C, ends the session.
+    """
+    action = key_action(Prompt.REVIEW, key)
+    if action is KeyAction.KEEP:
+        context.record_verdict(Event.TRIAL_KEPT, name, "")
+        return True
+    if action is KeyAction.REDO:
+        context.reject(name, REJECT_REASONS[key[1:]])
+        return True
+    if action is KeyAction.QUIT or context.stop.count:
+        context.reject(name, _ENDED)
+        raise StopRequestedError
+    return False

@@ -2,28 +2,34 @@
 
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from experiments.arguments import data_option
 from experiments.fault_injection.host_faults import HostFaults
 from experiments.fault_injection.plan import plan_faults
 from experiments.operator.console import Console
-from experiments.operator.prompts import OperatorInput, SimulatedHand
+from experiments.operator.prompts import OperatorInput
 from experiments.operator.terminal import keyboard
 from experiments.preflight.conditions import (
     check_conditions,
-    conditions_of,
+    rig_conditions,
     sensor_conditions,
     write_conditions,
 )
-from experiments.preflight.foot_check import confirm_foot, foot_before
-from experiments.preflight.preflight import Preflight, connect_rig, run_preflight
+from experiments.preflight.foot_check import confirm_foot, last_foot
+from experiments.preflight.preflight import (
+    LOOP_TEST,
+    Preflight,
+    connect_rig,
+    run_preflight,
+)
 from experiments.rig.bus_log import logging_bus
 from experiments.rig.rig import FakeOptions, Rig
+from experiments.rig.simulation import SimulatedHand
 from experiments.run.console_loop import ConsoleLoop
-from experiments.run.participants import Company, StopFlag, signals_ask
 from experiments.run.runner import SessionRunner
+from experiments.run.stop import StopFlag, handle_signals
 from experiments.session.journal import Journal
 from experiments.session.lock import session_lock
 from experiments.session.matrix_board import next_steps
@@ -36,12 +42,12 @@ from experiments.session.store import (
 )
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
-from experiments.trial.header import SessionFacts, collect_facts
+from experiments.trial.header import SessionMetadata, collect_metadata
 
 
 @dataclass(frozen=True, slots=True)
 class SessionRequest:
-    """What a person asked for: where, with which rig, and who takes part.
+    """A session as requested: where, with which rig, and by whom.
 
     Attributes:
         data: the data folder.
@@ -49,11 +55,11 @@ class SessionRequest:
         config: the rig.toml that was named; None = as shipped.
         row: row of the matrix.
         fake: how the rig is simulated; None = it is real.
-        operator: name of the person; empty = nobody said.
-        keys: who answers the prompts.
-        console: where it is said.
-        faults: to be raised in the simulation, as on the command line.
-        can_log: where the bus is written to.
+        operator_name: empty = not given.
+        operator: answers the prompts.
+        console: where everything is printed.
+        faults: to be injected into the simulation, as on the command line.
+        can_log: file that the bus is logged to.
     """
 
     data: Path
@@ -61,8 +67,8 @@ class SessionRequest:
     config: Path | None
     row: TerrainRow
     fake: FakeOptions | None
-    operator: str
-    keys: OperatorInput
+    operator_name: str
+    operator: OperatorInput
     console: Console
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
@@ -70,7 +76,7 @@ class SessionRequest:
     @property
     def who(self) -> str:
         """Name of the operator, "auto" in a simulation without one."""
-        return self.operator or ("auto" if self.fake is not None else "")
+        return self.operator_name or ("auto" if self.fake is not None else "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,18 +85,18 @@ class OpenMode:
 
     Attributes:
         event: started, resumed, or for a redo.
-        asked: what the journal keeps of it.
-        book: of the session on the disk, its lock held; None = a new session.
-        is_forced: other conditions than before are no obstacle.
+        details: what the journal records of it.
+        journal: of the session on the disk, its lock held; None = a new session.
+        is_forced: record under other conditions, too.
     """
 
     event: Event
-    asked: Mapping[str, object] = field(default_factory=dict[str, object])
+    details: Mapping[str, object] = field(default_factory=dict[str, object])
     journal: Journal | None = None
     is_forced: bool = False
 
 
-def run_session(request: SessionRequest, opening: OpenMode) -> int:
+def run_session(request: SessionRequest, mode: OpenMode) -> int:
     """Connect, check, record; return the exit code.
 
     Raises:
@@ -104,97 +110,109 @@ def run_session(request: SessionRequest, opening: OpenMode) -> int:
         faults = plan_faults(request.faults, rig.simulation, host_faults)
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {request.row.name}        {kind}")
-        found = _check_before(rig, opening, console)
-        before = foot_before(request.data, is_simulated=rig.is_simulated)
-        foot = confirm_foot(rig.row, before, request.keys, console)
-        console.check(foot.mark, foot.name, foot.text)
-        page = run_preflight(rig, request.data, console).after(foot)
-        found += _check_sensor(page, opening, console)
+        differences = _check_conditions(rig_conditions(rig), mode, console)
+        page = _check_rig(request, rig, host_faults)
+        sensor = sensor_conditions(page.devices)
+        differences += _check_conditions(sensor, mode, console)
         hand = SimulatedHand(rig.simulation) if rig.simulation else None
-        company = Company(request.keys, console, stop, hand, faults)
-        with signals_ask(stop), keyboard(request.keys), ExitStack() as stack:
-            stack.callback(host_faults.undo)
-            journal = opening.journal or _new_book(
-                request, rig, page, stack, host_faults
-            )
-            host_faults.folder = journal.folder
-            facts = _write_facts(request, rig, page, journal)
-            runner = SessionRunner(ConsoleLoop(rig, company), facts, journal)
-            code = runner.run(opening.event, **_asked(request, opening, found))
+        operator = request.operator
+        with handle_signals(stop), keyboard(operator), ExitStack() as stack:
+            stack.callback(host_faults.restore)
+            journal = _open_journal(request, mode, rig, stack, host_faults)
+            if mode.journal is None:
+                write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
+            metadata = _write_metadata(request, rig, page, journal)
+            console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
+            runner = SessionRunner(console_loop, metadata, journal)
+            code = runner.run(mode.event, **_details(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
-        console.say(f"▲ The fault {plan.text()} was planned, and its time never came.")
-    _say_next(request, journal, code)
+        text = plan.to_text()
+        console.say(f"▲ The fault {text} was planned, and its time never came.")
+    _print_next(request, journal, code)
     return code
 
 
-def _check_before(rig: Rig, opening: OpenMode, console: Console) -> list[str]:
-    if opening.journal is None:
+def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Preflight:
+    """Return the page of the preflight, the foot confirmed first.
+
+    Raises:
+        PreflightError: the rig is not fit.
+        SessionError: nobody confirmed the foot.
+    """
+    console = request.console
+    before = last_foot(request.data, is_simulated=rig.is_simulated)
+    foot = confirm_foot(rig.row, before, request.operator, console)
+    console.check(foot.mark, foot.name, foot.text)
+    probe = host_faults.free_bytes
+    return run_preflight(rig, request.data, console, LOOP_TEST, probe).after(foot)
+
+
+def _check_conditions(
+    now: Mapping[str, str], mode: OpenMode, console: Console
+) -> list[str]:
+    """Return what differs from the conditions of a session that is opened again."""
+    if mode.journal is None:
         return []
-    now, is_forced = conditions_of(rig), opening.is_forced
-    return check_conditions(opening.journal.folder, now, console, is_forced=is_forced)
+    folder, is_forced = mode.journal.folder, mode.is_forced
+    return check_conditions(folder, now, console, is_forced=is_forced)
 
 
-def _check_sensor(page: Preflight, opening: OpenMode, console: Console) -> list[str]:
-    if opening.journal is None:
-        return []
-    now, is_forced = sensor_conditions(page.devices), opening.is_forced
-    return check_conditions(opening.journal.folder, now, console, is_forced=is_forced)
-
-
-def _new_book(
+def _open_journal(
     request: SessionRequest,
+    mode: OpenMode,
     rig: Rig,
-    page: Preflight,
     stack: ExitStack,
     host_faults: HostFaults,
 ) -> Journal:
-    """Create the session's folder, take its lock, keep settings and conditions."""
+    """Return the journal on the rig's clock; a new session gets its folder and lock."""
+    if mode.journal is not None:
+        host_faults.enter_session(mode.journal.folder)
+        return replace(mode.journal, clock=rig.clock)
     folder = create_session(
         request.data,
         request.row.name,
         is_simulated=rig.is_simulated,
         utc_ns=session_utc_ns(),
     )
+    host_faults.enter_session(folder)
     host_faults.hold_lock(folder)
     stack.enter_context(session_lock(folder))
     request.console.say(f"session {folder.id}: {folder.path}")
     write_text(folder.path / "config.toml", rig.settings.rig_text)
     write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
-    write_conditions(folder, {**conditions_of(rig), **sensor_conditions(page.devices)})
     return Journal(folder, rig.clock)
 
 
-def _write_facts(
+def _write_metadata(
     request: SessionRequest, rig: Rig, page: Preflight, journal: Journal
-) -> SessionFacts:
+) -> SessionMetadata:
     """Write what is known at this opening; later ones get a number of their own."""
     seed = request.fake.seed if request.fake is not None else None
-    facts = collect_facts(journal.folder, request.who, seed, page.devices)
-    journal.clock = rig.clock
+    metadata = collect_metadata(journal.folder, request.who, seed, page.devices)
     number = journal.state.openings + 1
     suffix = f"-{number}" if number > 1 else ""
     path = journal.folder.path
     write_json(path / f"preflight{suffix}.json", page.as_dict())
-    write_json(path / f"provenance{suffix}.json", facts.provenance)
-    write_text(path / f"diff{suffix}.patch", facts.diff)
-    return facts
+    write_json(path / f"provenance{suffix}.json", metadata.provenance)
+    write_text(path / f"diff{suffix}.patch", metadata.diff)
+    return metadata
 
 
-def _asked(
-    request: SessionRequest, opening: OpenMode, found: list[str]
+def _details(
+    request: SessionRequest, mode: OpenMode, differences: list[str]
 ) -> dict[str, object]:
-    """Return what the journal keeps of this opening, for whoever resumes it."""
-    asked = {
-        **opening.asked,
+    """Return what the journal records of this opening, for the next one."""
+    details = {
+        **mode.details,
         "operator": request.who,
         "config": str(request.config.resolve()) if request.config else "",
         "fake": asdict(request.fake) if request.fake is not None else None,
     }
-    return {**asked, "differences": found} if found else asked
+    return {**details, "differences": differences} if differences else details
 
 
-def _say_next(request: SessionRequest, journal: Journal, code: int) -> None:
-    """Say what comes next: the report, and the terrain that time asks for."""
+def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
+    """Print what comes next: the report, and the terrain that time asks for."""
     name, data = journal.folder.id, data_option(request.data)
     if not journal.state.is_complete:
         request.console.say(f"To go on: traction resume {name}{data}")

@@ -12,9 +12,9 @@ from experiments.operator.prompts import Prompt
 from experiments.rig.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
-from experiments.run.participants import ArmFaultError, StopRequestedError
+from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.states import Event
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.payload import Payload
 from ft_sensor.tare import TareError, TareResult, tare
@@ -33,17 +33,17 @@ def take_tare(context: RunContext, name: TrialName) -> None:
 
     Raises:
         PreflightError: five tares in a row were refused.
-        FaultedError, StopAskedError: as `ConsoleLoop.tick`.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
     context.say("Lift the foot clear of everything and keep it still.")
     for left in reversed(range(MOST_TARES)):
-        context.console_loop.raise_faults(FaultTrigger.TARE, name.number, 0.0)
+        context.console_loop.inject_faults(FaultTrigger.TARE, name.number, 0.0)
         try:
             _accept(context, name, _measure(context, name))
         except PreflightError as error:
             if not left:
                 raise
-            context.tell(error)
+            context.report_error(error)
             context.console_loop.clear_faults()
         else:
             return
@@ -101,10 +101,10 @@ def _measure(context: RunContext, name: TrialName) -> TareResult:
     """
     _wait_still(context, name)
     console_loop, rig = context.console_loop, context.rig
-    reader = context.control.wrenches()
+    reader = context.loop_client.wrenches()
     for tick in range(round(TARE_SECONDS / TICK) + 1):
         console_loop.tick(Prompt.LIFT, name)
-        console_loop.raise_faults(FaultTrigger.TARE, name.number, tick * TICK)
+        console_loop.inject_faults(FaultTrigger.TARE, name.number, tick * TICK)
     limit = rig.settings.rig.limits.tare_spread
     try:
         return tare(unpack_wrenches(reader.read()), limit)
@@ -122,14 +122,14 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
         PreflightError: it hides a force that the sensor does not have by itself.
     """
     rig = context.rig
-    position = context.control.latest()["position"][0]
+    position = context.loop_client.latest()["position"][0]
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
     _check_residual(rig, tared)
     rig.tared = tared
     bias = tared.bias.tolist()
-    context.control.set_bias(bias)
-    context.journal.note(
+    context.loop_client.set_bias(bias)
+    context.append(
         Event.TARED,
         trial_number=name.number,
         bias=[round(v, 4) for v in bias],
@@ -151,7 +151,7 @@ def _wait_still(context: RunContext, name: TrialName) -> None:
     still = 0.0
     while still < STILL_SECONDS:
         context.console_loop.tick(Prompt.LIFT, name)
-        record = context.control.latest()[0]
+        record = context.loop_client.latest()[0]
         height = float(context.rig.frame.height(record["foot_position"]))
         speed = float(abs(record["foot_velocity"][:3]).max())
         is_still = height > LIFTED and speed < STILL_SPEED

@@ -15,7 +15,7 @@ from experiments.session.reducer import KEEP, refusal
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder, sha256_of
 from experiments.session.trial_files import add_remark, find_sidecar
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 
 LONGEST_TEXT = 2000  # characters
 _TRIAL = re.compile(r"^T?0*(?P<number>[1-9]\d?)(?P<letters>[a-z]{0,3})$")
@@ -80,10 +80,10 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
     with session_lock(folder):
         journal = _journal(folder)
         if not trial:
-            journal.note(Event.NOTED, text=text, who=who)
+            journal.append(Event.NOTED, text=text, who=who)
             return f"Noted on {folder.id}."
         name = _find_attempt(journal, trial)
-        journal.note(
+        journal.append(
             Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
         )
         return f"Noted on {folder.id} {add_remark(folder, name, text, who)}."
@@ -116,7 +116,7 @@ def change_verdict(
                 hint="Nothing was changed.",
             )
         said = _check_file(journal, name) if verdict == KEEP else []
-        journal.note(Event.VERDICT, **facts)
+        journal.append(Event.VERDICT, **facts)
         place = f"trials/{name.kept}"
         if verdict != KEEP:
             place = f"rejected/{name.rejected}"

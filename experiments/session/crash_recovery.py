@@ -6,6 +6,7 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file.recover import recover, recovered_path
 from acquisition.trial_file.verify import VerifiedFile, verify
 from experiments.session.journal import Journal
+from experiments.session.sidecar import TrialOutcome, sidecar_of
 from experiments.session.states import OPEN, Event, SessionPhase
 from experiments.session.store import SessionFolder, move_file, read_json, write_json
 from experiments.session.trial_files import (
@@ -13,8 +14,7 @@ from experiments.session.trial_files import (
     last_decisions,
     move_trial_files,
 )
-from experiments.trial.files import TrialOutcome, sidecar_of
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 
 WHO = "traction"  # a verdict that nobody gave
 REASON = "the session ended without closing"
@@ -32,7 +32,7 @@ def recover_session(journal: Journal) -> str:
     folder = journal.folder
     _sweep(folder)
     if journal.state.phase in OPEN:
-        journal.note(Event.CRASH_FOUND)
+        journal.append(Event.CRASH_FOUND)
     for decision in last_decisions(folder.events()):
         if find_sidecar(folder, decision.name):
             move_trial_files(folder, decision)
@@ -41,7 +41,7 @@ def recover_session(journal: Journal) -> str:
         return ""
     name = TrialName(number, journal.state.attempt(number))
     _gather(folder, name)
-    journal.note(
+    journal.append(
         Event.TRIAL_REJECTED,
         trial=number,
         attempt=name.attempt,

@@ -8,7 +8,7 @@ from typing import Any
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder, move_file, read_json, write_json
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 
 _SUFFIXES = (".mcap", ".truth.mcap")
 _VERDICTS: Mapping[str, str] = {

@@ -12,7 +12,7 @@ from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay
 from experiments.session.states import OPEN, RESUMABLE, SessionPhase
 from experiments.session.store import SessionFolder, list_sessions
-from experiments.trial.header import TrialName
+from experiments.session.trial_name import TrialName
 
 
 @dataclass(frozen=True, slots=True)

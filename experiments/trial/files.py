@@ -12,56 +12,14 @@ from acquisition.trial_file.writer import TrialHeader
 from analysis.data.quality import CoverageGrid, suggest
 from experiments.rig.rig import Rig
 from experiments.session.reducer import KEEP
+from experiments.session.sidecar import TrialOutcome, sidecar_of
 from experiments.session.store import read_json, write_json
-from experiments.trial.header import SessionFacts, TrialName, write_flight, write_truth
+from experiments.session.trial_name import TrialName
+from experiments.trial.header import SessionMetadata, write_flight, write_truth
 from experiments.trial.quality import Review
 
-COMPLETE = frozenset({"travel", "key", "time-limit"})
 CELLS = (4, 4)  # speeds, loads of a coverage
 MANY = 1_000_000_000  # samples, more than any trial has
-
-
-@dataclass(slots=True)
-class TrialOutcome:
-    """How a recording ended.
-
-    Attributes:
-        reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
-        seconds: since the start [s].
-        displacement: of the foot along the container [m].
-    """
-
-    reason: str
-    seconds: float = 0.0
-    displacement: float = 0.0
-
-    @property
-    def status(self) -> str:
-        """The machine's word on the trial, never a verdict."""
-        return "complete" if self.reason in COMPLETE else "interrupted"
-
-
-def sidecar_of(
-    name: TrialName, verified: VerifiedFile | None, outcome: TrialOutcome
-) -> dict[str, object]:
-    """Return the sidecar of an attempt without a verdict; no file where None."""
-    return {
-        "trial": name.kept,
-        "attempt": name.attempt,
-        "sha256": verified.sha256 if verified else "",
-        "size": verified.size if verified else 0,
-        "cycles": verified.cycles if verified else 0,
-        "duration": round(verified.duration, 3) if verified else 0.0,
-        "worst_gap": round(verified.worst_gap, 6) if verified else 0.0,
-        "status": outcome.status,
-        "stop_reason": outcome.reason,
-        "displacement": round(outcome.displacement, 4),
-        "verdict": "",
-        "reason": "",
-        "who": "",
-        "when": "",
-        "history": [],
-    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +27,7 @@ class TrialArchive:
     """The files of one session's trials."""
 
     rig: Rig
-    facts: SessionFacts
+    metadata: SessionMetadata
 
     def seal(self, header: TrialHeader, name: TrialName, reason: str) -> VerifiedFile:
         """End and verify the trial file, and the truth beside it when simulated.
@@ -78,13 +36,13 @@ class TrialArchive:
             TrialFileError: a file could not be written or verified.
         """
         verified = self.rig.backend.recorder.finish(reason)
-        truth = self.facts.folder.trials / f"{name.kept}.truth.mcap"
+        truth = self.metadata.folder.trials / f"{name.kept}.truth.mcap"
         write_truth(self.rig, header, truth)
         return verified
 
     def flight(self, header: TrialHeader, name: TrialName, reason: str) -> str:
         """Write the flight record of a fault; return what to say about it."""
-        path = self.facts.folder.faults / f"{name.rejected}.flight.mcap"
+        path = self.metadata.folder.faults / f"{name.rejected}.flight.mcap"
         try:
             write_flight(self.rig, header, path, reason)
         except TrialFileError as error:
@@ -112,7 +70,7 @@ class TrialArchive:
         facts = sidecar_of(name, verified, outcome)
         if review is not None:
             facts |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
-        write_json(self.facts.folder.trials / f"{name.kept}.json", facts)
+        write_json(self.metadata.folder.trials / f"{name.kept}.json", facts)
 
     def kept_ratios(self) -> list[float]:
         """Return the quick fits of the trials kept so far, from their sidecars."""
@@ -127,7 +85,7 @@ class TrialArchive:
         return suggest(CoverageGrid(counts))
 
     def _kept_sidecars(self) -> list[dict[str, Any]]:
-        paths = sorted(self.facts.folder.trials.glob("T*.json"))
+        paths = sorted(self.metadata.folder.trials.glob("T*.json"))
         found = [read_json(path) for path in paths]
         return [sidecar for sidecar in found if sidecar.get("verdict") == KEEP]
 

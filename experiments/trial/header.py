@@ -18,6 +18,7 @@ from acquisition.trial_file.writer import (
 from experiments import provenance
 from experiments.rig.rig import Rig
 from experiments.session.store import SessionFolder, iso_utc
+from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from wam.model.arm_model import urdf
 
@@ -28,30 +29,7 @@ PACE_SECONDS, PACE_LIMIT = 1.0, 0.2  # s, m/s
 
 
 @dataclass(frozen=True, slots=True)
-class TrialName:
-    """Number and attempt of a trial: T04 while it counts, T04a once rejected."""
-
-    number: int
-    attempt: int
-
-    @property
-    def kept(self) -> str:
-        """Name of the file in trials/."""
-        return f"T{self.number:02d}"
-
-    @property
-    def rejected(self) -> str:
-        """Name of the file in rejected/."""
-        letters = ""
-        rest = self.attempt
-        while rest > 0:
-            rest, digit = divmod(rest - 1, 26)
-            letters = chr(ord("a") + digit) + letters
-        return self.kept + letters
-
-
-@dataclass(frozen=True, slots=True)
-class SessionFacts:
+class SessionMetadata:
     """What every trial of a session repeats in its metadata."""
 
     folder: SessionFolder
@@ -61,16 +39,16 @@ class SessionFacts:
     diff: str
 
 
-def collect_facts(
+def collect_metadata(
     folder: SessionFolder, operator: str, seed: int | None, devices: Mapping[str, str]
-) -> SessionFacts:
+) -> SessionMetadata:
     """Return the facts of a session; asks git once."""
     facts = provenance.collect()
     facts.update(devices)
-    return SessionFacts(folder, operator, seed, facts, provenance.diff_patch())
+    return SessionMetadata(folder, operator, seed, facts, provenance.diff_patch())
 
 
-def trial_header(rig: Rig, facts: SessionFacts, name: TrialName) -> TrialHeader:
+def trial_header(rig: Rig, facts: SessionMetadata, name: TrialName) -> TrialHeader:
     """Return everything that is known about a trial before its first cycle."""
     row = rig.row
     offset, uncertainty = utc_offset_ns(rig.clock)

@@ -148,6 +148,11 @@ class ArmPlant:
         self._tau = self._of_units.dot(units)
         self._drive()
 
+    @property
+    def is_held(self) -> bool:
+        """Whether the brakes hold the joints."""
+        return self._is_held
+
     def set_braking(self, is_braked: bool, is_powered: bool) -> None:
         """Hold the joints (braked), or let them follow torque or fall."""
         self._is_held = is_braked and is_powered

@@ -1,6 +1,5 @@
 """The simulated rig as a process of its own: bus on a socket, sensor on a terminal."""
 
-import base64
 import os
 import select
 import shutil
@@ -13,15 +12,23 @@ import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.control_loop.realtime import RealtimeRequest, request
+from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.child import ChildContext, name_process
-from acquisition.ipc.rpc import Channel, ChannelClosedError, Handler
+from acquisition.ipc.rpc import RpcServer, bind
+from acquisition.sample import Record
+from acquisition.simulation import (
+    DeviceServer,
+    ServedDevices,
+    SimulationControl,
+    TruthSource,
+)
 from fakes.bus.hub import SocketHub
 from fakes.plant.plant import PlantOptions
 from fakes.plant.push import PACES
 from fakes.pucks.wire import WiredNetwork
 from fakes.sensor.kinds import SensorChoice
 from fakes.sensor.pty import SerialPty
-from fakes.truth import truth_records
+from fakes.truth import Truth, truth_records
 from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
 from fakes.world_clock import TICK_NS, WorldClock
 from ft_sensor.payload import TerrainFrame
@@ -50,7 +57,7 @@ class PtyCable:
 
 
 class RigServer:
-    """Serves one simulated rig to the processes of a session."""
+    """Serves one simulated rig to the processes of a session, and its handle."""
 
     def __init__(
         self,
@@ -67,15 +74,17 @@ class RigServer:
         now_ns = self._clock.now_ns()
         self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
         rig.cable = PtyCable(self._pty, clock)
-        self._handlers = rehearsal_handlers(simulation)
-        self._handlers["hello"] = lambda _: {
-            "can": {
-                "interface": "traction-fake",
-                "channel": str(folder / "can"),
-                "bitrate": 1_000_000,
-            },
-            "port": self._pty.path,
-        }
+        self._can_path = folder / "can"
+        self._server = RpcServer(
+            bind(SimulationControl, simulation),
+            bind(TruthSource, PlantTruth(rig)),
+            bind(DeviceServer, self),
+        )
+
+    def devices(self) -> ServedDevices:
+        """Return where bus and sensor are served."""
+        channel = str(self._can_path)
+        return ServedDevices("traction-fake", channel, 1_000_000, self._pty.path)
 
     def serve(self) -> None:
         """Go on until the console hangs up and the arm's driver has left the bus."""
@@ -83,7 +92,7 @@ class RigServer:
             try:
                 while True:
                     if self._step(self._channel.fileno()):
-                        self._channel.answer(self._handlers)
+                        self._server.answer(self._channel)
             except ChannelClosedError:
                 end_ns = self._clock.now_ns() + LINGER_NS
             while self._hub.clients and self._clock.now_ns() < end_ns:
@@ -120,37 +129,19 @@ class RigServer:
         return max(0, min(wait_ns, TICK_NS)) * 1e-9
 
 
-def rehearsal_handlers(simulation: LocalSimulation) -> dict[str, Handler]:
-    """Return what the console may ask of the simulation."""
-    rig = simulation.rig
-    return {
-        "prepare": simulation.prepare,
-        "lift": lambda _: simulation.lift(),
-        "rest": lambda _: simulation.rest(),
-        "let_go": lambda _: simulation.let_go(),
-        "put_down": lambda _: simulation.put_down(),
-        "touch": simulation.touch,
-        "push": lambda _: simulation.push(),
-        "pendant": simulation.pendant,
-        "inject": simulation.inject,
-        "clear_faults": lambda _: simulation.clear_faults(),
-        "fault_names": lambda _: list(simulation.fault_names),
-        "parameters": lambda _: simulation.parameters(),
-        "truth_part": lambda _: _truth_part(rig),
-    }
+class PlantTruth:
+    """The truth of a plant, a few rows at a time; implements `TruthSource`."""
 
+    def __init__(self, rig: FakeRig) -> None:
+        self._rig = rig
 
-def _truth_part(rig: FakeRig) -> str:
-    """Return the oldest rows of the truth; few, or the bus would wait meanwhile."""
-    truth = rig.plant.truth
-    if truth is None:
-        return ""
-    part = truth.take(TRUTH_ROWS)
-    if not part.t_ns:
-        rig.plant.truth = None
-        return ""
-    records = truth_records(part, rig.scene.frame)
-    return base64.b64encode(records.tobytes()).decode()
+    def truth_part(self) -> Record:
+        """Return the oldest rows that were not taken yet; none ends the truth."""
+        plant, frame = self._rig.plant, self._rig.scene.frame
+        part = plant.truth.take(TRUTH_ROWS) if plant.truth is not None else Truth()
+        if not part.t_ns:
+            plant.take_truth()
+        return truth_records(part, frame)
 
 
 def scene_of(facts: dict[str, Any]) -> SimulatedScene:

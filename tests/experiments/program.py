@@ -12,9 +12,10 @@ from pathlib import Path
 
 import pytest
 
-import fakes.world.rig
 from experiments.cli import main
 from experiments.operator.prompts import AutoOperator
+from fakes.world.rig import FakeRig
+from tests.experiments.built import watch_builds
 
 TRAVEL = 0.07  # m, a container that is crossed in a few seconds
 
@@ -83,7 +84,7 @@ class Watched:
 
     done: Done
     folder: Path
-    rig: fakes.world.rig.FakeRig
+    rig: FakeRig
 
 
 def run_watched(config, data, *arguments, press=None):
@@ -91,25 +92,18 @@ def run_watched(config, data, *arguments, press=None):
 
     `press(asked, rig)` returns the key pressed, or None for what AutoKeys would press.
     """
-    seen = []
-
-    class Seen(fakes.world.rig.FakeRig):
-        def __init__(self, *arguments, **named):
-            super().__init__(*arguments, **named)
-            seen.append(self)
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world.rig, "FakeRig", Seen)
+        built = watch_builds(patch)
         if press is not None:
             usual = AutoOperator.answer
 
             def answer(self, asked):
-                key = press(asked, seen[0])
+                key = press(asked, built.rigs[0])
                 return usual(self, asked) if key is None else key
 
             patch.setattr(AutoOperator, "answer", answer)
         done = run_short(config, data, "TF", *arguments)
-    return Watched(done, only_session(data), seen[0])
+    return Watched(done, only_session(data), built.rigs[0])
 
 
 def run_killed(config, data, *arguments, press):

@@ -1,9 +1,10 @@
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from experiments.cli import COMMANDS, EXIT_CODES
+from experiments.cli import COMMANDS, EXIT_CODES, build_parser
 from experiments.messages import CATALOGUE
 from tests.experiments.program import traction
 
@@ -32,6 +33,42 @@ def test_what_is_no_command_is_a_usage_error(arguments):
     done = traction(*arguments)
     assert done.code == 2
     assert "usage: traction" in done.err
+
+
+GLOBAL = [
+    (("--config", "a.toml"), "config", Path("a.toml"), None),
+    (("--data", "demo"), "data", Path("demo"), Path("data")),
+    (("-v",), "verbose", True, False),
+    (("--verbose",), "verbose", True, False),
+    (("--no-color",), "no_color", True, False),
+]
+
+
+@pytest.mark.parametrize(("option", "name", "value", "default"), GLOBAL)
+def test_a_global_option_works_before_and_after_the_command(
+    option, name, value, default
+):
+    parse = build_parser().parse_args
+    assert getattr(parse(["status"]), name) == default
+    assert getattr(parse([*option, "status"]), name) == value
+    assert getattr(parse(["status", *option]), name) == value
+
+
+@pytest.mark.parametrize("option", ["--config", "--data"])
+def test_of_a_global_option_that_stands_twice_the_later_one_counts(option):
+    args = build_parser().parse_args([option, "early", "status", option, "late"])
+    assert getattr(args, option.strip("-")) == Path("late")
+
+
+def test_other_global_options_stay_as_they_stood_before_the_command():
+    args = build_parser().parse_args(["--data", "demo", "-v", "status", "--no-color"])
+    assert (args.data, args.verbose, args.no_color) == (Path("demo"), True, True)
+
+
+def test_the_board_of_a_folder_named_before_the_command_is_shown(recorded):
+    before = traction("--data", recorded.data, "status")
+    assert before == traction("status", "--data", recorded.data)
+    assert before.code == 0
 
 
 def test_version_is_told():

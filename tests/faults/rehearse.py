@@ -10,12 +10,14 @@ import pytest
 import experiments.run.runner
 import experiments.run.session
 import fakes.world.rig
+from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify
 from experiments.operator.prompts import AutoOperator, Prompt
+from fakes.pucks.bank import PuckBank
 from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
 
@@ -36,6 +38,7 @@ class SimulatedScene:
     """What a fault can reach: the simulated devices and the loop's cycle."""
 
     rig: FakeRig
+    clock: Clock
     patch: pytest.MonkeyPatch
     cycle: Cycle | None = None
     strikes: int = 0
@@ -55,7 +58,7 @@ class SimulatedScene:
         network = self.rig.network
         if network.safety_mode is SafetyMode.E_STOP:
             return "without power"
-        if self.rig.plant._is_held:
+        if self.rig.plant.is_held:
             return "braked"
         is_fresh = network.schedule.now_ns - self.heard_ns < _FRESH_NS
         return "driven" if is_fresh else "last torques"
@@ -65,7 +68,7 @@ class SimulatedScene:
         state = self.cycle.status.state if self.cycle else ArmState.IDLE
         now = (self.arm, state)
         if not self.seen or self.seen[-1][1:] != now:
-            self.seen.append((self.rig._clock.now_ns(), *now))
+            self.seen.append((self.clock.now_ns(), *now))
 
     def reached_ms(self, arm: str, state: ArmState | None) -> float | None:
         """Return how long after the strike the arm did this; None = never."""
@@ -144,18 +147,17 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
     scenes: list[SimulatedScene] = []
 
     class Rig(fakes.world.rig.FakeRig):
-        def __init__(self, *arguments, **named):
-            super().__init__(*arguments, **named)
-            scenes.append(scene := SimulatedScene(self, patch))
-            bank = self.network._bank
-            usual = bank.receive_torques
+        def __init__(self, scene, constants, tool, clock, *arguments, **named):
+            super().__init__(scene, constants, tool, clock, *arguments, **named)
+            scenes.append(SimulatedScene(self, clock, patch))
 
-            def receive(*given):
-                scene.heard_ns = self.network.schedule.now_ns
-                usual(*given)
+    usual_receive = PuckBank.receive_torques
 
-            bank.receive_torques = receive
+    def receive(bank, *given):
+        scenes[-1].heard_ns = scenes[-1].rig.network.schedule.now_ns
+        usual_receive(bank, *given)
 
+    patch.setattr(PuckBank, "receive_torques", receive)
     usual_call = Cycle.__call__
 
     def call(cycle, tick):
@@ -185,7 +187,7 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
         scene = scenes[0]
         if not scene.strikes:
             scene.strikes += 1
-            scene.struck_ns = scene.rig._clock.now_ns()
+            scene.struck_ns = scene.clock.now_ns()
             inject(scene)
 
     def answer(_, asked):
@@ -209,7 +211,7 @@ def _before(patch, module, name: str, first, idle: float = 0.0) -> None:
     def replaced(*given, **named):
         first()
         if idle:  # the arm stays as it is for a while: the loop runs, nobody asks
-            given[0].control.advance(idle)
+            given[0].loop_client.advance(idle)
         return usual(*given, **named)
 
     patch.setattr(module, name, replaced)

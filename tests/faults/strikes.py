@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
+from wam.control.controller import FootController
 
 _J2, _J6 = 1, 5
 
@@ -43,21 +44,21 @@ def _swing(scene: SimulatedScene) -> dict[str, object]:
 def _nonsense(scene: SimulatedScene) -> None:
     """Let the control law come to no number."""
     nan = np.full(7, np.nan)
-    scene.patch.setattr(scene.cycle.law, "torque", lambda _: (nan, nan))
+    scene.patch.setattr(FootController, "torque", lambda *_: (nan, nan))
 
 
 def _stall(duration_ms: int) -> Strike:
     """Return a strike that takes the computer away from the loop."""
 
     def inject(scene: SimulatedScene) -> None:
-        clock = scene.rig._clock
+        clock = scene.clock
         clock.sleep_until(clock.now_ns() + duration_ms * MS)
 
     return inject
 
 
 def _step_utc(scene: SimulatedScene) -> None:
-    clock = scene.rig._clock
+    clock = scene.clock
     usual = clock.utc_ns
     scene.patch.setattr(clock, "utc_ns", lambda: usual() + 3600 * 1000 * MS)
 

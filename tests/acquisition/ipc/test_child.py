@@ -3,30 +3,64 @@
 import os
 import signal
 from pathlib import Path
+from typing import Any, Protocol
 
 import pytest
 
 from acquisition.errors import LinkError
 from acquisition.ipc.child import Child, ProcessLostError
 from acquisition.ipc.layout import SharedLayout
+from acquisition.ipc.rpc import RpcServer, bind, make_proxy
 
 pytestmark = pytest.mark.wall_clock
 HERE = "tests.acquisition.ipc.test_child"
 
 
-def answering(station):
+class Answering(Protocol):
+    """What the child offers."""
+
+    def add(self, a: int, b: int) -> int: ...
+    def refuse(self) -> None: ...
+    def settings(self) -> dict[str, Any]: ...
+    def write(self, text: str) -> None: ...
+    def descriptors(self) -> list[str]: ...
+    def is_session_leader(self) -> bool: ...
+    def fail(self) -> float: ...
+
+
+class Answers:
+    """Implements `Answering`."""
+
+    def __init__(self, context):
+        self.context = context
+
+    def add(self, a, b):
+        return a + b
+
+    def refuse(self):
+        raise LinkError("The bus is down.", hint="Plug it in.")
+
+    def settings(self):
+        return dict(self.context.settings)
+
+    def write(self, text):
+        self.context.shared.status.write(text.encode())
+
+    def descriptors(self):
+        return descriptors()
+
+    def is_session_leader(self):
+        return os.getsid(0) == os.getpid()
+
+    def fail(self):
+        return 1 / 0
+
+
+def answering(context):
     """Be a child that answers until the console hangs up."""
-    handlers = {
-        "add": sum,
-        "refuse": refuse,
-        "settings": lambda _: dict(station.settings),
-        "write": lambda text: station.shared.status.write(text.encode()),
-        "descriptors": lambda _: descriptors(),
-        "terminal": lambda _: os.getsid(0) == os.getpid(),
-        "break": lambda _: 1 / 0,
-    }
+    server = RpcServer(bind(Answering, Answers(context)))
     while True:
-        station.channel.answer(handlers)
+        server.answer(context.channel)
 
 
 def descriptors():
@@ -40,15 +74,11 @@ def descriptors():
     return sorted(found)
 
 
-def refuse(_):
-    raise LinkError("The bus is down.", hint="Plug it in.")
+def failing(context):
+    raise ValueError(f"told {context.settings['word']}")
 
 
-def failing(station):
-    raise ValueError(f"told {station.settings['word']}")
-
-
-def deaf(station):
+def deaf(context):
     import signal as signals
 
     signals.signal(signals.SIGTERM, signals.SIG_IGN)
@@ -70,51 +100,56 @@ def child(shared):
     child.stop()
 
 
-def test_a_child_answers_and_knows_its_settings(child):
-    assert child.ask("add", [2, 3]) == 5
-    assert child.ask("settings") == {"word": "go"}
+@pytest.fixture
+def remote(child):
+    return make_proxy(Answering, child.call)
 
 
-def test_errors_of_a_child_arrive_as_errors(child):
+def test_a_child_answers_and_knows_its_settings(remote):
+    assert remote.add(2, 3) == 5
+    assert remote.settings() == {"word": "go"}
+
+
+def test_errors_of_a_child_arrive_as_errors(child, remote):
     with pytest.raises(LinkError, match="The bus is down"):
-        child.ask("refuse")
+        remote.refuse()
     assert child.is_alive
 
 
-def test_the_board_is_shared(child, shared):
-    child.ask("write", "hello")
+def test_the_memory_is_shared(remote, shared):
+    remote.write("hello")
     assert shared.status.read() == b"hello"
 
 
-def test_a_child_inherits_nothing_but_what_it_needs(child):
+def test_a_child_inherits_nothing_but_what_it_needs(remote):
     # stdin and stdout; the board (a mapping keeps one of its own) and the last words;
     # the channel
     expected = ["/dev/null"] * 2 + ["/memfd"] * 3 + ["socket"]
-    assert child.ask("descriptors") == expected
-    assert child.ask("terminal")
+    assert remote.descriptors() == expected
+    assert remote.is_session_leader()
 
 
-def test_a_killed_child_is_named_with_its_signal(child):
+def test_a_killed_child_is_named_with_its_signal(child, remote):
     os.kill(child.pid, signal.SIGKILL)
     with pytest.raises(ProcessLostError, match="helper process ended: killed by SIGKI"):
-        child.ask("add", [1, 1])
+        remote.add(1, 1)
     assert not child.is_alive
 
 
-def test_a_child_that_breaks_leaves_its_last_words(child):
+def test_a_child_that_breaks_leaves_its_last_words(remote):
     with pytest.raises(ProcessLostError, match="ZeroDivisionError"):
-        child.ask("break")
+        remote.fail()
 
 
 def test_a_child_that_fails_at_once_says_why(shared):
     child = Child("helper", f"{HERE}:failing", {"word": "nonsense"}, shared)
     with pytest.raises(ProcessLostError, match="told nonsense"):
-        child.ask("anything")
+        child.call("anything", {})
     child.stop()
 
 
-def test_stopping_ends_a_child_and_can_be_repeated(child):
-    child.ask("add", [1, 1])
+def test_stopping_ends_a_child_and_can_be_repeated(child, remote):
+    remote.add(1, 1)
     child.stop()
     child.stop()
     assert not child.is_alive

@@ -13,7 +13,6 @@ from string import Formatter
 import numpy as np
 import pytest
 
-import fakes.world.rig
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
@@ -21,7 +20,6 @@ from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.preflight import preflight
-from experiments.rig import fake as simulated
 from experiments.rig import inline as inline_crew
 from experiments.run import activation
 from experiments.run import tare as taring
@@ -30,6 +28,7 @@ from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
 from experiments.settings import load as settings
 from ft_sensor import tare
+from tests.experiments.built import Built, watch_builds
 from tests.experiments.program import (
     Done,
     digest,
@@ -40,6 +39,7 @@ from tests.experiments.program import (
     traction,
     write_config,
 )
+from wam.control.controller import FootController
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -91,31 +91,25 @@ class SimulatedScene:
         data: the data folder.
         config: the rig.toml that it was recorded with.
         patch: changes the program for the time of a case.
-        rigs: the simulated rigs that were built.
-        crews: those who work them.
+        built: what was built for it.
     """
 
     data: Path
     config: Path
     patch: pytest.MonkeyPatch
-    rigs: list = field(default_factory=list)
-    crews: list = field(default_factory=list)
+    built: Built = field(default_factory=Built)
 
     @property
     def rig(self):
-        return self.rigs[-1]
+        return self.built.rig
 
     @property
     def folder(self):
         return only_session(self.data)
 
     def watch(self, press=None):
-        """Keep hold of rigs and crews; `press(asked, scene)` goes before `hurry`."""
-        self.patch.setattr(
-            fakes.world.rig, "FakeRig", self._seen(fakes.world.rig.FakeRig, "rigs")
-        )
-        backend = self._seen(simulated.InProcessBackend, "crews")
-        self.patch.setattr(simulated, "InProcessBackend", backend)
+        """Keep hold of what is built; `press(asked, scene)` goes before `hurry`."""
+        self.built = watch_builds(self.patch)
         usual = AutoOperator.answer
 
         def answer(keys, asked):
@@ -124,16 +118,6 @@ class SimulatedScene:
             return usual(keys, asked) if found is None else found
 
         self.patch.setattr(AutoOperator, "answer", answer)
-
-    def _seen(self, kind, name):
-        seen = getattr(self, name)
-
-        class Seen(kind):
-            def __init__(self, *arguments, **named):
-                super().__init__(*arguments, **named)
-                seen.append(self)
-
-        return Seen
 
 
 def resume(scene, *more, press=None) -> Done:
@@ -236,15 +220,14 @@ def _weak(scene):
 
 
 def _not_a_number(scene):
-    law = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle.law
     scene.patch.setattr(
-        type(law), "torque", lambda *_: (np.full(7, np.nan), np.zeros(7))
+        FootController, "torque", lambda *_: (np.full(7, np.nan), np.zeros(7))
     )
 
 
 def _deaf(scene):
     """Let the console show no sign of life for 0.6 s."""
-    loop_client, left = scene.crews[-1].loop_client, [30]
+    loop_client, left = scene.built.backend.loop_client, [30]
     usual = loop_client.beat
 
     def beat():
@@ -256,22 +239,22 @@ def _deaf(scene):
 
 
 def _orphan(scene):
-    scene.crews[-1].loop_client.advance_cycles._loop._cycle.is_orphaned = True
+    scene.built.loop_servers[-1].is_orphaned = True
 
 
 def _stuck_recorder(scene):
-    scene.crews[-1].recorder.drain = lambda: None
+    scene.built.backend.recorder.drain = lambda: None
 
 
 def _move(scene):
-    scene.crews[-1].loop_client.move_to([0.0] * 7, 0.1)
+    scene.built.backend.loop_client.move_to([0.0] * 7, 0.1)
 
 
 def _lose_recorder(scene):
     def advance_cycles(cycles):
         raise ProcessLostError("recorder", "killed by signal 9")
 
-    scene.crews[-1].loop_client.advance_cycles = advance_cycles
+    scene.built.backend.loop_client.advance_cycles = advance_cycles
 
 
 def _swing(scene):
@@ -280,7 +263,7 @@ def _swing(scene):
 
 def _narrow(scene):
     """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
-    cycle = scene.crews[-1].loop_client.advance_cycles._loop._cycle._cycle
+    cycle = scene.built.cycle
     upper = (*cycle.limits.q_upper[:5], 1.0, cycle.limits.q_upper[6])
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
@@ -439,7 +422,7 @@ CASES = {
     "crash": refused(_crashed_run, words="S001 ended without closing (T02 at "),
     "put-away": Case(_crashed_resume, 5, words="are in rejected/T02a.*"),
     "complete": refused(_complete, 0),
-    "bug": fault("bug@T2+0.1s", 1, words="RehearsedBugError: rehearsed."),
+    "bug": fault("bug@T2+0.1s", 1, words="InjectedBugError: rehearsed."),
     "command-bug": refused(lambda s: _failing_status(s, ZeroDivisionError("so")), 1),
     # what was asked for cannot be
     "config": refused(_bad_config, words='terrains[0].trials = "ten" - expected a w'),
@@ -524,7 +507,7 @@ def test_a_message_is_told_with_its_code_and_nothing_earlier_is_touched(scene, n
 @pytest.mark.parametrize("name", sorted(COMPUTER_FAULTS))
 def test_faults_of_the_computer_can_be_raised_in_every_trial(name):
     plan = FaultPlan(name, 3, 1.5)
-    assert plan.text() == f"{name}@T3+1.5s"
+    assert plan.to_text() == f"{name}@T3+1.5s"
 
 
 def test_a_new_session_that_another_process_opened_first_is_refused(config, tmp_path):

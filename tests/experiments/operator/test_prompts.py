@@ -11,10 +11,10 @@ from experiments.operator.prompts import (
     AutoOperator,
     Prompt,
     PromptState,
-    SimulatedHand,
 )
-from experiments.operator.select import choose_keys
+from experiments.operator.scripted import choose_operator
 from experiments.operator.terminal import TerminalInput
+from experiments.rig.simulation import SimulatedHand
 
 KNOWN = ("ft-stale", "ft-silent", "estop")
 
@@ -59,14 +59,14 @@ def test_the_hand_does_each_thing_once_per_prompt():
 @pytest.mark.parametrize("stdin", [None, io.StringIO()])
 def test_a_simulation_without_a_terminal_runs_by_itself(monkeypatch, stdin):
     monkeypatch.setattr(sys, "stdin", stdin)
-    assert isinstance(choose_keys(None, is_fake=True), AutoOperator)
+    assert isinstance(choose_operator(None, is_fake=True), AutoOperator)
 
 
 @pytest.mark.parametrize("stdin", [None, io.StringIO()])
 def test_a_real_session_needs_a_terminal(monkeypatch, stdin):
     monkeypatch.setattr(sys, "stdin", stdin)
     with pytest.raises(SettingsError, match="needs a person at a terminal"):
-        choose_keys(None, is_fake=False)
+        choose_operator(None, is_fake=False)
 
 
 def test_a_person_at_a_terminal_is_asked(monkeypatch):
@@ -74,7 +74,7 @@ def test_a_person_at_a_terminal_is_asked(monkeypatch):
     terminal.isatty = lambda: True
     terminal.fileno = lambda: 99
     monkeypatch.setattr(sys, "stdin", terminal)
-    assert isinstance(choose_keys(None, is_fake=False), TerminalInput)
+    assert isinstance(choose_operator(None, is_fake=False), TerminalInput)
 
 
 @pytest.mark.parametrize(

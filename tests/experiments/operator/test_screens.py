@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from experiments.operator.keys import screen_keys
+from experiments.operator.prompts import Prompt
 from experiments.operator.screens import (
-    READY_KEYS,
     ReadyView,
     RecordingView,
     ready_lines,
@@ -114,4 +115,4 @@ def test_before_the_first_trial_nothing_is_guessed():
 
 def test_the_ready_screen_fits_eighty_columns():
     lines = ready_lines(ready(trial=10, kept=9, rejected=99, elapsed=35999.0))
-    assert max(map(len, [*lines, READY_KEYS])) <= 80
+    assert max(map(len, [*lines, screen_keys(Prompt.READY)])) <= 80

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from experiments.preflight.foot_check import foot_before
+from experiments.preflight.foot_check import last_foot
 from tests.experiments.program import only_session, traction
 
 
@@ -32,25 +32,25 @@ def run(config, data, terrain, script):
 
 
 def test_the_first_session_asks_for_no_foot(tmp_path):
-    assert foot_before(tmp_path, is_simulated=True) is None
+    assert last_foot(tmp_path, is_simulated=True) is None
 
 
-def test_the_foot_before_is_that_of_the_session_open_last(data):
+def test_the_last_foot_is_that_of_the_session_open_last(data):
     add_session(data, "2027-01-01_S007_Tf.fake", "bare", 1)
-    folder, foot = foot_before(data, is_simulated=True)
-    assert (folder.id, foot) == ("S001", "tread")
+    last = last_foot(data, is_simulated=True)
+    assert (last.folder.id, last.foot) == ("S001", "tread")
     add_session(data, "2027-01-01_S002_Tf.fake", "bare", 5_000_000_000)
-    folder, foot = foot_before(data, is_simulated=True)
-    assert (folder.id, foot) == ("S002", "bare")
+    last = last_foot(data, is_simulated=True)
+    assert (last.folder.id, last.foot) == ("S002", "bare")
 
 
 def test_simulated_sessions_say_nothing_about_the_real_foot(data):
-    assert foot_before(data, is_simulated=False) is None
+    assert last_foot(data, is_simulated=False) is None
 
 
 def test_damaged_conditions_name_no_foot(data):
     (only_session(data) / "conditions.json").write_text("[")
-    assert foot_before(data, is_simulated=True) is None
+    assert last_foot(data, is_simulated=True) is None
 
 
 def test_another_foot_is_confirmed_and_stands_on_the_page(config, data):

@@ -6,45 +6,36 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from experiments.operator.prompts import Prompt
-from experiments.rig import fake as simulated
 from experiments.session.reducer import replay
+from tests.experiments.built import watch_builds
 from tests.experiments.program import journal, run_watched
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(120)]
 MANY = 40  # looks of 20 ms, of which the fault takes 5 and more each time it is mended
 
 
-def narrow(backend):
+def narrow(cycle):
     """Let joint 6 stand beyond what it is allowed from now on."""
-    cycle = backend.loop_client.advance_cycles._loop._cycle._cycle
     upper = (*cycle.limits.q_upper[:5], -1.5, cycle.limits.q_upper[6])
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
 @pytest.fixture
-def crews(monkeypatch):
-    """Return the crews that work a rig from now on."""
-    seen = []
-
-    class Seen(simulated.InProcessBackend):
-        def __init__(self, *arguments, **named):
-            super().__init__(*arguments, **named)
-            seen.append(self)
-
-    monkeypatch.setattr(simulated, "InProcessBackend", Seen)
-    return seen
+def built(monkeypatch):
+    """Return what is built for a session from now on."""
+    return watch_builds(monkeypatch)
 
 
 @pytest.mark.parametrize("prompt", [Prompt.REVIEW, Prompt.PAUSED])
-def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, crews, prompt):
+def test_keys_are_heard_while_a_fault_goes_on(config, tmp_path, built, prompt):
     looks, states = [], set()
 
     def press(asked, _):
         if asked.prompt is prompt:
             looks.append(asked)
-            states.add(crews[0].loop_client.status.state)
+            states.add(built.backend.loop_client.status.state)
             if len(looks) == 1:
-                narrow(crews[0])
+                narrow(built.cycle)
             return "q" if len(looks) > MANY else ""
         if asked.prompt is Prompt.READY:
             return "p" if prompt is Prompt.PAUSED else " "

@@ -7,7 +7,7 @@ from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
 from experiments.operator.prompts import Prompt
-from experiments.run.participants import StopFlag
+from experiments.run.stop import StopFlag
 from tests.experiments.program import journal, run_watched, sidecar
 
 
@@ -173,8 +173,8 @@ class Hands:
 def test_a_second_request_is_urgent_within_three_seconds(pause, is_urgent):
     clock = Hands()
     stop = StopFlag(clock)
-    stop.ask()
+    stop.request()
     assert (stop.count, stop.is_urgent) == (1, False)
     clock.now += round(pause * 1e9)
-    stop.ask()
+    stop.request()
     assert (stop.count, stop.is_urgent) == (2, is_urgent)

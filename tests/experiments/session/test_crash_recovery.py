@@ -65,26 +65,26 @@ def make_session(data):
     """Return the book of an ended session: T01 and T02 kept, T01 rejected once."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
     book = Journal(folder, Now())
-    book.note(Event.STARTED, terrain="S0", trials=2)
-    book.note(Event.ACTIVATED)
+    book.append(Event.STARTED, terrain="S0", trials=2)
+    book.append(Event.ACTIVATED)
     record(book, 1, 1, Event.TRIAL_REJECTED)
     record(book, 1, 2, Event.TRIAL_KEPT)
     record(book, 2, 1, Event.TRIAL_KEPT)
-    book.note(Event.ENDED, reason="complete")
+    book.append(Event.ENDED, reason="complete")
     return book
 
 
 def record(book, number, attempt, verdict):
     facts = {"trial": number, "attempt": attempt}
-    book.note(Event.TRIAL_STARTED, **facts)
+    book.append(Event.TRIAL_STARTED, **facts)
     path = book.folder.trials / f"T{number:02d}.mcap"
     path.write_bytes(f"{number}.{attempt}".encode())
     path.with_suffix(".truth.mcap").write_bytes(f"truth {number}.{attempt}".encode())
     name = f"T{number:02d}"
     sidecar = {"trial": name, "attempt": attempt, "sha256": sha256_of(path)}
     write_json(path.with_suffix(".json"), sidecar)
-    book.note(Event.TRIAL_RECORDED, **facts)
-    book.note(verdict, **facts, reason="", who="mk")
+    book.append(Event.TRIAL_RECORDED, **facts)
+    book.append(verdict, **facts, reason="", who="mk")
 
 
 def contents(folder):
@@ -116,10 +116,10 @@ def kill_in_verdict(data, monkeypatch, step, verdict):
     before = set(contents(book.folder))
     facts = {"trial": 1, "verdict": "reject", "attempt": 2, "reason": "", "who": "mk"}
     if verdict == "keep":  # the other attempt at the same number
-        book.note(Event.VERDICT, **facts)
+        book.append(Event.VERDICT, **facts)
         facts |= {"verdict": "keep", "attempt": 1}
     with killed_at(step, monkeypatch) as was_killed:
-        book.note(Event.VERDICT, **facts)
+        book.append(Event.VERDICT, **facts)
     recover_session(open_journal(book.folder, Now()))
     check_agreement(book.folder)
     assert set(contents(book.folder)) == before
@@ -146,9 +146,9 @@ def crash(data):
     """Return the book of a session that was killed in T01."""
     folder = create_session(data, "S0", is_simulated=True, utc_ns=Now().utc_ns())
     book = Journal(folder, Now())
-    book.note(Event.STARTED, terrain="S0", trials=2)
-    book.note(Event.ACTIVATED)
-    book.note(Event.TRIAL_STARTED, trial=1, attempt=1)
+    book.append(Event.STARTED, terrain="S0", trials=2)
+    book.append(Event.ACTIVATED)
+    book.append(Event.TRIAL_STARTED, trial=1, attempt=1)
     return book
 
 
@@ -229,7 +229,7 @@ def test_a_torn_line_is_ended_before_the_next_one(crashed):
     with path.open("ab") as file:
         file.write(b'{"event": "trial-rec')
     book = open_journal(crashed.folder, Now())
-    book.note(Event.NOTED, text="after the kill")
+    book.append(Event.NOTED, text="after the kill")
     *_, torn, last = path.read_text().splitlines()
     assert torn == '{"event": "trial-rec'
     assert json.loads(last)["text"] == "after the kill"

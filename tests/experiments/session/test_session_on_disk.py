@@ -5,15 +5,11 @@ import stat
 import numpy as np
 import pytest
 
-from acquisition.clock import SystemClock
 from acquisition.sample import SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify
 from acquisition.trial_file.writer import TRIAL_TOPICS
-from experiments.session.journal import Journal
 from experiments.session.reducer import replay
-from experiments.session.states import SessionPhase
-from experiments.session.store import create_session
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import TRAVEL, digest, journal, sidecar
 
@@ -163,21 +159,3 @@ def test_two_trials_of_one_session_differ(recorded):
     )
     count = min(len(first), len(second))
     assert bool((first["wrench_raw"][:count] != second["wrench_raw"][:count]).any())
-
-
-def test_the_journal_is_written_aside_where_somebody_has_to_look_after_the_arm(
-    tmp_path,
-):
-    seen = []
-
-    def aside(work):
-        before = len(folder.events())
-        work()
-        seen.append((before, len(folder.events())))
-
-    folder = create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
-    book = Journal(folder, SystemClock(), aside=aside)
-    book.note("session-started", terrain="TF", trials=1)
-    book.note("activated")
-    assert seen == [(0, 1), (1, 2)]
-    assert book.state.phase is SessionPhase.READY

@@ -17,7 +17,8 @@ from experiments.session.store import (
     read_json,
     write_json,
 )
-from experiments.trial.header import EndDetector, TrialName
+from experiments.session.trial_name import TrialName
+from experiments.trial.header import EndDetector
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 

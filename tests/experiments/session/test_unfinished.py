@@ -3,9 +3,9 @@ import os
 import pytest
 
 from experiments.operator.console import Console
-from experiments.operator.prompts import Prompt
+from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.terminal import TerminalInput
-from experiments.run.resume_prompt import ResumeChoice, choose
+from experiments.run.resume_prompt import ResumeChoice, choose_resume
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from experiments.session.unfinished import find_unfinished
@@ -108,20 +108,14 @@ def test_a_folder_that_cannot_be_read_is_left_out(tmp_path):
 # --- another run is asked for ---------------------------------------------------------
 
 
-class Early(TerminalInput):
-    """A keyboard on which the question was answered before it was asked."""
-
-    def __init__(self, descriptor):
-        super().__init__(descriptor)
-        self._prompt = Prompt.CHOICE
-
-
 def press(keys, found, terrain):
-    """Answer the question with `keys` from a keyboard."""
+    """Answer the question with `keys` from a keyboard, once it is on the screen."""
     read, write = os.pipe()
     try:
+        keyboard = TerminalInput(read)
+        keyboard.answer(PromptState(Prompt.CHOICE, 0, 0, False, 0.0))
         os.write(write, keys)
-        return choose(found, terrain, "", Early(read), Console())
+        return choose_resume(found, terrain, "", keyboard, Console())
     finally:
         os.close(read)
         os.close(write)

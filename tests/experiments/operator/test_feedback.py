@@ -12,7 +12,7 @@ from experiments.operator.feedback import (
     FeedbackSignal,
     OperatorFeedback,
     SpeechOutput,
-    build_cues,
+    build_feedback,
     find_speech,
 )
 from experiments.settings.rig import OperatorSection
@@ -42,7 +42,7 @@ class Words:
 
 def rung(stream, *, bell=True):
     with contextlib.redirect_stdout(stream):
-        feedback = build_cues(OperatorSection(bell=bell), Console())
+        feedback = build_feedback(OperatorSection(bell=bell), Console())
         for cue in FeedbackSignal:
             feedback.give(cue)
     return stream.getvalue()
@@ -74,9 +74,17 @@ def test_nobody_speaks_unless_asked(monkeypatch):
     monkeypatch.setattr(
         "experiments.operator.feedback.find_speech", lambda: "/bin/speak"
     )
-    assert build_cues(OperatorSection(), Console())._speaker is None
-    speaking = build_cues(OperatorSection(speech=True), Console())
-    assert speaking._speaker.program == "/bin/speak"
+    started = []
+
+    def start(command, **_):
+        started.append(command)
+        raise OSError
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    build_feedback(OperatorSection(), Console()).give(FeedbackSignal.DONE)
+    assert started == []
+    build_feedback(OperatorSection(speech=True), Console()).give(FeedbackSignal.DONE)
+    assert started == [("/bin/speak", "done")]
 
 
 @pytest.mark.parametrize(
@@ -106,6 +114,20 @@ def program(tmp_path):
     return path
 
 
+@pytest.fixture
+def started(monkeypatch):
+    """Return the speech programs that are started from now on."""
+    programs = []
+    usual = subprocess.Popen
+
+    def start(command, **options):
+        programs.append(usual(command, **options))
+        return programs[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    return programs
+
+
 def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
     program, tmp_path, monkeypatch
 ):
@@ -126,22 +148,22 @@ def test_words_reach_the_program_without_a_shell_in_a_session_of_its_own(
     assert started[0].returncode == -9  # ended, not waited for
 
 
-def test_new_words_cut_the_old_ones_short(program):
+def test_new_words_cut_the_old_ones_short(program, started):
     speech = SpeechOutput(str(program))
     speech.say("recording")
-    first = speech._speaking
     speech.say("done")
+    first, second = started
     assert first.returncode == -9
-    assert speech._speaking.poll() is None
+    assert second.poll() is None
     speech.close()
     speech.close()
-    assert speech._speaking is None
+    assert second.returncode == -9
 
 
-def test_a_speech_program_that_cannot_start_stops_nobody(tmp_path):
+def test_a_speech_program_that_cannot_start_stops_nobody(tmp_path, started):
     speech = SpeechOutput(str(tmp_path / "gone"))
     speech.say("recording")
-    assert speech._speaking is None
+    assert started == []
     assert os.listdir(tmp_path) == []  # noqa: PTH208
 
 

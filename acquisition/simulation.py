@@ -1,0 +1,99 @@
+"""What a simulated rig offers beyond a real one, whichever process it runs in."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from acquisition.sample import Record
+
+
+class SimulationControl(Protocol):
+    """Hand, pendant, ground and faults of a simulated rig."""
+
+    @property
+    def fault_names(self) -> tuple[str, ...]:
+        """Names that `inject` knows."""
+        ...
+
+    def prepare(self, trial: int) -> None:
+        """Rake the terrain for `trial`."""
+        ...
+
+    def lift(self) -> None:
+        """Let the hand lift the foot above the far end."""
+        ...
+
+    def rest(self) -> None:
+        """Let the hand stop pushing and lie on the arm."""
+        ...
+
+    def let_go(self) -> None:
+        """Let the hand let go of the arm."""
+        ...
+
+    def put_down(self) -> None:
+        """Let the hand put the foot down there."""
+        ...
+
+    def touch(self, number: int) -> None:
+        """Let the hand touch the ground: the corners 1 to 4, then points between."""
+        ...
+
+    def push(self) -> None:
+        """Let the hand push the foot across; the truth is written from here on."""
+        ...
+
+    def pendant(self, button: Literal["activate", "idle", "estop"]) -> None:
+        """Press the pendant."""
+        ...
+
+    def inject(self, fault: str) -> None:
+        """Let a device fail."""
+        ...
+
+    def clear_faults(self) -> None:
+        """End every fault that can be ended without the arm."""
+        ...
+
+    def take_truth(self) -> Record:
+        """Return traction_msgs/Truth records since the push began."""
+        ...
+
+    def parameters(self) -> dict[str, str]:
+        """Return the true parameters of the ground."""
+        ...
+
+
+class TruthSource(Protocol):
+    """The truth of a simulation in another process, a little at a time."""
+
+    def truth_part(self) -> Record:
+        """Return the oldest records that were not taken yet, none at the end.
+
+        Few at a time, or the bus of the simulation would wait meanwhile.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class ServedDevices:
+    """Where the devices of a simulated rig can be reached.
+
+    Attributes:
+        interface: of its CAN bus, in python-can's words.
+        channel: of its CAN bus.
+        bitrate: of its CAN bus [bit/s].
+        port: path of its serial sensor.
+    """
+
+    interface: str
+    channel: str
+    bitrate: int
+    port: str
+
+
+class DeviceServer(Protocol):
+    """The process that serves the devices of a simulated rig."""
+
+    def devices(self) -> ServedDevices:
+        """Return where the devices can be reached."""
+        ...

@@ -1,0 +1,183 @@
+"""The one table of the operator's keys: what each does, on screen and in a script."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+
+from experiments.operator.prompts import Prompt
+
+REJECT_REASONS = {
+    "1": "foot left the bed",
+    "2": "too fast",
+    "3": "touched the frame",
+    "4": "sensor",
+    "5": "other",
+}
+
+
+class KeyAction(Enum):
+    """What a key does."""
+
+    CONFIRM = "confirm"
+    RECORD = "record"
+    STOP = "stop"
+    NOTE = "note"
+    VIEW = "view"
+    PAUSE = "pause"
+    KEEP = "keep"
+    REDO = "redo"
+    RESUME = "resume"
+    CLOSE = "close"
+    FINISH = "finish"
+    QUIT = "quit"
+
+
+class Operand(Enum):
+    """What follows the word of a key in a script."""
+
+    NOTHING = ""
+    TEXT = " TEXT"
+    REASON = " 1..5"
+
+
+@dataclass(frozen=True, slots=True)
+class OperatorKey:
+    """A key at one prompt.
+
+    Attributes:
+        key: as it arrives from the keyboard.
+        action: what it does.
+        help: what it does, in the words of README.
+        screen: as the screen shows it; empty = not shown.
+        word: of a line in an operator script; empty = none.
+        operand: what follows the word.
+    """
+
+    key: str
+    action: KeyAction
+    help: str = ""
+    screen: str = ""
+    word: str = ""
+    operand: Operand = Operand.NOTHING
+
+    @property
+    def label(self) -> str:
+        """The key as README shows it."""
+        label = f"`{'space' if self.key == ' ' else self.key}`"
+        reasons = f" and `{min(REJECT_REASONS)}`..`{max(REJECT_REASONS)}`"
+        return label + reasons if self.operand is Operand.REASON else label
+
+
+_CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
+_QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
+_REASONS = "  ".join(f"{key} {reason}" for key, reason in REJECT_REASONS.items())
+
+KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
+    Prompt.CHOICE: (
+        OperatorKey("1", KeyAction.RESUME),
+        OperatorKey("r", KeyAction.RESUME),
+        OperatorKey("2", KeyAction.CLOSE),
+        OperatorKey("n", KeyAction.CLOSE),
+        _QUIT,
+    ),
+    Prompt.FOOT: (_CONFIRM, _QUIT),
+    Prompt.SUPPORT: (
+        OperatorKey(" ", KeyAction.CONFIRM, "once it is supported"),
+        _QUIT,
+    ),
+    Prompt.CLEAR: (_CONFIRM, _QUIT),
+    Prompt.MOVING: (_QUIT,),
+    Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
+    Prompt.LIFT: (_QUIT,),
+    Prompt.READY: (
+        OperatorKey(" ", KeyAction.RECORD, "record", "[space] record"),
+        OperatorKey("n", KeyAction.NOTE, "note", "[n]ote", "note", Operand.TEXT),
+        OperatorKey(
+            "v", KeyAction.VIEW, "view the last review again", "[v]iew last", "view"
+        ),
+        OperatorKey(
+            "p", KeyAction.PAUSE, "pause (the arm holds)", "[p]ause", word="pause"
+        ),
+        OperatorKey(
+            "q",
+            KeyAction.QUIT,
+            "quit after this trial, twice: at once",
+            "[q]uit after this",
+            "last",
+        ),
+    ),
+    Prompt.PAUSED: (_CONFIRM, _QUIT),
+    Prompt.RECORDING: (
+        OperatorKey(" ", KeyAction.STOP, "stop early", "[space] stop early"),
+        _QUIT,
+    ),
+    Prompt.REVIEW: (
+        OperatorKey("k", KeyAction.KEEP, "keep", "[k]eep", "keep"),
+        OperatorKey(
+            "r",
+            KeyAction.REDO,
+            "redo with its reason",
+            f"[r]edo: {_REASONS}",
+            "redo",
+            Operand.REASON,
+        ),
+        OperatorKey(
+            "n", KeyAction.NOTE, "note on this trial", "[n]ote", "remark", Operand.TEXT
+        ),
+        OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
+    ),
+}
+NOTE_KEYS = "Type the note: Enter ends it, Esc gives it up."
+STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
+
+# Prompts whose keys README explains, with its words for them.
+_EXPLAINED = {
+    Prompt.SUPPORT: "the arm is to be activated",
+    Prompt.READY: "between two trials",
+    Prompt.RECORDING: "while recording",
+    Prompt.REVIEW: "at the review",
+}
+
+
+def key_action(prompt: Prompt, key: str) -> KeyAction | None:
+    """Return what `key` does at `prompt`, None for nothing.
+
+    Args:
+        prompt: what is asked for.
+        key: as an `OperatorInput` returns it; with the digit of its reason for REDO.
+    """
+    for entry in KEYS.get(prompt, ()):
+        if entry.operand is Operand.REASON:
+            if key[:1] == entry.key and key[1:] in REJECT_REASONS:
+                return entry.action
+        elif key == entry.key:
+            return entry.action
+    return None
+
+
+def awaits_reason(prompt: Prompt, key: str) -> bool:
+    """Return whether `key` waits for the digit of a reason at `prompt`."""
+    entries = KEYS.get(prompt, ())
+    return any(e.key == key and e.operand is Operand.REASON for e in entries)
+
+
+def screen_keys(prompt: Prompt) -> str:
+    """Return the keys of `prompt` as the screen shows them."""
+    return "   ".join(entry.screen for entry in KEYS[prompt] if entry.screen)
+
+
+def script_keys(prompt: Prompt) -> dict[str, OperatorKey]:
+    """Return the keys that a script can press at `prompt`, by word."""
+    return {entry.word: entry for entry in KEYS.get(prompt, ()) if entry.word}
+
+
+def readme_rows() -> list[str]:
+    """Return the rows of README's table of keys."""
+    rows: list[str] = []
+    for prompt, when in _EXPLAINED.items():
+        shown = [entry for entry in KEYS[prompt] if entry.help]
+        if prompt is Prompt.RECORDING:
+            shown = [entry for entry in shown if entry.screen]
+        keys = ", ".join(f"{entry.label} {entry.help}" for entry in shown)
+        rows.append(f"| {when} | {keys} |")
+    return rows

@@ -1,0 +1,62 @@
+"""How a session ends early: a stop that was requested, or a fault of the arm."""
+
+import signal
+from collections.abc import Generator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from acquisition.clock import NS_PER_S, Clock, SystemClock
+from acquisition.control_loop.guard import GuardVerdict
+
+URGENT_NS = 3 * NS_PER_S  # two requests closer than this: stop now
+
+
+class StopRequestedError(Exception):
+    """The operator requested a stop: Ctrl-C, SIGTERM, or [q]uit."""
+
+
+class ArmFaultError(Exception):
+    """The guard stopped the arm.
+
+    Attributes:
+        verdict: of the guard.
+    """
+
+    def __init__(self, verdict: GuardVerdict) -> None:
+        super().__init__(verdict.reason)
+        self.verdict = verdict
+
+
+@dataclass(slots=True)
+class StopFlag:
+    """How often a stop was requested; set by signal handlers, read every tick.
+
+    Attributes:
+        clock: the operator's time, never the simulated one.
+        count: number of requests.
+        is_urgent: two requests within 3 s: the arm stops before anything is finished.
+    """
+
+    clock: Clock = field(default_factory=SystemClock)
+    count: int = 0
+    is_urgent: bool = False
+    _requested_ns: int = 0
+
+    def request(self, *_: object) -> None:
+        """Count one more request; also a signal handler."""
+        now = self.clock.now_ns()
+        self.is_urgent |= self.count > 0 and now - self._requested_ns <= URGENT_NS
+        self.count += 1
+        self._requested_ns = now
+
+
+@contextmanager
+def handle_signals(stop: StopFlag) -> Generator[None]:
+    """Turn Ctrl-C, SIGTERM and a lost terminal into requests to stop."""
+    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    before = [signal.signal(number, stop.request) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -1,0 +1,106 @@
+"""The one table of keys, and everything that follows from it."""
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import SettingsError
+from experiments.commands.run import add_arguments
+from experiments.operator.keys import (
+    KEYS,
+    REJECT_REASONS,
+    KeyAction,
+    Operand,
+    awaits_reason,
+    key_action,
+    readme_rows,
+    screen_keys,
+    script_keys,
+)
+from experiments.operator.prompts import AutoOperator, Prompt, PromptState
+from experiments.operator.scripted import ScriptedOperator
+
+README = Path(__file__).parents[3] / "README.md"
+SCRIPTED = [
+    (prompt, word)
+    for prompt in (Prompt.READY, Prompt.REVIEW)
+    for word in script_keys(prompt)
+]
+
+
+def state(prompt, since=100.0):
+    return PromptState(prompt, 1, 1, is_complete=True, since=since)
+
+
+def script_line(prompt, word):
+    operand = script_keys(prompt)[word].operand
+    return word + {Operand.TEXT: " a b", Operand.REASON: " 3"}.get(operand, "")
+
+
+@pytest.mark.parametrize("row", readme_rows())
+def test_the_table_of_keys_in_the_readme_is_this_one(row):
+    assert row in README.read_text().splitlines()
+
+
+@pytest.mark.parametrize(("prompt", "word"), SCRIPTED)
+def test_a_word_of_a_script_presses_its_key_at_its_prompt(tmp_path, prompt, word):
+    script = tmp_path / "script.txt"
+    script.write_text(script_line(prompt, word))
+    entry = script_keys(prompt)[word]
+    key = ScriptedOperator(script).answer(state(prompt))
+    assert key_action(prompt, key) is entry.action
+
+
+@pytest.mark.parametrize(("prompt", "word"), SCRIPTED)
+def test_every_word_of_a_script_is_in_help_readme_and_refusal(tmp_path, prompt, word):
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    bad = tmp_path / "bad.txt"
+    bad.write_text("fly")
+    with pytest.raises(SettingsError) as refusal:
+        ScriptedOperator(bad)
+    operand = script_keys(prompt)[word].operand
+    assert f"{word}{operand.value}" in " ".join(parser.format_help().split())
+    assert f"{word}{operand.value}" in str(refusal.value)
+    shown = f"`{word} 1`" if operand is Operand.REASON else f"`{word}{operand.value}`"
+    assert shown in README.read_text()
+
+
+@pytest.mark.parametrize("prompt", KEYS)
+def test_every_key_of_a_prompt_does_one_thing(prompt):
+    keys = [entry.key for entry in KEYS[prompt]]
+    assert len(set(keys)) == len(keys)
+
+
+@pytest.mark.parametrize("prompt", KEYS)
+def test_what_the_automatic_operator_presses_means_something(prompt):
+    key = AutoOperator().answer(state(prompt))
+    assert not key or key_action(prompt, key) is not None
+
+
+@pytest.mark.parametrize("digit", REJECT_REASONS)
+def test_a_redo_needs_its_reason(digit):
+    assert key_action(Prompt.REVIEW, f"r{digit}") is KeyAction.REDO
+    assert key_action(Prompt.REVIEW, "r") is None
+    assert key_action(Prompt.REVIEW, "r9") is None
+
+
+def test_only_the_key_of_a_redo_waits_for_a_digit():
+    waiting = {
+        (prompt, entry.key)
+        for prompt, entries in KEYS.items()
+        for entry in entries
+        if awaits_reason(prompt, entry.key)
+    }
+    assert waiting == {(Prompt.REVIEW, "r")}
+
+
+def test_a_key_without_meaning_does_nothing():
+    assert key_action(Prompt.READY, "k") is None
+    assert key_action(Prompt.NOTE, "n") is None
+
+
+def test_the_screen_shows_every_reason_of_a_redo():
+    shown = screen_keys(Prompt.REVIEW)
+    assert all(f"{key} {why}" in shown for key, why in REJECT_REASONS.items())

@@ -1,0 +1,103 @@
+"""The conditions of a session, also of one that another version has recorded."""
+
+import io
+import json
+from contextlib import redirect_stdout
+
+import pytest
+
+from acquisition.errors import SessionError
+from experiments.operator.console import Console
+from experiments.preflight.conditions import (
+    FILE,
+    VERSION,
+    check_conditions,
+    default_conditions,
+    differences,
+    read_conditions,
+    write_conditions,
+)
+from experiments.session.store import SessionFolder
+
+DEFAULTS = default_conditions()
+NOW = {**DEFAULTS, "rig.limits.foot_speed": "0.8", "terrain.foot": "tread"}
+LATER = "rig.safety.torque_fault_units"  # a setting that older sessions lack
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return SessionFolder(tmp_path, "S001", "TF", is_simulated=True)
+
+
+def check(folder, now, *, is_forced=False):
+    with redirect_stdout(io.StringIO()):
+        return check_conditions(folder, now, Console(), is_forced=is_forced)
+
+
+def write_old(folder, values):
+    """Write the file as version 1 did."""
+    (folder.path / FILE).write_text(json.dumps(values))
+
+
+def without(values, *names):
+    return {name: value for name, value in values.items() if name not in names}
+
+
+def test_conditions_are_read_as_they_were_written(folder):
+    write_conditions(folder, NOW)
+    conditions = read_conditions(folder)
+    assert (conditions.version, conditions.values) == (VERSION, NOW)
+
+
+def test_a_file_without_a_number_is_version_1(folder):
+    write_old(folder, NOW)
+    assert read_conditions(folder).version == 1
+
+
+def test_damaged_conditions_are_empty(folder):
+    (folder.path / FILE).write_text("[")
+    assert not read_conditions(folder).values
+
+
+def test_a_setting_that_is_younger_than_the_session_had_its_default(folder):
+    write_old(folder, without(NOW, LATER))
+    assert check(folder, NOW) == []
+
+
+def test_a_younger_setting_that_is_not_at_its_default_is_named(folder):
+    write_old(folder, without(NOW, LATER))
+    with pytest.raises(SessionError, match=f"{LATER} was {DEFAULTS[LATER]}, is 4000"):
+        check(folder, {**NOW, LATER: "4000"})
+
+
+def test_a_whole_section_may_be_younger(folder):
+    section = [name for name in NOW if name.startswith("rig.safety.")]
+    write_old(folder, without(NOW, *section))
+    assert len(section) > 2
+    assert check(folder, NOW) == []
+
+
+def test_a_missing_setting_without_a_default_is_a_difference(folder):
+    write_old(folder, without(NOW, "rig.limits.foot_speed"))
+    (text,) = check(folder, NOW, is_forced=True)
+    assert text.startswith("rig.limits.foot_speed was not there")
+
+
+def test_a_setting_that_is_not_known_any_more_is_left_out(folder):
+    write_old(folder, {**NOW, "rig.limits.of_old": "3"})
+    assert check(folder, NOW) == []
+
+
+def test_a_file_of_a_newer_version_is_refused(folder):
+    (folder.path / FILE).write_text(json.dumps({"version": VERSION + 1, **NOW}))
+    with pytest.raises(SessionError, match=f"version {VERSION + 1}"):
+        check(folder, NOW, is_forced=True)
+
+
+def test_what_no_number_depends_on_has_no_default_either():
+    assert not [name for name in DEFAULTS if name.startswith("rig.operator.")]
+
+
+def test_optional_settings_are_compared_as_they_are_written():
+    assert DEFAULTS["rig.ft_sensor.ranges"] == "None"
+    assert differences({}, {"rig.ft_sensor.sinc": "64"}) == []
