@@ -26,14 +26,17 @@ class SteppedClock:
     Start and epoch are fixed, so two runs with the same seed have the same times.
 
     Attributes:
-        world: what goes on while somebody waits.
         lag_ns: so late a sleep ends, as on a computer that is busy elsewhere [ns].
     """
 
     def __init__(self) -> None:
         self._now_ns = START_NS
-        self.world: World | None = None
+        self._world: World | None = None
         self.lag_ns = 0
+
+    def attach(self, world: World) -> None:
+        """Let `world` go on while somebody waits; it needs the clock to be made."""
+        self._world = world
 
     def now_ns(self) -> int:
         """Return the simulated monotonic time [ns]."""
@@ -51,7 +54,7 @@ class SteppedClock:
     def wait(self, link: Readable, deadline_ns: int) -> bool:
         """Go from event to event until `link` is readable or `deadline_ns` comes."""
         while not link.is_readable():
-            event = self.world.next_event_ns() if self.world else None
+            event = self._world.next_event_ns() if self._world else None
             if event is None or event > deadline_ns:
                 if deadline_ns > self._now_ns:
                     self._go_to(deadline_ns)
@@ -61,5 +64,5 @@ class SteppedClock:
 
     def _go_to(self, t_ns: int) -> None:
         self._now_ns = t_ns
-        if self.world is not None:
-            self.world.advance(t_ns)
+        if self._world is not None:
+            self._world.advance(t_ns)

@@ -38,6 +38,8 @@ class LoopStats:
 class Loop:
     """Calls `cycle` on a grid of `period_ns`; the grid never moves.
 
+    `stats` is filled in as it goes on, for whoever else reads it.
+
     A cycle that overruns makes the loop skip whole periods: there is no burst of
     catch-up cycles, and the numbers of the skipped cycles are missing in the record.
     """
@@ -47,13 +49,14 @@ class Loop:
         cycle: Callable[[Tick], None],
         clock: Clock,
         period_ns: int = PERIOD_NS,
+        stats: LoopStats | None = None,
     ) -> None:
         self._cycle = cycle
         self._clock = clock
         self._period_ns = period_ns
         self._next_ns: int | None = None
         self._number = 0
-        self.stats = LoopStats()
+        self.stats = stats or LoopStats()
 
     def run(self, cycles: int) -> None:
         """Run until `cycles` periods have passed on the grid."""

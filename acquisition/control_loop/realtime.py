@@ -50,23 +50,23 @@ def choose_cores() -> tuple[int | None, int | None]:
     return (cores[-1], cores[0]) if len(cores) > 1 else (None, None)
 
 
-def request(wish: RealtimeRequest) -> list[Grant]:
-    """Ask the kernel for what `wish` says; what it refuses is in the answer."""
+def request(wanted: RealtimeRequest) -> list[Grant]:
+    """Ask the kernel for what `wanted` says; what it refuses is in the answer."""
     grants: list[Grant] = []
-    if wish.core is not None:
-        core = wish.core
+    if wanted.core is not None:
+        core = wanted.core
         grants.append(_try(f"core {core}", lambda: os.sched_setaffinity(0, {core})))
-    if wish.priority:
-        parameter = os.sched_param(wish.priority)
+    if wanted.priority:
+        parameter = os.sched_param(wanted.priority)
         grants.append(
             _try(
                 "SCHED_FIFO",
                 lambda: os.sched_setscheduler(0, os.SCHED_FIFO, parameter),
             )
         )
-    if wish.nice:
-        grants.append(_try(f"nice {wish.nice}", lambda: _nice(wish.nice)))
-    if wish.is_locked:
+    if wanted.nice:
+        grants.append(_try(f"nice {wanted.nice}", lambda: _nice(wanted.nice)))
+    if wanted.is_locked:
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -99,9 +99,9 @@ def _lock_memory() -> None:
         raise OSError(number, os.strerror(number))
 
 
-def _try(what: str, ask: Callable[[], object]) -> Grant:
+def _try(what: str, call: Callable[[], object]) -> Grant:
     try:
-        ask()
+        call()
     except OSError as error:
         name = errno.errorcode.get(error.errno or 0, "error")
         needs = f"; needs {_NEEDS[what]}" if what in _NEEDS else ""

@@ -64,7 +64,7 @@ class LoopServer:
     """
 
     def __init__(
-        self, cycle: Cycle, arm: Arm, shared: SharedLayout, around: LoopHooks
+        self, cycle: Cycle, arm: Arm, shared: SharedLayout, hooks: LoopHooks
     ) -> None:
         self.is_over = False
         self.is_orphaned = False
@@ -72,7 +72,7 @@ class LoopServer:
         self._cycle = cycle
         self._arm = arm
         self._shared = shared
-        self._around = around
+        self._hooks = hooks
         self._commands = CommandQueue(shared.commands)
         self._status_slot = StatusSlot(shared.status)
         self._status = LoopStatus(is_running=True, control=cycle.status)
@@ -112,7 +112,7 @@ class LoopServer:
         self._status.obeyed = command.number
 
     def _publish_facts(self) -> None:
-        self._shared.health.write(json.dumps(dict(self._around.facts())).encode())
+        self._shared.health.write(json.dumps(dict(self._hooks.facts())).encode())
 
     def _watch(self, now_ns: int) -> None:
         """Stop the arm when those who look after it have gone."""
@@ -121,7 +121,7 @@ class LoopServer:
         if console_ns > SILENT_NS:
             self._cycle.report(verdict_for(Fault.CONSOLE_SILENT))
             if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0:
-                self._around.ring()
+                self._hooks.ring()
         if (
             self._cycle.is_recording
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS
@@ -147,7 +147,7 @@ class LoopServer:
         status.skipped, status.late = stats.skipped, stats.late
         status.worst_late_ns = stats.worst_late_ns
         self._status_slot.write(status)
-        now_ns = self._around.now_ns()
+        now_ns = self._hooks.now_ns()
         self._shared.heartbeats.beat(_CONTROL, now_ns)
         self._shared.timings.write(
             pack_timing(tick, self._cycle.replies_ns, self._arm.sent_ns, now_ns)

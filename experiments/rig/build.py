@@ -24,7 +24,7 @@ from ft_sensor.payload import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line.link import SerialLink, SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.barrett import BarrettSensor
-from wam.bus.link import CanLink, FrameTap
+from wam.bus.link import CanBus, CanLink, FrameTap
 from wam.control.controller import FootController
 from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
@@ -94,15 +94,15 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
 
 
+def build_link(bus: CanBus, shared: SharedLayout, clock: Clock) -> CanLink:
+    """Return the link to a bus; every frame goes into the shared memory too."""
+    return CanLink(bus, FrameTap(FrameTape(shared.frames), clock))
+
+
 def build_arm(
-    rig: RigSettings,
-    constants: ArmConstants,
-    link: CanLink,
-    shared: SharedLayout,
-    clock: Clock,
+    rig: RigSettings, constants: ArmConstants, link: CanLink, clock: Clock
 ) -> WamArm:
-    """Return the driver of the arm on `link`; every frame goes onto the board."""
-    link.tap = FrameTap(FrameTape(shared.frames), clock)
+    """Return the driver of the arm on `link`."""
     settings = ArmSettings(j2mp=constants.j2mp, safety_limits=build_safety_limits(rig))
     return WamArm(link, clock, settings)
 

@@ -14,6 +14,7 @@ from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
+    build_link,
     build_sensor,
     build_tool,
     open_bus_sensor,
@@ -26,7 +27,6 @@ from experiments.settings.rig import RigSettings
 from ft_sensor.serial_line.link import SerialPort
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.registry import AnySensor
-from wam.bus.link import CanLink
 from wam.model.arm_model import ArmModel
 from wam.model.tool import tool_facts, tool_of
 
@@ -112,9 +112,9 @@ def stepped(
         clock,
         options=PlantOptions(friction=facts["friction"]),
     )
-    clock.world = simulation
-    link = CanLink(simulation.bus)
-    arm = build_arm(settings.rig, model.constants, link, shared, clock)
+    clock.attach(simulation)
+    link = build_link(simulation.bus, shared, clock)
+    arm = build_arm(settings.rig, model.constants, link, clock)
 
     def sensor() -> WrenchSensor:
         if settings.rig.ft_sensor.is_on_bus:

@@ -69,8 +69,7 @@ class InProcessBackend:
         if self._sensor is None:
             raise RuntimeError("the sensor was not opened")
         loop_server = build_loop_server(self._parts(self._sensor))
-        loop = Loop(loop_server, self._clock)
-        loop_server.stats = loop.stats
+        loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         self.loop_client.advance_cycles = InlineAdvance(loop, self.recorder)
         self.loop_client.beat()
 

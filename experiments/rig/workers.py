@@ -24,6 +24,7 @@ from experiments.rig.backend import measure_exchange
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
+    build_link,
     build_loop_server,
     build_sensor,
     build_tool,
@@ -132,11 +133,9 @@ class ControlWorker:
         """Return the arm, its bus open; raises LinkError."""
         if self._arm is None:
             can = self._context.settings["can"]
-            link = self._link = CanLink(
-                open_bus(can["interface"], can["channel"], can["bitrate"])
-            )
-            shared = self._context.shared
-            self._arm = build_arm(self._rig, self._constants, link, shared, self._clock)
+            bus = open_bus(can["interface"], can["channel"], can["bitrate"])
+            link = self._link = build_link(bus, self._context.shared, self._clock)
+            self._arm = build_arm(self._rig, self._constants, link, self._clock)
         return self._arm
 
     def begin(self) -> None:
@@ -159,8 +158,7 @@ class ControlWorker:
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, the arm is braked."""
         self._context.shared.memory.touch()
-        loop = Loop(loop_server, self._clock)
-        loop_server.stats = loop.stats
+        loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
                 loop_server.is_orphaned = self._is_orphaned

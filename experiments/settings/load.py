@@ -190,7 +190,7 @@ class _Location:
 
     @property
     def example(self) -> str:
-        """An example of the field as the end of a sentence; empty for none."""
+        """An example of the field for the end of a sentence; or nothing."""
         examples = self.field.examples if self.field else None
         return f", e.g. {examples[0]}" if examples else ""
 

@@ -169,7 +169,7 @@ class PuckBank:
 
     def _restart(self, puck: MotorPuck, stat: int) -> None:
         """Obey SET STAT: wake a sleeping puck, reset a running one."""
-        change = puck.life.change_by(stat)
+        change = puck.life.transition(stat)
         if change is None:
             return
         delay_ns, power = change

@@ -124,7 +124,7 @@ class BusFaults:
         Until something goes wrong for the first time frames take the short way. The
         long one stays: a mended delay still keeps frames of an identifier in order.
         """
-        self._schedule.emit = self._pass_on
+        self._schedule.intercept(self._pass_on)
 
     def _pass_on(self, can_id: int, data: bytes) -> None:
         for delay_ns, left in self._struck(can_id, data):

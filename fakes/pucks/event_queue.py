@@ -23,9 +23,7 @@ class EventQueue:
     Attributes:
         now_ns: the network's time; it never runs back.
         next_ns: when the next plan or the alarm is due, `NEVER` if there is none.
-        emit: lets a device say something now (identifier, data); whoever comes between
-            the devices and the wire takes the place of `put`.
-        on_alarm: called when the alarm goes off.
+        emit: sends a frame of a device now (identifier, data); see `intercept`.
         outbox: frames that want onto the wire, until they are taken.
     """
 
@@ -33,7 +31,7 @@ class EventQueue:
         self.now_ns = t_ns
         self.next_ns = NEVER
         self.emit: Callable[[int, bytes], None] = self.put
-        self.on_alarm: Callable[[], None] = lambda: None
+        self._on_alarm: Callable[[], None] = lambda: None
         self._alarm_ns = NEVER
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
         self._plan_count = 0
@@ -46,8 +44,16 @@ class EventQueue:
         heappush(self._plans, (at_ns, self._plan_count, action))
         self.next_ns = min(self.next_ns, at_ns)
 
+    def intercept(self, emit: Callable[[int, bytes], None]) -> None:
+        """Give every frame of a device to `emit` from now on, instead of `put`."""
+        self.emit = emit
+
+    def define_alarm(self, action: Callable[[], None]) -> None:
+        """Call `action` when the alarm goes off."""
+        self._on_alarm = action
+
     def set_alarm(self, at_ns: int) -> None:
-        """Call `on_alarm` at `at_ns` and at no other time, `NEVER` = not at all."""
+        """Let the alarm go off at `at_ns` only, `NEVER` = not at all."""
         self._alarm_ns = at_ns
         self._find_next()
 
@@ -61,7 +67,7 @@ class EventQueue:
                 self._find_next()
                 action()
             else:
-                self.on_alarm()
+                self._on_alarm()
         self.now_ns = max(self.now_ns, t_ns)
 
     def put(self, can_id: int, data: bytes) -> None:

@@ -126,7 +126,7 @@ class ForceTorquePuck:
             self._properties[name] = value
 
     def _obey_stat(self, stat: int) -> None:
-        change = self.life.change_by(stat)
+        change = self.life.transition(stat)
         if change is not None:
             delay_ns, power = change
             self._restart(Power.SILENT)

@@ -129,13 +129,13 @@ class PuckNetwork:
         """Let nobody know where the joints are, as after power-up."""
         self._safety.forget_positions()
 
-    def strain(self, monitor: Strainable) -> None:
+    def trip(self, monitor: Strainable) -> None:
         """Let a monitor of the safety module find fault with what it sees."""
-        self._safety.strain(monitor)
+        self._safety.trip(monitor)
 
-    def relax(self) -> None:
+    def reset_monitors(self) -> None:
         """Let the safety module judge as before; a fault stays until Shift-idle."""
-        self._safety.relax()
+        self._safety.reset_monitors()
 
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor: no torque, position and tare lost."""

@@ -70,7 +70,7 @@ class PuckPower:
         self._lives += 1
         self.power = power
 
-    def change_by(self, stat: int) -> tuple[int, Power] | None:
+    def transition(self, stat: int) -> tuple[int, Power] | None:
         """Return what SET STAT does: a silence [ns] and the power after it, if any."""
         if stat == PuckStatus.READY and self.power is Power.MONITOR:
             return self._options.boot_ns, Power.AWAKE
@@ -100,5 +100,5 @@ class PuckPower:
             if value is not None:
                 self._schedule.reply(self.node, number, name, value)
 
-        thought_ns = min(_APART_NS * self.node, _LATEST_NS)
-        self.later(self._options.latch_ns + thought_ns, speak)
+        delay_ns = min(_APART_NS * self.node, _LATEST_NS)
+        self.later(self._options.latch_ns + delay_ns, speak)

@@ -91,7 +91,7 @@ class FakeSafetyModule:
                 **_POWER_UP_LIMITS,
             },
         }
-        schedule.on_alarm = self._miss_beat
+        schedule.define_alarm(self._miss_beat)
         self._feel_beat()
 
     @property
@@ -122,7 +122,7 @@ class FakeSafetyModule:
     def forget_positions(self) -> None:
         """Know no longer where the joints are, as after power-up."""
         self._properties["ZERO"] = 0
-        self._speeds.forget()
+        self._speeds.reset()
 
     def receive(self, request: Property) -> None:
         """Take a GET or SET sent to the module."""
@@ -140,7 +140,7 @@ class FakeSafetyModule:
         self._bus_voltage = voltage
         self._judge_voltage()
 
-    def strain(self, monitor: Strainable) -> None:
+    def trip(self, monitor: Strainable) -> None:
         """Let a monitor find fault with what it sees, until `relax`.
 
         The limits of speed and torque become the smallest that is not off; for the
@@ -153,7 +153,7 @@ class FakeSafetyModule:
             self._spared.setdefault(limit, self._properties[limit])
             self._properties[limit] = 1
 
-    def relax(self) -> None:
+    def reset_monitors(self) -> None:
         """Judge as before; a fault stays until Shift-idle."""
         self._is_deaf = False
         self._properties.update(self._spared)
@@ -164,7 +164,7 @@ class FakeSafetyModule:
         if self._is_deaf:
             return
         self._feel_beat()
-        self._speeds.hear(self._schedule.now_ns, positions)
+        self._speeds.on_positions(self._schedule.now_ns, positions)
         self._judge_speed()
 
     def hear_torques(self, group: int, units: Sequence[int]) -> None:
@@ -256,7 +256,7 @@ class FakeSafetyModule:
         before, self.mode = self.mode, mode
         if mode is SafetyMode.E_STOP:
             self._properties["ZERO"] = 0
-            self._speeds.forget()
+            self._speeds.reset()
             self._too_fast_since_ns = None
         self._feel_beat()
         told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)

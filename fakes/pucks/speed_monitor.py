@@ -30,12 +30,12 @@ class SpeedMonitor:
             deque(maxlen=HISTORY + 1) for _ in range(_MAIN_JOINTS)
         ]
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew: the pucks have lost their power."""
         for seen in self._seen:
             seen.clear()
 
-    def hear(self, t_ns: int, positions: Mapping[int, int]) -> None:
+    def on_positions(self, t_ns: int, positions: Mapping[int, int]) -> None:
         """Take positions [counts] by node, all latched at `t_ns`."""
         for node, seen in enumerate(self._seen, 1):
             counts = positions.get(node)

@@ -104,7 +104,7 @@ class BotaFirmware:
         self._run_from(self._ready_ns)
         return said
 
-    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
         """Obey the commands in `data`; return the acknowledgements."""
         if self._options.is_deaf or t_ns < self._ready_ns:
             return []

@@ -61,7 +61,7 @@ class Firmware(Protocol):
         """Begin anew; return what it says by itself."""
         ...
 
-    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
         """Take bytes from the client; return the answers."""
         ...
 

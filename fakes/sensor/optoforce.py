@@ -75,7 +75,7 @@ class OptoForceFirmware:
         self._run_from(t_ns, 10)
         return []
 
-    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
         """Obey the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []

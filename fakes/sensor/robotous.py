@@ -83,7 +83,7 @@ class RobotousFirmware:
         self.schedule = None
         return []
 
-    def hear(self, t_ns: int, data: bytes) -> list[Saying]:
+    def receive(self, t_ns: int, data: bytes) -> list[Saying]:
         """Obey the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []

@@ -82,7 +82,7 @@ class SensorStream:
     def receive(self, t_ns: int, data: bytes) -> None:
         """Take bytes written by the client at `t_ns`."""
         self._sample_until(t_ns)
-        said = self._firmware.hear(t_ns, data)
+        said = self._firmware.receive(t_ns, data)
         if self._firmware.on_since_ns != self._on_since_ns:
             self._begin_anew()
         self._say(said)

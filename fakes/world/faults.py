@@ -39,9 +39,9 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "can-down": faults.go_off,
         "not-zeroed": network.forget_positions,
         "bus-flooded": lambda: faults.flood(FOREIGN_LOAD),
-        "safety-speed": lambda: network.strain("velocity"),
-        "safety-torque": lambda: network.strain("torque"),
-        "safety-heartbeat": lambda: network.strain("heartbeat"),
+        "safety-speed": lambda: network.trip("velocity"),
+        "safety-torque": lambda: network.trip("torque"),
+        "safety-heartbeat": lambda: network.trip("heartbeat"),
         "safety-voltage": lambda: network.set_bus_voltage(_LOW_VOLTAGE),
         "estop": lambda: network.pendant("estop"),
         "pendant-idle": lambda: network.pendant("idle"),
@@ -55,7 +55,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
     until a start-up wakes it and has to be zeroed, as on a real arm.
     """
     network.faults.clear_faults()
-    network.relax()
+    network.reset_monitors()
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     for node in MOTOR_NODES:
         network.silence(node, is_mute=False)

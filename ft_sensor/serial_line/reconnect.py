@@ -22,13 +22,13 @@ class ReconnectingSensor:
 
     Attributes:
         reopened: how often it was opened again.
-        trouble: why it is not read at present; empty while it is.
+        last_error: why it is not read at present; empty while it is.
     """
 
     def __init__(self, connect: Callable[[], SerialSensor], clock: Clock) -> None:
         """Take what opens the port; `connect` returns a sensor not opened yet."""
         self.reopened = 0
-        self.trouble = ""
+        self.last_error = ""
         self._connect = connect
         self._clock = clock
         self._sensor: SerialSensor | None = None
@@ -55,7 +55,7 @@ class ReconnectingSensor:
     def poll(self, now_ns: int) -> list[WrenchSample]:
         """Return what has arrived; looks for a lost sensor, which takes seconds."""
         if self._sensor is None:
-            self._look_for_it(now_ns)
+            self._reconnect(now_ns)
             return []
         try:
             samples = self._sensor.poll(now_ns)
@@ -79,7 +79,7 @@ class ReconnectingSensor:
         self._facts = sensor.describe()
         self._trusted_ns = self._clock.now_ns()
         self._pause_ns = FIRST_PAUSE_NS
-        self.trouble = ""
+        self.last_error = ""
 
     def _opened(self) -> SerialSensor:
         sensor = self._connect()
@@ -92,17 +92,17 @@ class ReconnectingSensor:
 
     def _lose(self, why: str, now_ns: int) -> None:
         self.close()
-        self.trouble = why
+        self.last_error = why
         self._next_ns = now_ns + self._pause_ns
 
-    def _look_for_it(self, now_ns: int) -> None:
+    def _reconnect(self, now_ns: int) -> None:
         if now_ns < self._next_ns:
             return
         try:
             sensor = self._opened()
             self._refuse_another(sensor)
         except TractionError as error:
-            self.trouble = error.message
+            self.last_error = error.message
             self._pause_ns = min(2 * self._pause_ns, LONGEST_PAUSE_NS)
             self._next_ns = self._clock.now_ns() + self._pause_ns
             return
@@ -124,7 +124,7 @@ class ReconnectingSensor:
 
 def stream_facts(reconnecting: ReconnectingSensor) -> dict[str, str]:
     """Return what became of the stream since it was opened last, as text."""
-    facts = {"reopened": str(reconnecting.reopened), "trouble": reconnecting.trouble}
+    facts = {"reopened": str(reconnecting.reopened), "trouble": reconnecting.last_error}
     if reconnecting.sensor is not None:
         facts |= reconnecting.sensor.stream_facts()
     return facts

@@ -1,4 +1,4 @@
-"""What the opening rituals of all serial sensors share: speak, listen, count."""
+"""What the start-up of all serial sensors shares: commands, answers, frame rate."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -12,24 +12,24 @@ from ft_sensor.serial_line.link import SerialLink
 MIN_RATE = 0.99 * RATE_HZ  # [Hz]; less by what two clocks may disagree
 FIRST_READINGS = 10
 _FIRST_NS = NS_PER_S
-_HEARD_SIZE = 2048  # answers are looked for in this much of what came last
+_BUFFER_SIZE = 2048  # answers are looked for in this much of what came last
 
 T = TypeVar("T")
 
 
 class SerialDialog:
-    """One side of a conversation with a sensor that may be streaming meanwhile.
+    """Commands to a sensor, and their answers in what may be a running stream.
 
     Attributes:
-        heard: the last bytes that came since `forget`, or since the last command.
-        heard_bytes: how many came in all.
+        buffer: the last bytes that came since `discard`, or since the last write.
+        received_bytes: how many came in all.
     """
 
     def __init__(
         self, link: SerialLink, clock: Clock, scanner: FrameScanner[Reading]
     ) -> None:
-        self.heard = b""
-        self.heard_bytes = 0
+        self.buffer = b""
+        self.received_bytes = 0
         self._link = link
         self._clock = clock
         self._scanner = scanner
@@ -39,41 +39,41 @@ class SerialDialog:
         """Good frames so far."""
         return self._scanner.counters.frames
 
-    def say(self, data: bytes) -> None:
+    def write(self, data: bytes) -> None:
         """Send `data`; answers are looked for in what comes from now on.
 
         Raises:
             LinkError: the port failed.
         """
-        self.heard = b""
+        self.buffer = b""
         self._link.write(data)
 
     def pause(self, duration_ns: int) -> None:
         """Let time pass; what comes meanwhile stays in the port."""
         self._clock.sleep_until(self._clock.now_ns() + duration_ns)
 
-    def forget(self) -> None:
-        """Throw away what has come and was not read."""
+    def discard(self) -> None:
+        """Discard all input so far."""
         self._link.discard_input()
-        self.heard = b""
+        self.buffer = b""
 
     def wait_for(
         self,
-        found: Callable[[], T | None],
+        condition: Callable[[], T | None],
         duration_ns: int,
         readings: list[Reading] | None = None,
     ) -> T | None:
-        """Listen until `found` returns something; None after `duration_ns`.
+        """Listen until `condition` returns something; None after `duration_ns`.
 
         `readings` collects the frames that come meanwhile.
         """
         deadline_ns = self._clock.now_ns() + duration_ns
-        while (result := found()) is None:
+        while (result := condition()) is None:
             # A device that never pauses keeps the link readable past the deadline.
             if self._clock.now_ns() >= deadline_ns:
                 return None
             if self._clock.wait(self._link, deadline_ns):
-                self._hear(readings)
+                self._receive(readings)
         return result
 
     def first_readings(self) -> list[Reading]:
@@ -83,32 +83,32 @@ class SerialDialog:
             LinkTimeoutError: none came, or none that was whole.
         """
         readings: list[Reading] = []
-        before = self.heard_bytes
+        before = self.received_bytes
         self.wait_for(
             lambda: True if len(readings) >= FIRST_READINGS else None,
             _FIRST_NS,
             readings,
         )
-        if not readings and self.heard_bytes > before:
+        if not readings and self.received_bytes > before:
             raise LinkTimeoutError(
-                f"No whole F/T frame in {self.heard_bytes - before} bytes.",
+                f"No whole F/T frame in {self.received_bytes - before} bytes.",
                 hint="Check the cable and what runs beside it.",
             )
         if not readings:
             raise silent_error()
         return readings
 
-    def refuse_stranger(self, baudrate: int) -> None:
+    def raise_no_reply(self, baudrate: int) -> None:
         """Raise: no answer came, and not one good frame.
 
         Raises:
             LinkTimeoutError: nothing came at all.
             LinkError: bytes came, and none of them are this sensor's.
         """
-        if not self.heard_bytes:
+        if not self.received_bytes:
             raise silent_error()
         raise LinkError(
-            f"{self.heard_bytes} bytes from the F/T sensor and no valid frame "
+            f"{self.received_bytes} bytes from the F/T sensor and no valid frame "
             f"among them.",
             hint=f"Wrong speed (now {baudrate} baud) or another kind of sensor on "
             "this port?",
@@ -145,10 +145,10 @@ class SerialDialog:
             )
         return rate
 
-    def _hear(self, readings: list[Reading] | None) -> None:
+    def _receive(self, readings: list[Reading] | None) -> None:
         data = self._link.read_available()
-        self.heard_bytes += len(data)
-        self.heard = (self.heard + data)[-_HEARD_SIZE:]
+        self.received_bytes += len(data)
+        self.buffer = (self.buffer + data)[-_BUFFER_SIZE:]
         fresh = self._scanner.feed(data)
         if readings is not None:
             readings.extend(fresh)
@@ -156,7 +156,7 @@ class SerialDialog:
 
 def silent_error() -> LinkTimeoutError:
     """Return the error for a port that is open and brings nothing."""
-    # 100 ms is the limit that counts while running; a ritual waits longer.
+    # 100 ms is the limit that counts while running; a start-up waits longer.
     return LinkTimeoutError(
         "No F/T data for 100 ms (port open, 0 bytes).", hint="Check power and cable."
     )

@@ -75,7 +75,7 @@ class BarrettSensor:
         """
         self._wake()
         role, vers, serial_number = (
-            self._properties.ask(SENSOR_NODE, number) for number in (_ROLE, _VERS, _SN)
+            self._properties.get(SENSOR_NODE, number) for number in (_ROLE, _VERS, _SN)
         )
         first = self._exchange()
         if first is None:
@@ -91,14 +91,14 @@ class BarrettSensor:
         answered = 1 + sum(self._exchange() is not None for _ in range(1, _QUESTIONS))
         self._identity = _Identity(role, vers, serial_number, answered)
 
-    def request(self, t_ns: int) -> tuple[int, bytes]:
+    def poll_frame(self, t_ns: int) -> tuple[int, bytes]:
         """Return the question that leaves at `t_ns`."""
         self._pairing.ask(t_ns)
         return SENSOR_NODE, _GET_FT
 
-    def hear(self, can_id: int, data: Payload) -> None:
+    def on_frame(self, can_id: int, data: Payload) -> None:
         """Take a frame of the bus; all but force and torque are ignored."""
-        sample = self._pairing.hear(can_id, data)
+        sample = self._pairing.on_frame(can_id, data)
         if sample is not None:
             self._inbox.append(sample)
 
@@ -116,7 +116,7 @@ class BarrettSensor:
         Raises:
             LinkError: the bus is down.
         """
-        self._properties.tell(SENSOR_NODE, _FT, 0)
+        self._properties.set(SENSOR_NODE, _FT, 0)
         self._properties.pause(_WAKE_NS)
         self._exchange()
 
@@ -144,16 +144,16 @@ class BarrettSensor:
         self._inbox = []
 
     def _wake(self) -> None:
-        stat = self._properties.ask(SENSOR_NODE, _STAT)
+        stat = self._properties.get(SENSOR_NODE, _STAT)
         if stat is None:
             raise LinkTimeoutError(
                 "The F/T sensor (node 8) does not answer on the arm's bus.",
                 hint="Check its cable and the arm's power, or ft_sensor.kind.",
             )
         if stat == PuckStatus.RESET:
-            self._properties.tell(SENSOR_NODE, _STAT, PuckStatus.READY)
+            self._properties.set(SENSOR_NODE, _STAT, PuckStatus.READY)
             self._properties.pause(_WAKE_NS + _BOOT_NS)
-            stat = self._properties.ask(SENSOR_NODE, _STAT)
+            stat = self._properties.get(SENSOR_NODE, _STAT)
         if stat != PuckStatus.READY:
             raise DeviceFaultError(
                 f"The F/T sensor (node 8) is not ready: STAT {_text(stat)}, not 2.",
@@ -165,10 +165,10 @@ class BarrettSensor:
         self._properties.drain()
         now_ns = self._clock.now_ns()
         deadline_ns = now_ns + _ANSWER_NS
-        self._link.send(*self.request(now_ns))
+        self._link.send(*self.poll_frame(now_ns))
         while self._clock.wait(self._link, deadline_ns):
             for frame in self._link.receive():
-                self.hear(frame.can_id, frame.data)
+                self.on_frame(frame.can_id, frame.data)
             if self._inbox:
                 return self._inbox.pop()
             if self._clock.now_ns() >= deadline_ns:

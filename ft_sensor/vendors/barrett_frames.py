@@ -80,7 +80,7 @@ class WrenchPairing:
         self._force = self._torque = None
         self._asked_ns = t_ns
 
-    def hear(self, can_id: int, data: Payload) -> WrenchSample | None:
+    def on_frame(self, can_id: int, data: Payload) -> WrenchSample | None:
         """Take a frame; return the sample that it completes. Others are ignored."""
         try:
             if can_id == FORCE_ID:

@@ -124,7 +124,7 @@ class BotaDevice:
         }
 
     def _first_sign(self, dialog: SerialDialog) -> bool | None:
-        self._boot = bota.find_boot_text(dialog.heard)
+        self._boot = bota.find_boot_text(dialog.buffer)
         return self._boot.is_complete or dialog.frames > 0 or None
 
     def _start_until_plausible(self, dialog: SerialDialog) -> None:
@@ -132,9 +132,9 @@ class BotaDevice:
             self._set_up(dialog)
             if _is_plausible(dialog.first_readings()):
                 return
-            dialog.say(bota.SOFT_RESET)
+            dialog.write(bota.SOFT_RESET)
             dialog.pause(_RESET_NS)
-            dialog.forget()
+            dialog.discard()
         raise DeviceFaultError(
             f"The F/T sensor sends raw gauge data or absurd forces after "
             f"{_RESETS} starts (limits {_MAX_FORCE:g} N, {_MAX_TORQUE:g} N m).",
@@ -149,7 +149,7 @@ class BotaDevice:
             except (DeviceFaultError, LinkTimeoutError):
                 known = self._answers or dialog.frames or self._boot.is_started
                 if not known:
-                    dialog.refuse_stranger(self.line.baudrate)
+                    dialog.raise_no_reply(self.line.baudrate)
                 if not tries_left:
                     raise
             else:
@@ -180,12 +180,12 @@ class BotaDevice:
     def _ask(self, dialog: SerialDialog, command: bytes) -> int | None:
         """Send `command`; return the code of its answer, None when there is none."""
         for key in command:
-            dialog.say(bytes((key,)))
+            dialog.write(bytes((key,)))
             dialog.pause(_KEYSTROKE_NS)
         letter = chr(command[0])
 
         def answer() -> int | None:
-            for found in bota.find_acknowledgements(dialog.heard):
+            for found in bota.find_acknowledgements(dialog.buffer):
                 if found.letter == letter:
                     self._answers += 1
                     return found.code

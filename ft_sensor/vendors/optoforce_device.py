@@ -119,9 +119,9 @@ class OptoForceDevice:
 
     def _serial_number(self, dialog: SerialDialog) -> str:
         for _ in range(_TRIES):
-            dialog.say(optoforce.ASK_SERIAL)
+            dialog.write(optoforce.ASK_SERIAL)
             found = dialog.wait_for(
-                lambda: optoforce.find_serial_number(dialog.heard), _ANSWER_NS
+                lambda: optoforce.find_serial_number(dialog.buffer), _ANSWER_NS
             )
             if found is not None:
                 break
@@ -140,9 +140,9 @@ class OptoForceDevice:
 
     def _configure(self, dialog: SerialDialog, command: bytes) -> None:
         for _ in range(_TRIES):
-            dialog.say(command)
+            dialog.write(command)
             code = dialog.wait_for(
-                lambda: optoforce.find_configuration_answer(dialog.heard), _ANSWER_NS
+                lambda: optoforce.find_configuration_answer(dialog.buffer), _ANSWER_NS
             )
             if code == 0:
                 return
@@ -151,13 +151,13 @@ class OptoForceDevice:
                     f"The F/T sensor refused its configuration with code {code}.",
                     hint="Cycle its power; check filter_hz against its manual.",
                 )
-            if optoforce.is_older_protocol(dialog.heard):
+            if optoforce.is_older_protocol(dialog.buffer):
                 raise DeviceFaultError(
                     "The F/T sensor speaks an older protocol of its maker.",
                     hint="Its firmware has to be brought up to date.",
                 )
         if not dialog.frames:
-            dialog.refuse_stranger(self.line.baudrate)
+            dialog.raise_no_reply(self.line.baudrate)
         raise LinkTimeoutError(
             f"The F/T sensor did not answer within {_TRIES * _ANSWER_NS / NS_PER_S:g} "
             "s.",

@@ -123,7 +123,7 @@ class RobotousDevice:
         self._set_filter(dialog)
         self._set_rate(dialog)
         overloads = self._ask(dialog, robotous.OVERLOADS)
-        dialog.say(robotous.encode_command(robotous.STREAM))
+        dialog.write(robotous.encode_command(robotous.STREAM))
         self._refuse_absurd(dialog.first_readings())
         low_pass = f"low-pass {self._settings.filter_hz} Hz"
         return {
@@ -135,16 +135,16 @@ class RobotousDevice:
 
     def _make_quiet(self, dialog: SerialDialog) -> None:
         """End a stream that an earlier program left; this command has no answer."""
-        dialog.say(self.stop)
+        dialog.write(self.stop)
         dialog.pause(_QUIET_NS)
-        dialog.forget()
+        dialog.discard()
 
     def _identify(self, dialog: SerialDialog) -> str:
         try:
             name = self._text(dialog, MODEL)
         except LinkTimeoutError:
             if not dialog.frames:
-                dialog.refuse_stranger(self.line.baudrate)
+                dialog.raise_no_reply(self.line.baudrate)
             raise
         found = _model_of(name)
         if found is None:
@@ -204,9 +204,9 @@ class RobotousDevice:
             LinkTimeoutError: it did not come, several times.
         """
         for _ in range(_TRIES):
-            dialog.say(robotous.encode_command(command, *parameters))
+            dialog.write(robotous.encode_command(command, *parameters))
             found = dialog.wait_for(
-                lambda: robotous.find_answer(dialog.heard, command), _ANSWER_NS
+                lambda: robotous.find_answer(dialog.buffer, command), _ANSWER_NS
             )
             if found is not None:
                 return found

@@ -56,5 +56,5 @@ def make_rig(seed=1, terrain="S0", stones="small", network=None):
     clock = SteppedClock()
     scene = SimulatedScene(terrain, stones, "tread", FRAME, START_Q, seed)
     rig = FakeRig(scene, CONSTANTS, TOOL, clock, network=network)
-    clock.world = rig
+    clock.attach(rig)
     return rig, clock

@@ -32,31 +32,35 @@ def test_start_and_epoch_are_fixed():
 
 def test_sleeping_lets_the_world_go_on_and_never_back():
     clock = SteppedClock()
-    clock.world = World(clock)
+    world = World(clock)
+    clock.attach(world)
     clock.sleep_until(START_NS + 10)
     clock.sleep_until(START_NS + 3)
     assert clock.now_ns() == START_NS + 10
-    assert clock.world.advanced == [START_NS + 10]
+    assert world.advanced == [START_NS + 10]
 
 
 def test_waiting_ends_at_the_first_event():
     clock = SteppedClock()
-    clock.world = World(clock, START_NS + 7, START_NS + 9)
-    assert clock.wait(clock.world, START_NS + 20)
+    world = World(clock, START_NS + 7, START_NS + 9)
+    clock.attach(world)
+    assert clock.wait(world, START_NS + 20)
     assert clock.now_ns() == START_NS + 7
 
 
 def test_waiting_for_nothing_ends_at_the_deadline():
     clock = SteppedClock()
-    clock.world = World(clock, START_NS + 30)
-    assert not clock.wait(clock.world, START_NS + 20)
+    world = World(clock, START_NS + 30)
+    clock.attach(world)
+    assert not clock.wait(world, START_NS + 20)
     assert clock.now_ns() == START_NS + 20
 
 
 def test_waiting_for_what_is_there_takes_no_time():
     clock = SteppedClock()
-    clock.world = World(clock, START_NS)
-    assert clock.wait(clock.world, START_NS + 20)
+    world = World(clock, START_NS)
+    clock.attach(world)
+    assert clock.wait(world, START_NS + 20)
     assert clock.now_ns() == START_NS
 
 

@@ -61,6 +61,9 @@ class Link(Protocol):
         ...
 
 
+CanBus = can.BusABC  # for modules that may not know python-can
+
+
 def open_bus(interface: str, channel: str, bitrate: int) -> can.BusABC:
     """Return an open bus of python-can.
 
@@ -93,12 +96,17 @@ class CanLink:
     Attributes:
         mode_hints: broadcasts of the safety module so far.
         error_frames: error frames of the controller so far.
-        tap: told of every data frame with an 11-bit identifier, sent or received;
-            of all that are found at once together.
     """
 
-    def __init__(self, bus: can.BusABC) -> None:
-        self.tap: Tap | None = None
+    def __init__(self, bus: CanBus, tap: Tap | None = None) -> None:
+        """Take a bus over.
+
+        Args:
+            bus: of python-can.
+            tap: takes every data frame with an 11-bit identifier, sent or received;
+                all that have arrived at once together.
+        """
+        self._tap = tap
         self.mode_hints = 0
         self.error_frames = 0
         self._bus = bus
@@ -123,8 +131,8 @@ class CanLink:
             self._bus.send(message)
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
-        if self.tap is not None:
-            self.tap(((can_id, data, 0.0),))
+        if self._tap is not None:
+            self._tap(((can_id, data, 0.0),))
 
     def receive(self) -> list[Frame]:
         """Return the device frames that have arrived, oldest first.
@@ -159,7 +167,7 @@ class CanLink:
         if not self._is_open:
             return
         receive = self._bus.recv
-        found: list[Frame] = []
+        frames: list[Frame] = []
         try:
             for _ in range(_DRAIN_AT_MOST):
                 message = receive(0)
@@ -169,18 +177,18 @@ class CanLink:
                     self.error_frames += 1
                 elif not (message.is_extended_id or message.is_remote_frame):
                     data, stamp = bytes(message.data), message.timestamp
-                    found.append(Frame(message.arbitration_id, data, stamp))
+                    frames.append(Frame(message.arbitration_id, data, stamp))
         except (can.CanError, OSError) as error:
             raise _broken(self._bus.channel_info, error) from error
         finally:
-            if found:
-                self._sort(found)
+            if frames:
+                self._sort(frames)
 
-    def _sort(self, found: list[Frame]) -> None:
+    def _sort(self, frames: list[Frame]) -> None:
         """Show frames to the tap and keep those of devices."""
-        if self.tap is not None:
-            self.tap(found)
-        for frame in found:
+        if self._tap is not None:
+            self._tap(frames)
+        for frame in frames:
             can_id = frame.can_id
             if can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1

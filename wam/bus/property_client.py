@@ -1,4 +1,4 @@
-"""Questions to the arm's devices outside the loop, and what is told them."""
+"""Properties of the devices on the bus, read and set outside the loop."""
 
 from acquisition.clock import Clock
 from acquisition.errors import LinkTimeoutError
@@ -18,7 +18,7 @@ _ANSWER_NS = 50_000_000  # a puck answers within 1 ms; a slow adapter may sit on
 
 
 class PropertyClient:
-    """Questions to devices outside the loop, one at a time.
+    """Reads and sets properties of devices outside the loop, one at a time.
 
     Replies carry no sequence number, so each is matched by device and property, and
     what came too late for an earlier question is drained first.
@@ -32,7 +32,7 @@ class PropertyClient:
         self._link = link
         self._clock = clock
 
-    def ask(self, node: int, number: int, within_ns: int = _ANSWER_NS) -> int | None:
+    def get(self, node: int, number: int, within_ns: int = _ANSWER_NS) -> int | None:
         """Return the value of property `number` of `node`, None if it is silent.
 
         Raises:
@@ -56,7 +56,7 @@ class PropertyClient:
             LinkTimeoutError: the device does not answer.
             LinkError: the bus is down.
         """
-        value = self.ask(node, number)
+        value = self.get(node, number)
         if value is None:
             raise LinkTimeoutError(
                 f"Node {node} does not answer GET {name} ({number}) within "
@@ -65,31 +65,31 @@ class PropertyClient:
             )
         return value
 
-    def tell(self, node: int, number: int, value: int) -> None:
+    def set(self, node: int, number: int, value: int) -> None:
         """Set a property of one device; devices do not acknowledge."""
         self._link.send(node, encode_set(number, value))
 
-    def tell_group(self, group: Group, number: int, value: int) -> None:
+    def set_group(self, group: Group, number: int, value: int) -> None:
         """Set a property of all devices of a group."""
         self._link.send(group_id(group, HOST), encode_set(number, value))
 
     def drain(self) -> None:
-        """Throw away what nobody asked for."""
+        """Discard frames that belong to no open question."""
         self.late_replies += len(self._link.receive())
 
     def pause(self, duration_ns: int) -> None:
-        """Say nothing for a while."""
+        """Send nothing for `duration_ns`."""
         self._clock.sleep_until(self._clock.now_ns() + duration_ns)
 
     def _find(self, can_id: int, number: int) -> int | None:
-        found: int | None = None
+        answer: int | None = None
         for frame in self._link.receive():
-            value = _value_of(frame, can_id, number) if found is None else None
+            value = _value_of(frame, can_id, number) if answer is None else None
             if value is None:
                 self.late_replies += 1
             else:
-                found = value
-        return found
+                answer = value
+        return answer
 
 
 def _value_of(frame: Frame, can_id: int, number: int) -> int | None:

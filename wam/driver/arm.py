@@ -220,7 +220,7 @@ class WamArm:
         counts = motion.transmission.counts(q)
         self._safety.ignore_speed_faults(_IGNORED_SPEED_FAULTS)
         for node, value in zip(MOTOR_NODES, counts, strict=True):
-            self._properties.tell(node, self._traffic.p_number, value)
+            self._properties.set(node, self._traffic.p_number, value)
             self._properties.pause(_MS)
         # The module must see the new positions while it still ignores speed.
         self._begin_at_rest()

@@ -69,11 +69,11 @@ class BusDevice(Protocol):
     or in a later one.
     """
 
-    def request(self, t_ns: int) -> tuple[int, bytes]:
+    def poll_frame(self, t_ns: int) -> tuple[int, bytes]:
         """Return identifier and bytes of the question that leaves at `t_ns`."""
         ...
 
-    def hear(self, can_id: int, data: Payload) -> None:
+    def on_frame(self, can_id: int, data: Payload) -> None:
         """Take a frame that is no position, of whatever device; never raises."""
         ...
 
@@ -164,7 +164,7 @@ class CycleTraffic:
         """Send the companion's question; a refusal does not cost the positions."""
         if self.bus_device is None:
             return
-        can_id, data = self.bus_device.request(self._clock.now_ns())
+        can_id, data = self.bus_device.poll_frame(self._clock.now_ns())
         try:
             self._link.send(can_id, data)
         except LinkError:
@@ -204,8 +204,8 @@ class CycleTraffic:
                     found += 1
                 else:
                     if self.bus_device is not None:
-                        self.bus_device.hear(can_id, data)
-                    self.poller.hear(can_id, data)
+                        self.bus_device.on_frame(can_id, data)
+                    self.poller.on_frame(can_id, data)
             except DeviceFaultError:
                 self.counters.malformed += 1
         return found

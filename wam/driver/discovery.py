@@ -58,7 +58,7 @@ def _ask(
     """Return STAT by node of those of `nodes` that answer in time."""
     found: dict[int, int] = {}
     for node in nodes:
-        stat = properties.ask(node, _STAT, within_ns)
+        stat = properties.get(node, _STAT, within_ns)
         if stat is not None:
             found[node] = stat
     return found

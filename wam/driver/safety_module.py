@@ -179,8 +179,8 @@ class SafetyModule:
     def _ask_down(self) -> int | None:
         """Ask for IDLE once; return MODE as answered, None without an answer."""
         try:
-            self._properties.tell(SAFETY_NODE, _MODE, SafetyMode.IDLE)
-            return self._properties.ask(SAFETY_NODE, _MODE, _RETRY_NS)
+            self._properties.set(SAFETY_NODE, _MODE, SafetyMode.IDLE)
+            return self._properties.get(SAFETY_NODE, _MODE, _RETRY_NS)
         except LinkError:
             return None
 
@@ -241,7 +241,7 @@ class SafetyModule:
 
     def _set(self, name: str, value: int) -> None:
         number = property_number(Device.SAFETY, name, self._vers)
-        self._properties.tell(SAFETY_NODE, number, value)
+        self._properties.set(SAFETY_NODE, number, value)
         self._properties.pause(_CONFIG_GAP_NS)
 
 

@@ -156,7 +156,7 @@ class StartUp:
         if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
             safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
-            self._properties.tell_group(Group.ARM, _MODE, PuckMode.IDLE)
+            self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
@@ -175,10 +175,10 @@ class StartUp:
         if not asleep:
             return
         for node in asleep:
-            self._properties.tell(node, _STAT, PuckStatus.READY)
+            self._properties.set(node, _STAT, PuckStatus.READY)
             self._properties.pause(10 * _MS)
         self._properties.pause(self._boot_ns)
-        stats = {node: self._properties.ask(node, _STAT) for node in asleep}
+        stats = {node: self._properties.get(node, _STAT) for node in asleep}
         dozing = [n for n in MOTOR_NODES if n in stats and stats[n] != PuckStatus.READY]
         if dozing:
             raise PreflightError(
@@ -205,7 +205,7 @@ class StartUp:
         mech = None
         if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
             mech = self._get(node, "MECH", vers)
-        health = ask_health(lambda number: self._properties.ask(node, number))
+        health = ask_health(lambda number: self._properties.get(node, number))
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
 
     def _check_wrist(self, puck: PuckInfo) -> None:

@@ -100,7 +100,7 @@ class StatusPoller:
             node, number = self.health.next_question()
             self._link.send(node, encode_get(number))
 
-    def hear(self, can_id: int, data: Payload) -> None:
+    def on_frame(self, can_id: int, data: Payload) -> None:
         """Take a frame that is no position.
 
         Raises:

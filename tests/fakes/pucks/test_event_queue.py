@@ -3,7 +3,7 @@ from fakes.pucks.event_queue import NEVER, EventQueue
 
 def schedule_of(log):
     schedule = EventQueue(0)
-    schedule.on_alarm = lambda: (log.append("alarm"), schedule.set_alarm(NEVER))
+    schedule.define_alarm(lambda: (log.append("alarm"), schedule.set_alarm(NEVER)))
     return schedule
 
 

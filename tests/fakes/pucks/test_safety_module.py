@@ -242,11 +242,11 @@ def test_a_fault_while_idle_bars_the_activation():
 
 def test_speeds_begin_anew_after_a_stop():
     watch = SpeedMonitor((4096,) * 7)
-    watch.hear(0, {1: 0})
-    watch.hear(CYCLE_NS, {1: 100_000})
+    watch.on_positions(0, {1: 0})
+    watch.on_positions(CYCLE_NS, {1: 100_000})
     assert watch.joint_speed() > 100
-    watch.forget()
-    watch.hear(2 * CYCLE_NS, {1: -100_000})
+    watch.reset()
+    watch.on_positions(2 * CYCLE_NS, {1: -100_000})
     assert watch.joint_speed() == 0.0
 
 

@@ -41,7 +41,7 @@ class ClosedLoop:
         self.rig.plant.hand.let_go()
         self.ground = self.rig.plant.terrain
         self.rig.plant.terrain = None  # the poses reach below the plate
-        self.clock.world = self.rig
+        self.clock.attach(self.rig)
         self.model = ArmModel(CONSTANTS, tool)
         self.law = FootController(self.model, virtual_mass)
         self.arm = WamArm(

@@ -37,15 +37,15 @@ def pairing():
     return pairing
 
 
-def hear(pairing, *frames):
+def receive(pairing, *frames):
     """Return the samples that `frames` complete."""
-    samples = [pairing.hear(can_id, data) for can_id, data in frames]
+    samples = [pairing.on_frame(can_id, data) for can_id, data in frames]
     return [sample for sample in samples if sample is not None]
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_force_and_torque_in_either_order_make_one_sample(pairing, order):
-    (sample,) = hear(pairing, *[(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)][::order])
+    (sample,) = receive(pairing, *[(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)][::order])
     # Half a count of each.
     assert sample.wrench[:3] == pytest.approx((1.0, -2.5, -9.81), abs=0.002)
     assert sample.wrench[3:] == pytest.approx((0.1, -0.25, 0.015), abs=0.00013)
@@ -60,7 +60,9 @@ def test_force_and_torque_in_either_order_make_one_sample(pairing, order):
 def test_the_status_after_the_torque_judges_the_force_too(
     pairing, status, is_valid, saturated
 ):
-    (sample,) = hear(pairing, (FORCE_ID, FORCE), (TORQUE_ID, TORQUE + bytes((status,))))
+    (sample,) = receive(
+        pairing, (FORCE_ID, FORCE), (TORQUE_ID, TORQUE + bytes((status,)))
+    )
     assert (sample.is_valid, sample.saturated) == (is_valid, saturated)
     assert sample.status == status
 
@@ -79,7 +81,7 @@ def test_the_status_after_the_torque_judges_the_force_too(
 )
 def test_a_reading_at_its_range_is_saturated_in_that_axis(pairing, wrench, saturated):
     force, torque = encode_force(wrench[:3]), encode_torque(wrench[3:])
-    (sample,) = hear(pairing, (FORCE_ID, force), (TORQUE_ID, torque))
+    (sample,) = receive(pairing, (FORCE_ID, force), (TORQUE_ID, torque))
     assert sample.saturated == saturated
     assert sample.is_valid
 
@@ -89,11 +91,11 @@ def test_half_an_answer_is_counted_and_pairs_with_no_later_one(half):
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
-    hear(pairing, half)
+    receive(pairing, half)
     pairing.ask(CYCLE_NS)
     assert (counters.unpaired, counters.unanswered) == (1, 1)
     other = (FORCE_ID, FORCE) if half[0] == TORQUE_ID else (TORQUE_ID, TORQUE)
-    assert hear(pairing, other) == []
+    assert receive(pairing, other) == []
 
 
 @pytest.mark.parametrize("half", [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)])
@@ -101,7 +103,7 @@ def test_of_two_equal_halves_the_first_is_dropped(half):
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
-    assert hear(pairing, half, half) == []
+    assert receive(pairing, half, half) == []
     assert counters.unpaired == 1
 
 
@@ -110,7 +112,7 @@ def test_an_answer_nobody_asked_for_is_dropped():
     pairing = WrenchPairing(counters)
     pairing.ask(0)
     answer = [(FORCE_ID, FORCE), (TORQUE_ID, TORQUE)]
-    assert len(hear(pairing, *answer, *answer)) == 1
+    assert len(receive(pairing, *answer, *answer)) == 1
     assert (counters.samples, counters.unasked) == (1, 1)
 
 
@@ -118,7 +120,7 @@ def test_frames_that_contradict_the_protocol_are_counted():
     counters = BarrettCounters()
     pairing = WrenchPairing(counters)
     pairing.ask(0)
-    assert hear(pairing, (FORCE_ID, FORCE + b"\0"), (TORQUE_ID, b"")) == []
+    assert receive(pairing, (FORCE_ID, FORCE + b"\0"), (TORQUE_ID, b"")) == []
     assert counters.malformed == 2
 
 
@@ -136,7 +138,7 @@ def test_no_frames_make_more_samples_than_questions(heard):
         if frame is None:
             pairing.ask(t_ns)
         else:
-            samples += hear(pairing, frame)
+            samples += receive(pairing, frame)
     assert len(samples) == counters.samples <= heard.count(None)
     times = [sample.t_ns for sample in samples]
     assert times == sorted(set(times))

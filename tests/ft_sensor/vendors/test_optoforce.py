@@ -187,7 +187,7 @@ def test_firmware_of_the_older_protocol_is_named():
 
 def test_a_sensor_without_serial_number_is_refused():
     bench = SensorBench("optoforce")
-    bench.device._firmware.hear = lambda t_ns, data: (
+    bench.device._firmware.receive = lambda t_ns, data: (
         []
         if data == optoforce.ASK_SERIAL
         else [(t_ns + MS, optoforce.encode_configuration_answer(0))]

@@ -168,18 +168,16 @@ def test_a_link_has_the_descriptor_of_its_bus():
 
 
 def test_a_tap_hears_all_plain_frames_sent_and_received():
-    link = CanLink(
-        ScriptedBus(
-            [
-                message(0x426),
-                message(0x540),
-                message(0x404),
-                message(1, is_error_frame=True),
-            ]
-        )
-    )
     heard = []
-    link.tap = heard.extend
+    bus = ScriptedBus(
+        [
+            message(0x426),
+            message(0x540),
+            message(0x404),
+            message(1, is_error_frame=True),
+        ]
+    )
+    link = CanLink(bus, heard.extend)
     link.send(1, b"\x05")
     assert [frame.can_id for frame in link.receive()] == [0x426]
     assert [can_id for can_id, _, _ in heard] == [1, 0x426, 0x540, 0x404]
@@ -194,9 +192,8 @@ def test_a_tap_hears_what_came_before_the_bus_broke():
                 raise can.CanOperationError("gone", errno.ENETDOWN)
             return super()._recv_internal(timeout)
 
-    link = CanLink(Breaking([message(0x426)]))
     heard = []
-    link.tap = heard.extend
+    link = CanLink(Breaking([message(0x426)]), heard.extend)
     with pytest.raises(LinkError):
         link.receive()
     assert [can_id for can_id, _, _ in heard] == [0x426]

@@ -8,7 +8,7 @@ from wam.bus.property_client import PropertyClient
 
 def test_a_question_is_answered_with_its_value():
     rig = Rig()
-    assert PropertyClient(rig.link, rig.clock).ask(7, 90) == 6
+    assert PropertyClient(rig.link, rig.clock).get(7, 90) == 6
     assert rig.sent[-1][1:] == (0x007, b"\x5a")
 
 
@@ -17,7 +17,7 @@ def test_an_answer_to_another_question_is_not_taken():
     properties = PropertyClient(rig.link, rig.clock)
     rig.link.send(1, b"\x56")  # IPNM of puck 1
     rig.link.send(2, b"\x44")  # CTS of puck 2
-    assert properties.ask(1, 68) == 4096
+    assert properties.get(1, 68) == 4096
     rig.rest(1_000_000)
     properties.drain()
     assert properties.late_replies == 2
@@ -26,7 +26,7 @@ def test_an_answer_to_another_question_is_not_taken():
 def test_silence_is_no_value_after_the_time_given():
     rig = Rig()
     begin_ns = rig.clock.t_ns
-    assert PropertyClient(rig.link, rig.clock).ask(20, 5, 1_000_000) is None
+    assert PropertyClient(rig.link, rig.clock).get(20, 5, 1_000_000) is None
     assert rig.clock.t_ns - begin_ns == 1_000_000
 
 
@@ -38,5 +38,5 @@ def test_silence_where_an_answer_is_needed_names_node_and_property():
 
 def test_telling_a_group_uses_its_identifier():
     rig = Rig()
-    PropertyClient(rig.link, rig.clock).tell_group(Group.ARM, 8, 0)
+    PropertyClient(rig.link, rig.clock).set_group(Group.ARM, 8, 0)
     assert rig.sent[-1][1:] == (0x404, bytes.fromhex("88 00 00 00 00 00"))

@@ -12,17 +12,17 @@ CYCLE_NS = 2_000_000
 FORCE, TORQUE = 0x50A, 0x50B
 
 
-class SerialDialog:
-    """Asks for the wrench and remembers what it was told."""
+class RecordingDevice:
+    """Asks for the wrench and keeps the frames that it is given."""
 
     def __init__(self):
         self.asked, self.heard = [], []
 
-    def request(self, t_ns):
+    def poll_frame(self, t_ns):
         self.asked.append(t_ns)
         return 8, b"\x36"
 
-    def hear(self, can_id, data):
+    def on_frame(self, can_id, data):
         self.heard.append((can_id, bytes(data)))
 
 
@@ -33,7 +33,7 @@ def rig():
 
 @pytest.fixture
 def listener():
-    return SerialDialog()
+    return RecordingDevice()
 
 
 @pytest.fixture

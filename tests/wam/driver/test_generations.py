@@ -115,11 +115,11 @@ def test_positions_are_defined(generation):
 def test_a_property_that_moved_is_where_its_firmware_has_it(vers, ecmax):
     rig = Rig(NetworkOptions(vers=(vers,) * 7))
     properties = PropertyClient(rig.link, rig.clock)
-    answering = [n for n in (96, 100, 101) if properties.ask(1, n) is not None]
+    answering = [n for n in (96, 100, 101) if properties.get(1, n) is not None]
     # Up to 124 ECMIN is 97; from 125 on ECMIN is one above ECMAX.
     assert ecmax in answering
     assert (96 in answering) is (vers < 125)
-    assert properties.ask(1, ecmax) == 0
+    assert properties.get(1, ecmax) == 0
 
 
 def test_pucks_of_two_generations_work_together():

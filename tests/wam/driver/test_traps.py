@@ -271,10 +271,10 @@ def test_trap_13_a_force_is_believed_only_after_its_torque_of_6_or_7_bytes():
     found = []
     for status in (None, 0xC4):
         pairing.ask(0)
-        assert pairing.hear(FORCE_ID, encode_force((1.0, 2.0, 3.0))) is None
+        assert pairing.on_frame(FORCE_ID, encode_force((1.0, 2.0, 3.0))) is None
         torque = encode_torque((0.1, 0.2, 0.3), status)
         assert len(torque) == (6 if status is None else 7)
-        found.append(pairing.hear(TORQUE_ID, torque))
+        found.append(pairing.on_frame(TORQUE_ID, torque))
     assert [(s.is_valid, s.status) for s in found] == [(True, 0), (False, 0xC4)]
     assert decode_force(encode_force((1.0, 2.0, 3.0))) == (1.0, 2.0, 3.0)
 
