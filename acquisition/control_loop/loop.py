@@ -48,13 +48,14 @@ class Loop:
         cycle: Callable[[Tick], None],
         clock: Clock,
         period_ns: int = PERIOD_NS,
+        stats: LoopStats | None = None,
     ) -> None:
         self._cycle = cycle
         self._clock = clock
         self._period_ns = period_ns
         self._next_ns: int | None = None
         self._number = 0
-        self.stats = LoopStats()
+        self.stats = stats if stats is not None else LoopStats()
 
     def run(self, cycles: int) -> None:
         """Run until `cycles` periods have passed on the grid."""

@@ -159,8 +159,7 @@ class ControlWorker:
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, the arm is braked."""
         self._context.shared.memory.touch()
-        loop = Loop(loop_server, self._clock)
-        loop_server.stats = loop.stats
+        loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
                 loop_server.is_orphaned = self._is_orphaned
