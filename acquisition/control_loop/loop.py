@@ -56,7 +56,7 @@ class Loop:
         self._period_ns = period_ns
         self._next_ns: int | None = None
         self._number = 0
-        self.stats = stats or LoopStats()
+        self.stats = stats if stats is not None else LoopStats()
 
     def run(self, cycles: int) -> None:
         """Run until `cycles` periods have passed on the grid."""

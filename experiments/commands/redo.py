@@ -22,8 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Record the trial and return the exit code."""
     from acquisition.errors import SessionError
-    from experiments.commands.resume import reopening
-    from experiments.run.resume import redo
+    from experiments.run.resume import redo, resume_request
     from experiments.session.annotations import clean_text, parse_trial
     from experiments.session.store import find_session
 
@@ -35,4 +34,4 @@ def run(args: argparse.Namespace) -> int:
             hint=f"For example: traction redo {folder.id} T{number:02d}",
         )
     reason = clean_text(args.reason) if args.reason else "redone"
-    return redo(folder, number, reason, reopening(args))
+    return redo(folder, number, reason, resume_request(args))

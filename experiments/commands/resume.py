@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from experiments.arguments import add_reopening
 
 if TYPE_CHECKING:
-    from experiments.run.resume import ResumeRequest
     from experiments.session.store import SessionFolder
 
 EXAMPLES = """\
@@ -25,33 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record what is missing and return the exit code."""
-    from experiments.run.resume import resume
+    from experiments.run.resume import resume, resume_request
     from experiments.session.store import find_session
 
     if args.session is None:
         folder = _only_one(args.data, is_fake=args.fake)
     else:
         folder = find_session(args.data, args.session)
-    return resume(folder, reopening(args))
-
-
-def reopening(args: argparse.Namespace) -> "ResumeRequest":
-    """Return what the options say about how a session is opened once more."""
-    from experiments.operator.console import Console
-    from experiments.run.resume import ResumeRequest
-
-    return ResumeRequest(
-        data=args.data,
-        config=args.config,
-        console=Console(color=not args.no_color),
-        is_fast=args.fast,
-        is_fake=args.fake,
-        is_forced=args.force,
-        operator=args.operator,
-        script=args.operator_script,
-        can_log=args.can_log,
-        faults=tuple(args.fault),
-    )
+    return resume(folder, resume_request(args))
 
 
 def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":

@@ -1,4 +1,4 @@
-"""Who works a rig when everything is in this thread."""
+"""The rig's backend with everything in this thread."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -36,7 +36,8 @@ class InProcessBackend:
         self._parts = parts
         self._sensor: WrenchSensor | None = None
         self.recorder = Recorder(shared, clock)
-        self.loop_client = LoopClient(shared, clock, _not_begun)
+        self._advance_loop: InlineAdvance | None = None  # once the loop runs
+        self.loop_client = LoopClient(shared, clock, self._advance)
 
     @property
     def recorder_pid(self) -> int:
@@ -70,7 +71,7 @@ class InProcessBackend:
             raise RuntimeError("the sensor was not opened")
         loop_server = build_loop_server(self._parts(self._sensor))
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
-        self.loop_client.advance_cycles = InlineAdvance(loop, self.recorder)
+        self._advance_loop = InlineAdvance(loop, self.recorder)
         self.loop_client.beat()
 
     def grants(self) -> dict[str, list[Grant]]:
@@ -94,6 +95,8 @@ class InProcessBackend:
             self._sensor = None
         self._shared.close()
 
-
-def _not_begun(cycles: int) -> None:
-    raise RuntimeError(f"the loop does not run yet; {cycles} cycles were waited for")
+    def _advance(self, cycles: int) -> None:
+        """Let `cycles` periods of the loop pass."""
+        if self._advance_loop is None:
+            raise RuntimeError("the loop does not run yet")
+        self._advance_loop(cycles)

@@ -1,5 +1,6 @@
 """Sessions on the disk that are opened again: resumed, redone, or closed."""
 
+import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +55,22 @@ class ResumeRequest:
     script: str | None = None
     can_log: Path | None = None
     faults: tuple[str, ...] = ()
+
+
+def resume_request(args: argparse.Namespace) -> ResumeRequest:
+    """Return the request that the options of `resume` and `redo` make."""
+    return ResumeRequest(
+        data=args.data,
+        config=args.config,
+        console=Console(color=not args.no_color),
+        is_fast=args.fast,
+        is_fake=args.fake,
+        is_forced=args.force,
+        operator=args.operator,
+        script=args.operator_script,
+        can_log=args.can_log,
+        faults=tuple(args.fault),
+    )
 
 
 def resume(folder: SessionFolder, request: ResumeRequest) -> int:

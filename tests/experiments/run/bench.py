@@ -1,0 +1,97 @@
+"""A rig without devices for the console loop and the steps that run on it."""
+
+import io
+from contextlib import redirect_stdout
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+
+from acquisition.control_loop.states import ControlStatus
+from acquisition.devices import SafetyMode
+from experiments.operator.console import Console
+from experiments.run.console_loop import ConsoleLoop
+from experiments.run.stop import StopFlag
+from fakes.clock import SteppedClock
+
+
+@dataclass
+class StubClient:
+    """A loop in which nothing happens unless the test says so."""
+
+    clock: SteppedClock
+    status: ControlStatus = field(default_factory=ControlStatus)
+    advanced: float = 0.0
+    requested: list = field(default_factory=list)
+    on_advance: list = field(default_factory=list)
+    loop: SimpleNamespace = field(
+        default_factory=lambda: SimpleNamespace(is_bus_down=False, is_running=True)
+    )
+
+    def advance(self, seconds):
+        self.advanced += seconds
+        self.clock.sleep_until(self.clock.now_ns() + round(seconds * 1e9))
+        for look in self.on_advance:
+            look()
+
+    def request(self, state):
+        self.requested.append(state)
+
+    def last(self, seconds):
+        del seconds
+        return np.zeros(0)
+
+
+class Keys:
+    """An operator who presses the given keys, one per look, then nothing."""
+
+    draft = ""
+
+    def __init__(self, *keys, lines=()):
+        self.keys, self.lines = list(keys), list(lines)
+        self.states = []
+
+    def answer(self, state):
+        self.states.append(state)
+        return self.keys.pop(0) if self.keys else ""
+
+    def line(self, state):
+        self.states.append(state)
+        return self.lines.pop(0) if self.lines else ""
+
+
+class StubBackend:
+    """A backend that is safe at once."""
+
+    def __init__(self, client):
+        self.loop_client = client
+        self.recorder = SimpleNamespace(abandon=lambda: None)
+
+    def idle(self):
+        return True
+
+    def safety_mode(self):
+        return SafetyMode.IDLE
+
+
+def make_loop(operator, *, is_stepped=True, console=None, **more):
+    """Return a console loop over a rig without devices."""
+    clock = SteppedClock()
+    rig = SimpleNamespace(
+        clock=clock,
+        backend=StubBackend(StubClient(clock)),
+        simulation=None,
+        is_stepped=is_stepped,
+        settings=SimpleNamespace(
+            rig=SimpleNamespace(operator=SimpleNamespace(double_tap=False))
+        ),
+    )
+    return ConsoleLoop(rig, console or Console(), operator, StopFlag(), **more)
+
+
+def said(work):
+    """Return what `work` prints."""
+    out = io.StringIO()
+    with redirect_stdout(out):
+        work()
+    return out.getvalue()

@@ -1,0 +1,148 @@
+"""Time, keys, stops and faults of the console loop, without any device."""
+
+import time
+
+import pytest
+
+from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.states import ArmState
+from acquisition.errors import SessionError
+from experiments.operator.prompts import Prompt
+from experiments.run.console_loop import TICK
+from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.session.trial_name import TrialName
+from tests.experiments.run.bench import Keys, make_loop
+
+NAME = TrialName(3, 2)
+STANDING = GuardVerdict(Action.HOLD, "joint-limit")
+WORSE = GuardVerdict(Action.IDLE, "estop")
+
+
+def test_a_tick_lets_20_ms_pass_and_returns_the_key():
+    loop = make_loop(Keys("n"))
+    assert loop.tick(Prompt.READY, NAME) == "n"
+    assert loop.loop_client.advanced == pytest.approx(TICK)
+
+
+def test_the_operator_sees_trial_and_attempt_and_since_when_it_is_asked():
+    operator = Keys()
+    loop = make_loop(operator)
+    for prompt in (Prompt.LIFT, Prompt.LIFT, Prompt.READY):
+        loop.tick(prompt, NAME)
+    assert [(s.trial, s.attempt) for s in operator.states] == [(3, 2)] * 3
+    assert [s.since for s in operator.states] == pytest.approx([0.0, TICK, 0.0])
+
+
+@pytest.mark.parametrize("prompt", [Prompt.SUPPORT, Prompt.LIFT, Prompt.RECORDING])
+def test_quit_ends_the_session_where_it_has_no_other_meaning(prompt):
+    with pytest.raises(StopRequestedError):
+        make_loop(Keys("q")).tick(prompt)
+
+
+@pytest.mark.parametrize("prompt", [Prompt.REVIEW, Prompt.READY])
+def test_quit_is_an_ordinary_key_where_it_has_another_meaning(prompt):
+    assert make_loop(Keys("q")).tick(prompt) == "q"
+
+
+def test_a_stop_ends_every_prompt_but_the_review():
+    loop = make_loop(Keys("k"))
+    loop.stop.request()
+    assert loop.tick(Prompt.REVIEW) == "k"
+    with pytest.raises(StopRequestedError):
+        loop.tick(Prompt.READY)
+
+
+def test_a_stop_gives_a_note_up():
+    loop = make_loop(Keys(lines=["half a no"]))
+    loop.stop.request()
+    assert loop.line(NAME) == ""
+
+
+def test_a_terminal_that_is_lost_is_a_stop():
+    loop = make_loop(Keys())
+    loop.console.is_lost = True
+    with pytest.raises(StopRequestedError):
+        loop.tick(Prompt.READY)
+
+
+@pytest.mark.parametrize("prompt", [Prompt.REVIEW, Prompt.PAUSED])
+def test_a_fault_that_persists_is_raised_once_where_the_arm_rests(prompt):
+    loop = make_loop(Keys("k"))
+    loop.loop_client.status.verdict = STANDING
+    with pytest.raises(ArmFaultError):
+        loop.tick(prompt)
+    assert loop.tick(prompt) == "k"
+    loop.loop_client.status.verdict = WORSE
+    with pytest.raises(ArmFaultError):
+        loop.tick(prompt)
+
+
+def test_a_fault_that_was_gone_is_raised_again():
+    loop = make_loop(Keys())
+    for verdict in (STANDING, STANDING):
+        loop.loop_client.status.verdict = verdict
+        with pytest.raises(ArmFaultError):
+            loop.tick(Prompt.REVIEW)
+        loop.loop_client.status.verdict = None
+        loop.tick(Prompt.REVIEW)
+
+
+def test_a_fault_is_raised_at_every_tick_where_the_arm_is_wanted():
+    loop = make_loop(Keys())
+    loop.loop_client.status.verdict = STANDING
+    for _ in range(2):
+        with pytest.raises(ArmFaultError):
+            loop.tick(Prompt.RECORDING)
+
+
+def test_the_worst_verdict_is_the_newest_only_if_it_is_more_severe():
+    loop = make_loop(Keys())
+    assert loop.worst_verdict(STANDING) is STANDING
+    loop.loop_client.status.verdict = WORSE
+    assert loop.worst_verdict(STANDING) is WORSE
+    loop.loop_client.status.verdict = STANDING
+    assert loop.worst_verdict(WORSE) is WORSE
+
+
+def test_the_heartbeat_goes_on_while_something_slow_is_done():
+    loop = make_loop(Keys(), is_stepped=False)
+
+    def work():
+        end = time.monotonic() + 5.0  # noqa: TID251 - of a thread that waits for us
+        while loop.loop_client.advanced < 3 * TICK and time.monotonic() < end:  # noqa: TID251
+            pass
+        return "done"
+
+    assert loop.run_aside(work) == "done"
+    assert loop.loop_client.advanced >= 3 * TICK
+
+
+def test_on_stepped_time_no_time_passes_while_something_slow_is_done():
+    loop = make_loop(Keys())
+    assert loop.run_aside(lambda: 7) == 7
+    assert loop.loop_client.advanced == 0.0
+
+
+@pytest.mark.parametrize("is_stepped", [True, False])
+def test_what_slow_work_raises_is_raised(is_stepped):
+    def work():
+        raise SessionError("no")
+
+    with pytest.raises(SessionError):
+        make_loop(Keys(), is_stepped=is_stepped).run_aside(work)
+
+
+def test_a_stop_holds_the_arm():
+    loop = make_loop(Keys())
+    loop.stop.request()
+    loop.stop_arm()
+    assert loop.loop_client.requested == [ArmState.HOLD]
+
+
+def test_an_urgent_stop_damps_and_brakes_once():
+    loop = make_loop(Keys())
+    loop.stop.request()
+    loop.stop.request()
+    loop.stop_arm()
+    loop.stop_arm()
+    assert loop.loop_client.requested == [ArmState.DAMP, ArmState.IDLE]
