@@ -11,7 +11,12 @@ from acquisition.control_loop.states import ControlStatus
 from acquisition.devices import SafetyMode
 from experiments.operator.console import Console
 from experiments.run.console_loop import ConsoleLoop
+from experiments.run.context import RunContext
 from experiments.run.stop import StopFlag
+from experiments.session.journal import Journal
+from experiments.session.states import Event
+from experiments.session.store import create_session
+from experiments.trial.header import SessionMetadata
 from fakes.clock import SteppedClock
 
 
@@ -95,3 +100,27 @@ def said(work):
     with redirect_stdout(out):
         work()
     return out.getvalue()
+
+
+def make_context(data, operator, *, trials=2, **more):
+    """Return the context of a session in `data` that waits for its first trial."""
+    loop = make_loop(operator, **more)
+    folder = create_session(data, "TF", is_simulated=True, utc_ns=0)
+    journal = Journal(folder, loop.rig.clock)
+    journal.append(Event.STARTED, terrain="TF", trials=trials)
+    journal.append(Event.ACTIVATED)
+    loop.rig.row = SimpleNamespace(name="TF", reset=())
+    loop.rig.frame = SimpleNamespace(travel=0.4)
+    return RunContext(
+        console_loop=loop,
+        rig=loop.rig,
+        console=loop.console,
+        operator=operator,
+        stop=loop.stop,
+        metadata=SessionMetadata(folder, "mk", None, {}, ""),
+        journal=journal,
+        archive=SimpleNamespace(suggestion=lambda: ""),
+        feedback=SimpleNamespace(),
+        opened_ns=loop.rig.clock.now_ns(),
+        kept_before=0,
+    )

@@ -1,0 +1,149 @@
+"""The steps of the flow that ask the operator: ready, note, verdict, estimates."""
+
+import time
+
+import pytest
+
+from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.states import ArmState
+from experiments.operator.keys import REJECT_REASONS
+from experiments.run.console_loop import TICK
+from experiments.run.ready import take_note, wait_ready
+from experiments.run.runner import ask_verdict
+from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.session.sidecar import TrialOutcome
+from experiments.session.states import Event
+from experiments.session.trial_name import TrialName
+from tests.experiments.run.bench import Keys, make_context
+
+FIRST = TrialName(1, 1)
+
+
+def names(context):
+    return [event["event"] for event in context.metadata.folder.events()]
+
+
+def reviewed(context):
+    """Let the first trial be recorded and wait for its verdict."""
+    details = {"trial": 1, "attempt": 1}
+    context.journal.append(Event.TRIAL_STARTED, **details)
+    context.journal.append(Event.TRIAL_RECORDED, **details)
+    return TrialOutcome("key", 3.0, 0.4)
+
+
+def test_a_trial_begins_with_space_and_not_with_a_key_that_means_nothing(tmp_path):
+    context = make_context(tmp_path, Keys("x", "k", "", " ", "n"))
+    wait_ready(context, FIRST)
+    assert context.operator.keys == ["n"]
+
+
+def test_quit_lets_the_next_trial_be_the_last(tmp_path):
+    context = make_context(tmp_path, Keys("q", " "))
+    wait_ready(context, FIRST)
+    assert context.is_last
+
+
+def test_quit_twice_ends_at_once(tmp_path):
+    context = make_context(tmp_path, Keys("q", "q"))
+    with pytest.raises(StopRequestedError):
+        wait_ready(context, FIRST)
+
+
+def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):
+    context = make_context(tmp_path, Keys("p", "", " ", " "))
+    wait_ready(context, FIRST)
+    assert context.loop_client.requested == [ArmState.HOLD, ArmState.FLOAT]
+    assert names(context)[-2:] == [Event.PAUSED, Event.CONTINUED]
+
+
+def test_there_is_nothing_to_view_before_the_first_trial(tmp_path, capsys):
+    wait_ready(make_context(tmp_path, Keys("v", " ")), FIRST)
+    assert "no trial to look at" in capsys.readouterr().out
+
+
+def test_a_note_of_spaces_is_none(tmp_path):
+    context = make_context(tmp_path, Keys(lines=["   "]))
+    take_note(context, FIRST, is_on_trial=False)
+    assert Event.NOTED not in names(context)
+
+
+def test_a_note_is_in_the_journal_with_its_author(tmp_path):
+    context = make_context(tmp_path, Keys(lines=[None, "wet"]))
+    take_note(context, FIRST, is_on_trial=False)
+    (note,) = [e for e in context.metadata.folder.events() if e["event"] == "noted"]
+    assert (note["text"], note["who"]) == ("wet", "mk")
+
+
+def test_a_kept_trial_counts(tmp_path):
+    context = make_context(tmp_path, Keys("x", "r", "k"))
+    ask_verdict(context, FIRST, reviewed(context))
+    assert context.journal.state.kept == (1,)
+
+
+@pytest.mark.parametrize("digit", REJECT_REASONS)
+def test_a_rejected_trial_has_its_reason(tmp_path, digit):
+    context = make_context(tmp_path, Keys(f"r{digit}"))
+    ask_verdict(context, FIRST, reviewed(context))
+    event = context.metadata.folder.events()[-1]
+    assert (event["event"], event["reason"]) == (
+        Event.TRIAL_REJECTED,
+        REJECT_REASONS[digit],
+    )
+
+
+def test_quit_at_the_review_rejects_the_trial_and_ends(tmp_path):
+    context = make_context(tmp_path, Keys("q"))
+    with pytest.raises(StopRequestedError):
+        ask_verdict(context, FIRST, reviewed(context))
+    assert names(context)[-1] == Event.TRIAL_REJECTED
+
+
+def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, capsys):
+    context = make_context(tmp_path, Keys("k"))
+    outcome = reviewed(context)
+    context.loop_client.status.verdict = GuardVerdict(Action.HOLD, "console-silent")
+    ask_verdict(context, FIRST, outcome)
+    assert context.journal.state.kept == (1,)
+    assert "ARM: holding" in capsys.readouterr().err
+
+
+def test_a_fault_that_takes_the_arm_away_rejects_the_trial(tmp_path):
+    context = make_context(tmp_path, Keys())
+    outcome = reviewed(context)
+    context.loop_client.status.verdict = GuardVerdict(Action.IDLE, "estop")
+    with pytest.raises(ArmFaultError):
+        ask_verdict(context, FIRST, outcome)
+    assert names(context)[-1] == Event.TRIAL_REJECTED
+
+
+def test_the_duration_is_estimated_once_with_the_first_kept_trial(tmp_path):
+    context = make_context(tmp_path, Keys("k"), trials=3)
+    context.update_estimate()
+    assert context.estimate is None
+    context.loop_client.advance(10.0)
+    ask_verdict(context, FIRST, reviewed(context))
+    context.update_estimate()
+    estimate = context.estimate
+    assert estimate == pytest.approx(3 * context.elapsed)
+    context.loop_client.advance(10.0)
+    context.update_estimate()
+    assert context.estimate == estimate
+
+
+def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
+    context = make_context(tmp_path, Keys(), is_stepped=False)
+    client, journal = context.loop_client, context.journal
+
+    class SlowJournal:
+        """A journal that waits until the console has ticked three times."""
+
+        def append(self, event, **details):
+            deadline = time.monotonic() + 5.0  # noqa: TID251 - of a thread
+            while client.advanced < 3 * TICK and time.monotonic() < deadline:  # noqa: TID251
+                pass
+            journal.append(event, **details)
+
+    context.journal = SlowJournal()
+    context.append(Event.PAUSED)
+    assert client.advanced >= 3 * TICK
+    assert names(context)[-1] == Event.PAUSED
