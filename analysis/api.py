@@ -18,7 +18,7 @@ import numpy as np
 
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PreparedTrial, PrepareOptions
-from analysis.data.prepare import prepare as prepare_series
+from analysis.data.prepare import prepare_trial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import TractionSeries
 from analysis.data.tables import load_tables
@@ -72,7 +72,7 @@ def prepare(
         options: width of the average, thinning and window; the paper's by default.
     """
     series = trial.series() if isinstance(trial, RecordedTrial) else trial
-    return prepare_series(series, options or PrepareOptions())
+    return prepare_trial(series, options or PrepareOptions())
 
 
 def fit_tustin(

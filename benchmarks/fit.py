@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.tables import load_tables
 from analysis.gp.arcsine import Arcsine
@@ -38,7 +38,7 @@ _GOALS = {"evaluation": 5.0, "SE fit": 4.0, "NN fit": 2.0, "Tustin fit": 10.0}
 def load_rows() -> SampleTable:
     """Return the kept samples of three trials on stones."""
     return SampleTable.of(
-        [prepare(s, PrepareOptions()) for s in load_tables([SLICE])["S0"]]
+        [prepare_trial(s, PrepareOptions()) for s in load_tables([SLICE])["S0"]]
     )
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.data.series import Array
 from analysis.data.tables import load_tables
@@ -108,7 +108,7 @@ def race(
 def folds_of(path: Path) -> list[FoldTask]:
     """Return every fold of the trials in a file."""
     trials = {
-        name: [prepare(series, PrepareOptions()) for series in group]
+        name: [prepare_trial(series, PrepareOptions()) for series in group]
         for name, group in load_tables([path]).items()
     }
     return plan_folds(trials, FitOptions())[0]

@@ -54,7 +54,7 @@ class TareResult:
     samples: int
 
 
-def tare(
+def take_mean(
     samples: Sequence[WrenchSample],
     spread_limit: float,
     rate: float = SLOWEST,

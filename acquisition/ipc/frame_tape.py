@@ -6,15 +6,11 @@ from typing import Final
 
 import numpy as np
 
-from acquisition.cdr import CdrWriter
 from acquisition.ipc.rings import Ring
 from acquisition.sample import Record
 
 SECONDS = 2.0
 _FRAME: Final = struct.Struct("<QIB3x8s")
-_CAN_FRAME: Final = np.dtype(
-    [("can_id", "<u4"), ("length", "u1"), ("gap", "V3"), ("data", "V8")]
-)
 
 
 class FrameTape:
@@ -39,13 +35,3 @@ def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:
         return frames
     earliest = int(frames["t_ns"][-1]) - int(seconds * 1e9)
     return frames[frames["t_ns"].astype(np.int64) >= earliest]
-
-
-def encode_can_batch(log_time: int, frames: Record) -> bytes:
-    """Return a traction_msgs/CanBatch payload of struct can_frame records."""
-    raw = np.zeros(len(frames), _CAN_FRAME)
-    for name in ("can_id", "length", "data"):
-        raw[name] = frames[name]
-    writer = CdrWriter().header(log_time, "can")
-    writer.sequence(np.ascontiguousarray(frames["t_ns"]))
-    return writer.sequence(raw.view(np.uint8)).finish()

@@ -5,16 +5,13 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState, ControlStatus
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.rings import RingReader
-from acquisition.recording.recorder import Recorder
 from acquisition.sample import Record
 
 PORTION = 10  # cycles between two looks of the console: 20 ms
-_GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
 
 
 class Advance(Protocol):
@@ -27,30 +24,6 @@ class Advance(Protocol):
             TractionError: the loop, the recorder or another process is in trouble.
         """
         ...
-
-
-class InlineAdvance:
-    """Loop and recorder in this thread: nothing runs unless the console waits.
-
-    The recorder drains as often as it would flush anyway: a process of its own drains
-    every 20 ms, but here one long piece of work costs half of many short ones, and it
-    is the simulation that waits for it.
-    """
-
-    def __init__(self, loop: Loop, recorder: Recorder) -> None:
-        self._loop = loop
-        self._recorder = recorder
-        self._passed = 0
-
-    def __call__(self, cycles: int) -> None:
-        """Run the loop for `cycles` periods; drain the recorder when it is time."""
-        self._loop.run(cycles)
-        self._passed += cycles
-        if self._passed >= _GATHERED:
-            self._passed = 0
-            self._recorder.drain()
-        if self._recorder.failure is not None:
-            raise self._recorder.failure
 
 
 class LoopClient:

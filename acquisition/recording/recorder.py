@@ -11,7 +11,7 @@ from acquisition.clock import RATE_HZ, Clock
 from acquisition.errors import TrialFileError
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.sample import Record
-from acquisition.trial_file.verify import VerifiedFile, verify
+from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
     TRIAL_TOPICS,
@@ -194,7 +194,7 @@ def seal(writer: TrialWriter, stop_reason: str) -> VerifiedFile:
     """
     try:
         writer.finish(stop_reason)
-        verified = verify(writer.partial, writer.counts)
+        verified = verify_file(writer.partial, writer.counts)
         publish(writer)
     except TrialFileError:
         writer.close_partial()

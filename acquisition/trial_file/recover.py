@@ -20,7 +20,7 @@ from acquisition.trial_file.chunks import as_trial_file_error, read_file
 from acquisition.trial_file.publishing import publish_file
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Salvaged, SoundRecords
-from acquisition.trial_file.verify import VerifiedFile, verify
+from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
 
@@ -168,7 +168,7 @@ def recovered_path(source: Path) -> Path:
     return source.with_name(f"{stem}.recovered.mcap")
 
 
-def recover(source: Path) -> Recovery:
+def recover_file(source: Path) -> Recovery:
     """Save everything up to the first broken record of `source` into a new file.
 
     The new file is marked as incomplete, verified and read-only. A source that is
@@ -179,7 +179,7 @@ def recover(source: Path) -> Recovery:
     """
     data = read_file(source)
     try:
-        verified = verify(source)
+        verified = verify_file(source)
     except TrialFileError as error:
         reason = error.reason
     else:
@@ -210,7 +210,7 @@ def _recover(
     salvage = SoundRecords(data, source)
     copy = _write(salvage, source, facts, written)
     try:
-        verified = verify(written)
+        verified = verify_file(written)
     except TrialFileError as error:
         raise TrialFileError(source, f"makes no trial: {error.reason}") from error
     target = recovered_path(source)
@@ -262,7 +262,7 @@ def _earlier(source: Path, target: Path, facts: Mapping[str, str]) -> Recovery:
     return Recovery(
         source=source,
         path=target,
-        verified=verify(target),
+        verified=verify_file(target),
         messages=messages,
         bytes_dropped=dropped,
         reason=found.get("reason", facts["reason"]),

@@ -38,7 +38,7 @@ class VerifiedFile:
     is_complete: bool
 
 
-def verify(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
+def verify_file(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
     """Check magics, CRCs, counts, cadence, clock and attachments of `path`.
 
     A recovered file may lack attachments, and its cadence is not judged: it is all

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from acquisition.cdr import NS_PER_S, CdrWriter
+from acquisition.sample import Record
 from acquisition.schema import CYCLE
 
 JOINT_NAMES = [f"wam_j{joint}" for joint in range(1, 8)]
@@ -18,6 +19,9 @@ VIEW_TOPICS = {
 }
 _STAMP: Final = struct.Struct("<iI")
 _STAMP_AT: Final = 4  # right behind the encapsulation
+_CAN_FRAME: Final = np.dtype(
+    [("can_id", "<u4"), ("length", "u1"), ("gap", "V3"), ("data", "V8")]
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,3 +91,13 @@ _VIEWS: Final = {
     "/foot/pose": _view(_header("wam_base"), ("foot_position", "foot_orientation")),
     "/foot/twist": _view(_header("wam_base"), ("foot_velocity",)),
 }
+
+
+def encode_can_batch(log_time: int, frames: Record) -> bytes:
+    """Return a traction_msgs/CanBatch payload of struct can_frame records."""
+    raw = np.zeros(len(frames), _CAN_FRAME)
+    for name in ("can_id", "length", "data"):
+        raw[name] = frames[name]
+    writer = CdrWriter().header(log_time, "can")
+    writer.sequence(np.ascontiguousarray(frames["t_ns"]))
+    return writer.sequence(raw.view(np.uint8)).finish()

@@ -13,11 +13,10 @@ from mcap.writer import CompressionType, Writer
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.clock import RATE_HZ
 from acquisition.errors import TrialFileError
-from acquisition.ipc.frame_tape import encode_can_batch
 from acquisition.sample import CHANNELS, Flag, Record
 from acquisition.schema import CYCLE, TRUTH, schema_text
 from acquisition.trial_file.publishing import publish_file, sync_directory
-from acquisition.trial_file.views import VIEW_TOPICS, encode_views
+from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
 CHUNK_BYTES = 262_144
 FORMAT_VERSION = "1"

@@ -175,7 +175,7 @@ def foot_velocity(t: Array, position: Array) -> Array:
     return velocity
 
 
-def prepare(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
+def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
     """Return the kept samples of a trial: smoothed, thinned, inside the window."""
     smooth = _smooth(series, options.smoothing)
     thinned = np.arange(0, smooth.t.size, options.downsample)

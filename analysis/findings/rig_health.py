@@ -102,7 +102,7 @@ class RigTrial:
         return {name: getattr(self, name) for name in names}
 
 
-def rig_health(trials: Sequence[RecordedTrial]) -> list[RigTrial]:
+def summarise_rig(trials: Sequence[RecordedTrial]) -> list[RigTrial]:
     """Return the health of every trial, sessions in the order they are given."""
     following: dict[int, Array] = {}
     for k, pair in enumerate(pairwise(trials)):

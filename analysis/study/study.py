@@ -7,7 +7,12 @@ import numpy as np
 
 from acquisition.errors import SettingsError
 from analysis.data.events import Slip, find_slips
-from analysis.data.prepare import MINIMUM_KEPT, PreparedTrial, PrepareOptions, prepare
+from analysis.data.prepare import (
+    MINIMUM_KEPT,
+    PreparedTrial,
+    PrepareOptions,
+    prepare_trial,
+)
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.data.terrain_kinds import kind_title, terrain_kind
@@ -166,7 +171,9 @@ def run_study(
     if not any(trials.values()):
         raise SettingsError("There is no trial to analyse.", hint="Record some first.")
     prepared = {
-        terrain: tuple(prepare(series, options.prepare) for series in recorded)
+        terrain: tuple(
+            prepare_trial(series, options.prepare) for series in recorded
+        )
         for terrain, recorded in trials.items()
     }
     tasks, notes = plan_folds(prepared, options.fit)
@@ -192,7 +199,9 @@ def run_study(
     warnings = tuple(
         warning
         for result in results.values()
-        for warning in _warnings(result, options.prepare.container_travel is not None)
+        for warning in _warnings(
+            result, options.prepare.container_travel is not None
+        )
     )
     contradictions = tuple(_contradictions(trials))
     return Study(simulated, options, results, tuple(notes), contradictions + warnings)

@@ -33,7 +33,7 @@ class _Errors:
         return self.mean(terrain, tested) / self.mean(tested, tested)
 
 
-def model_measures(study: Study) -> dict[str, list[float]]:
+def measure_models(study: Study) -> dict[str, list[float]]:
     """Return the values of A1 to C4 and E7, by id.
 
     Args:

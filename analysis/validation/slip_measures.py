@@ -45,7 +45,7 @@ class GroundTrials:
         return float(np.mean([getattr(t.shares, name) for t in self.prepared]))
 
 
-def slip_measures(grounds: Mapping[str, GroundTrials]) -> dict[str, list[float]]:
+def measure_slips(grounds: Mapping[str, GroundTrials]) -> dict[str, list[float]]:
     """Return the values of D1 to F2 but E7, by id."""
     stones = [g for g in grounds.values() if not g.is_plate]
     plates = [g for g in grounds.values() if g.is_plate]

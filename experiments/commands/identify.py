@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     import json
     from dataclasses import asdict
 
-    from analysis.data.prepare import PrepareOptions, prepare
+    from analysis.data.prepare import PrepareOptions, prepare_trial
     from analysis.terrains.database import load
     from analysis.terrains.recognition import recognise
     from experiments.operator.console import Console
@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     database = load(args.models)
     results: list[dict[str, object]] = []
     for series in _series(args):
-        trial = prepare(series, PrepareOptions())
+        trial = prepare_trial(series, PrepareOptions())
         found = recognise(trial, database, args.window)
         if args.json:
             content = None if found is None else asdict(found)

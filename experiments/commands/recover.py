@@ -19,7 +19,7 @@ _NOTHING_SAVED = 6  # exit code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `recover`."""
+    """Declare the options of `recover_file`."""
     parser.add_argument(
         "files",
         nargs="+",
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Recover every file and return the exit code."""
     from acquisition.errors import TrialFileError
-    from acquisition.trial_file.recover import recover
+    from acquisition.trial_file.recover import recover_file
     from experiments.operator.console import Console
 
     console = Console(color=not args.no_color)
@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
     failed = 0
     for source in sources:
         try:
-            recovery = recover(source)
+            recovery = recover_file(source)
         except TrialFileError as error:
             failed += 1
             console.problem(f"✘ {error} The file is untouched.")

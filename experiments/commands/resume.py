@@ -15,7 +15,7 @@ EXAMPLES = """\
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `resume`."""
+    """Declare the options of `resume_session`."""
     parser.add_argument(
         "session", nargs="?", metavar="SESSION", help="S012, a folder, or left out"
     )
@@ -24,14 +24,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Record what is missing and return the exit code."""
-    from experiments.run.resume import resume, resume_request
+    from experiments.run.resume import resume_request, resume_session
     from experiments.session.store import find_session
 
     if args.session is None:
         folder = _only_one(args.data, is_fake=args.fake)
     else:
         folder = find_session(args.data, args.session)
-    return resume(folder, resume_request(args))
+    return resume_session(folder, resume_request(args))
 
 
 def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":

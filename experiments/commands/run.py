@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator.console import Console
     from experiments.operator.scripted import choose_operator
     from experiments.rig.rig import FakeOptions
-    from experiments.run.resume import resume
+    from experiments.run.resume import resume_session
     from experiments.run.session import OpenMode, SessionRequest, run_session
     from experiments.session.states import Event
     from experiments.settings.load import load_settings
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
     )
     unfinished = _make_room(request, is_new=args.new)
     if unfinished is not None:
-        return resume(unfinished.folder, _as_reopening(args, request))
+        return resume_session(unfinished.folder, _as_reopening(args, request))
     trials = args.trials or request.row.trials
     asked = {"terrain": request.row.name, "trials": trials}
     return run_session(request, OpenMode(Event.STARTED, asked))

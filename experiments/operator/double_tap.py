@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.rig.rig import Rig
+from acquisition.ipc.loop_client import LoopClient
 
 PRESSED = 8.0  # F_n above which the foot is pressed down [N]
 RELEASED = 5.0  # and below which it is let go: it rests with less than that [N]
@@ -70,10 +70,9 @@ _SECONDS = 0.1  # of samples looked at; those seen before are passed over
 class FootKeys:
     """Turns a double tap of the foot into a key, if rig.toml wants it."""
 
-    def __init__(self, rig: Rig) -> None:
-        is_wanted = rig.settings.rig.operator.double_tap
+    def __init__(self, loop_client: LoopClient, *, is_wanted: bool) -> None:
         self._taps = DoubleTap() if is_wanted else None
-        self._loop_client = rig.backend.loop_client
+        self._loop_client = loop_client
 
     def key(self, key: str) -> str:
         """Return `key` when the foot was tapped twice since the last call, else ""."""

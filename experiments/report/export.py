@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import SessionError, TrialFileError
 from analysis.data.load import RecordedTrial, load_trial
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from experiments.operator.console import WARNING, Console
 from experiments.session.store import SessionFolder, sha256_of, write_new_text
 
@@ -186,7 +186,7 @@ def trial_table(trial: RecordedTrial) -> str:
 def samples_table(trial: RecordedTrial) -> str:
     """Return the kept samples of a trial as CSV, units in the header."""
     options = PrepareOptions(container_travel=trial.frame.travel)
-    kept = prepare(trial.series(), options)
+    kept = prepare_trial(trial.series(), options)
     columns = (kept.smooth.t[kept.indices], kept.v_t, kept.F_n, kept.F_t)
     headers = [f"{name} [{unit}]" for name, unit, _ in SAMPLES]
     return _table(headers, np.column_stack(columns))

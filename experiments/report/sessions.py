@@ -8,7 +8,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import SessionError, TrialFileError
 from analysis.data.load import RecordedTrial, load_trial
 from analysis.data.prepare import PrepareOptions
-from analysis.findings.rig_health import rig_health
+from analysis.findings.rig_health import summarise_rig
 from analysis.report.page import ReportContext, write_report
 from analysis.report.what_if import StudyVariant, plain_choice, side_by_side
 from analysis.study.fold_store import ResultStore
@@ -242,6 +242,6 @@ def report_sessions(
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
         warnings=analysed.problems,
-        rig=rig_health([trial for group in trials.values() for trial in group]),
+        rig=summarise_rig([trial for group in trials.values() for trial in group]),
     )
     return write_report(study, out, context)

@@ -36,7 +36,7 @@ class TruthErrors:
     parameters: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
-def truth_errors(trial: RecordedTrial) -> TruthErrors | None:
+def compare_with_truth(trial: RecordedTrial) -> TruthErrors | None:
     """Return how far a trial is from its truth file; None where there is none."""
     path = trial.path.with_name(trial.path.stem + ".truth.mcap")
     if not path.exists():
@@ -96,7 +96,7 @@ def truth_tables(
         name: [
             (trial.name, error)
             for trial in group
-            if (error := truth_errors(trial)) is not None
+            if (error := compare_with_truth(trial)) is not None
         ]
         for name, group in trials.items()
     }

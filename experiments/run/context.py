@@ -8,6 +8,7 @@ from acquisition.errors import TractionError
 from acquisition.ipc.loop_client import LoopClient
 from experiments.messages import FaultContext, fault_text
 from experiments.operator.console import Console
+from experiments.operator.double_tap import FootKeys
 from experiments.operator.feedback import OperatorFeedback, build_feedback
 from experiments.operator.prompts import OperatorInput
 from experiments.rig.rig import Rig
@@ -92,6 +93,11 @@ class RunContext:
     def report_fault(self, verdict: GuardVerdict) -> None:
         """Print why the guard stopped the arm, and what is safe."""
         self.console.problem(self.fault_text(verdict))
+
+    def watch_foot(self) -> FootKeys:
+        """Return the double tap of the foot as a key, if rig.toml wants it."""
+        is_wanted = self.rig.settings.rig.operator.double_tap
+        return FootKeys(self.loop_client, is_wanted=is_wanted)
 
     def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""

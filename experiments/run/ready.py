@@ -5,7 +5,6 @@ from dataclasses import replace
 
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
-from experiments.operator.double_tap import FootKeys
 from experiments.operator.keys import NOTE_KEYS, KeyAction, key_action, screen_keys
 from experiments.operator.prompts import Prompt
 from experiments.operator.screens import ReadyView, ready_lines
@@ -24,7 +23,7 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
     Raises:
         ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
     """
-    console_loop, feet = context.console_loop, FootKeys(context.rig)
+    console_loop, feet = context.console_loop, context.watch_foot()
     while True:
         _show(context)
         action = None

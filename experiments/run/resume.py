@@ -58,7 +58,7 @@ class ResumeRequest:
 
 
 def resume_request(args: argparse.Namespace) -> ResumeRequest:
-    """Return the request that the options of `resume` and `redo` make."""
+    """Return the request that the options of `resume_session` and `redo` make."""
     return ResumeRequest(
         data=args.data,
         config=args.config,
@@ -73,7 +73,7 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
     )
 
 
-def resume(folder: SessionFolder, request: ResumeRequest) -> int:
+def resume_session(folder: SessionFolder, request: ResumeRequest) -> int:
     """Continue a session that is not finished; return the exit code.
 
     Raises:

@@ -6,7 +6,6 @@ from acquisition.control_loop.states import ArmState
 from acquisition.errors import TractionError
 from analysis.data.prepare import MINIMUM_TRAVEL_SHARE
 from experiments.messages import CATALOGUE, FaultContext, rest_text
-from experiments.operator.double_tap import FootKeys
 from experiments.operator.keys import (
     REJECT_REASONS,
     KeyAction,
@@ -160,7 +159,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     context.say(screen_keys(Prompt.REVIEW))
     context.fault_context = FaultContext(name.kept)
     is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
-    feet = FootKeys(context.rig)
+    feet = context.watch_foot()
     while True:
         try:
             key = context.console_loop.tick(Prompt.REVIEW, name, is_complete=is_whole)

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from acquisition.clock import NS_PER_S, Clock, SystemClock
-from acquisition.control_loop.guard import GuardVerdict
+from acquisition.control_loop.faults import GuardVerdict
 
 URGENT_NS = 3 * NS_PER_S  # two requests closer than this: stop now
 

@@ -17,7 +17,7 @@ from experiments.session.states import Event
 from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.payload import Payload
-from ft_sensor.tare import TareError, TareResult, tare
+from ft_sensor.tare import TareError, TareResult, take_mean
 from wam.model.constants import Array
 
 TARE_SECONDS = 1.0
@@ -107,7 +107,7 @@ def _measure(context: RunContext, name: TrialName) -> TareResult:
         console_loop.inject_faults(FaultTrigger.TARE, name.number, tick * TICK)
     limit = rig.settings.rig.limits.tare_spread
     try:
-        return tare(unpack_wrenches(reader.read()), limit)
+        return take_mean(unpack_wrenches(reader.read()), limit)
     except TareError as error:
         if error.spread is None:
             raise preflight_error("tare-poor", detail=error.message) from error

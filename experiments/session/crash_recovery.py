@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
-from acquisition.trial_file.recover import recover, recovered_path
-from acquisition.trial_file.verify import VerifiedFile, verify
+from acquisition.trial_file.recover import recover_file, recovered_path
+from acquisition.trial_file.verify import VerifiedFile, verify_file
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialOutcome, sidecar_of
 from experiments.session.states import OPEN, Event, SessionPhase
@@ -69,7 +69,7 @@ def _gather(folder: SessionFolder, name: TrialName) -> None:
 def _recover(partial: Path, path: Path) -> None:
     """Save what is sound of `partial` as `path`; nothing where nothing is."""
     try:
-        found = recover(partial).path
+        found = recover_file(partial).path
     except TrialFileError:
         return
     move_file(found, path)
@@ -79,7 +79,7 @@ def _recover(partial: Path, path: Path) -> None:
 def _verified(path: Path) -> VerifiedFile | None:
     """Return what `path` holds, None where it cannot be read."""
     try:
-        return verify(path)
+        return verify_file(path)
     except TrialFileError:
         return None
 

@@ -18,9 +18,9 @@ from analysis.data.terrain_kinds import FLAT
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import Study, StudyOptions, run_study
 from analysis.validation.bands import Band, BandResult, hold_against_bands
-from analysis.validation.model_measures import model_measures
-from analysis.validation.slip_measures import GroundTrials, slip_measures
-from experiments.report.truth_errors import truth_errors
+from analysis.validation.model_measures import measure_models
+from analysis.validation.slip_measures import GroundTrials, measure_slips
+from experiments.report.truth_errors import compare_with_truth
 from experiments.session.store import list_sessions
 
 WHOLE = 10  # trials per terrain from which every band applies
@@ -105,8 +105,8 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
     )
     study = run_study(series, options, simulated=True)
     measures = {
-        **(model_measures(study) if is_whole else {}),
-        **slip_measures(_grounds(study, trials)),
+        **(measure_models(study) if is_whole else {}),
+        **measure_slips(_grounds(study, trials)),
     }
     found = [*hold_against_bands(measures), *_truth(trials)]
     if is_whole:
@@ -186,7 +186,7 @@ def _grounds(
 
 def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
     errors = {
-        name: [e for trial in of if (e := truth_errors(trial)) is not None]
+        name: [e for trial in of if (e := compare_with_truth(trial)) is not None]
         for name, of in trials.items()
     }
     every = [error for of in errors.values() for error in of]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition.sample import Flag
 from analysis.data.events import find_slips
 from analysis.data.load import load_trial
-from analysis.data.prepare import MINIMUM_KEPT, PrepareOptions, prepare
+from analysis.data.prepare import MINIMUM_KEPT, PrepareOptions, prepare_trial
 from analysis.data.quality import JOINT7_WARNING, coverage, quick_ratio
 from experiments.operator.console import GOOD, WARNING
 
@@ -107,7 +107,7 @@ def review_trial(path: Path) -> Review:
         TrialFileError: it cannot be read.
     """
     trial = load_trial(path)
-    prepared = prepare(
+    prepared = prepare_trial(
         trial.series(), PrepareOptions(container_travel=trial.frame.travel)
     )
     q7 = trial.cycles["position"][:, 6]

@@ -15,7 +15,7 @@ from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import AutoOperator, Prompt
 from fakes.pucks.bank import PuckBank
 from fakes.world.rig import FakeRig, LocalSimulation
@@ -101,7 +101,7 @@ class Seen:
     def rejected(self) -> list[str]:
         """Return the reasons of the rejected attempts whose files are sound."""
         paths = sorted((self.folder / "rejected").glob("T???.mcap"))
-        assert all(verify(p).sha256 == sidecar(p)["sha256"] for p in paths)
+        assert all(verify_file(p).sha256 == sidecar(p)["sha256"] for p in paths)
         return [sidecar(path)["reason"] for path in paths]
 
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from acquisition.devices import WrenchSample
-from ft_sensor.tare import TareError, tare
+from ft_sensor.tare import TareError, take_mean
 
 PERIOD_NS = 1_250_000
 
 
 def measure(samples, spread_limit=0.5):
-    return tare(samples, spread_limit)
+    return take_mean(samples, spread_limit)
 
 
 def samples(forces, **changes):

@@ -2,9 +2,10 @@ import struct
 
 import pytest
 
-from acquisition.ipc.frame_tape import FrameTape, encode_can_batch, last_frames
+from acquisition.ipc.frame_tape import FrameTape, last_frames
 from acquisition.ipc.layout import FRAME_DTYPE
 from acquisition.ipc.rings import Ring
+from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode
 
 S = 1_000_000_000

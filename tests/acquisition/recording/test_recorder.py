@@ -11,7 +11,7 @@ from acquisition.ipc.shared_sensor import publish
 from acquisition.recording.recorder import Recorder
 from acquisition.schema import CYCLE
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import recover
+from acquisition.trial_file.recover import recover_file
 from acquisition.trial_file.writer import TrialWriter
 from fakes.clock import SteppedClock
 from tests.acquisition.ros import decode, messages_of
@@ -284,5 +284,5 @@ def test_what_was_measured_before_a_trial_is_abandoned_is_on_the_disk(loop_clien
     loop_client.run(137)
     loop_client.recorder.abandon()
     partial = loop_client.path.with_name(loop_client.path.name + ".partial")
-    saved = recover(partial).path
+    saved = recover_file(partial).path
     assert TrialReader(saved).cycles().data["cycle"].tolist() == list(range(137))

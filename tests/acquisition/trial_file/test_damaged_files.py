@@ -13,7 +13,7 @@ from acquisition.recording.recorder import seal
 from acquisition.schema import CYCLE, schema_text
 from acquisition.trial_file.chunks import FILE_LIMIT, RECORD_LIMIT
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from tests.acquisition.forged import (
     PACKERS,
     chunk_content,
@@ -404,7 +404,7 @@ def test_a_forged_file_raises_nothing_but_trial_file_errors(put, pristine, seed)
         changed = data[:at] + noise + data[at + len(noise) :]
         path.write_bytes(resealed(changed))
         try:
-            verify(path)
+            verify_file(path)
             everything(path)
         except TrialFileError as error:
             refused.append(error.path)

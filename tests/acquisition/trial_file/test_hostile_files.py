@@ -17,7 +17,7 @@ import zstandard
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import recover, recovered_path
+from acquisition.trial_file.recover import recover_file, recovered_path
 from tests.acquisition.forged import (
     CHUNK,
     chunk_content,
@@ -261,7 +261,7 @@ def is_recovered(path, wanted):
     target = recovered_path(path)
     target.unlink(missing_ok=True)
     try:
-        recovery = recover(path)
+        recovery = recover_file(path)
     except TrialFileError:
         return False
     if recovery.path == path:

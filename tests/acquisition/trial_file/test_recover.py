@@ -14,9 +14,9 @@ from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
 from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import recover, recovered_path
+from acquisition.trial_file.recover import recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
 from tests.acquisition.ros import messages_of
 from tests.acquisition.trials import (
@@ -107,9 +107,9 @@ def test_a_file_cut_anywhere_gives_its_whole_chunks_or_is_refused(put, left, cyc
         wanted = BLOCK * sum(end <= cut for end in ends)
         if not wanted:
             with pytest.raises(TrialFileError, match="nothing to save"):
-                recover(path)
+                recover_file(path)
             continue
-        recovery = recover(path)
+        recovery = recover_file(path)
         found = TrialReader(recovery.path).cycles().data
         assert found["position"].tobytes() == cycles["position"][:wanted].tobytes()
         assert recovery.verified.cycles == wanted
@@ -118,7 +118,7 @@ def test_a_file_cut_anywhere_gives_its_whole_chunks_or_is_refused(put, left, cyc
 
 def test_every_topic_is_saved_as_it_was(put, sealed, left):
     theirs = messages_of(put(sealed, "T01.mcap"))
-    saved = messages_of(recover(put(left)).path)
+    saved = messages_of(recover_file(put(left)).path)
     assert saved.keys() == theirs.keys()
     for topic, messages in saved.items():
         assert messages == theirs[topic][: len(messages)]
@@ -126,7 +126,7 @@ def test_every_topic_is_saved_as_it_was(put, sealed, left):
 
 
 def test_what_was_known_before_the_trial_is_saved(put, left):
-    reader = TrialReader(recover(put(left)).path)
+    reader = TrialReader(recover_file(put(left)).path)
     assert reader.attachments == ATTACHMENTS
     assert reader.metadata["trial"]["session"] == "S"
     assert {"clock", "provenance", "channels"} <= reader.metadata.keys()
@@ -135,7 +135,7 @@ def test_what_was_known_before_the_trial_is_saved(put, left):
 def test_a_broken_chunk_ends_what_is_saved(put, sealed, cycles):
     third = chunks(sealed)[2]
     path = put(flipped(sealed, (third.body + third.end) // 2), "T01.mcap")
-    recovery = recover(path)
+    recovery = recover_file(path)
     assert recovery.verified.cycles == 2 * BLOCK
     assert recovery.bytes_dropped == len(sealed) - third.start
     assert "chunk whose checksum" in recovery.reason or "decompress" in recovery.reason
@@ -147,13 +147,13 @@ def test_a_chunk_that_passes_for_another_record_ends_it_too(put, sealed):
     for opcode in (MESSAGE_INDEX, 1, 0x86, 99):
         data = bytearray(sealed)
         data[third] = opcode
-        recovery = recover(put(bytes(data), f"T{opcode}.mcap"))
+        recovery = recover_file(put(bytes(data), f"T{opcode}.mcap"))
         assert recovery.verified.cycles == 2 * BLOCK
 
 
 def test_a_damaged_attachment_costs_itself_alone(put, sealed):
     at = span_of(sealed, ATTACHMENT).end - 10
-    recovery = recover(put(flipped(sealed, at), "T01.mcap"))
+    recovery = recover_file(put(flipped(sealed, at), "T01.mcap"))
     reader = TrialReader(recovery.path)
     assert recovery.verified.cycles == 300
     assert reader.attachments == {"arm_model.toml": ATTACHMENTS["arm_model.toml"]}
@@ -161,7 +161,7 @@ def test_a_damaged_attachment_costs_itself_alone(put, sealed):
 
 
 def test_a_lost_summary_loses_nothing_else(put, sealed):
-    recovery = recover(put(sealed[:-50]))
+    recovery = recover_file(put(sealed[:-50]))
     assert (recovery.verified.cycles, recovery.bytes_dropped) == (300, 0)
     assert TrialReader(recovery.path).metadata["result"]["stop_reason"] == "travel"
 
@@ -174,7 +174,7 @@ def test_a_truth_file_is_recovered_too(tmp_path):
     writer.write_truth(records)
     writer.flush()
     writer.close_partial()
-    recovery = recover(writer.partial)
+    recovery = recover_file(writer.partial)
     assert recovery.path.name == "T07.truth.recovered.mcap"
     assert len(TrialReader(recovery.path).truth().data) == 9
 
@@ -183,8 +183,8 @@ def test_a_truth_file_is_recovered_too(tmp_path):
 
 
 def test_a_recovered_trial_is_readable_and_incomplete(put, left):
-    recovery = recover(put(left))
-    verified = verify(recovery.path)
+    recovery = recover_file(put(left))
+    verified = verify_file(recovery.path)
     assert verified == recovery.verified
     assert verified.is_complete is TrialReader(recovery.path).is_complete is False
     assert verified.cycles == 300
@@ -192,7 +192,7 @@ def test_a_recovered_trial_is_readable_and_incomplete(put, left):
 
 def test_it_says_what_it_was_made_from(put, left):
     cut = left[:-100]
-    recovery = recover(put(cut))
+    recovery = recover_file(put(cut))
     facts = TrialReader(recovery.path).metadata["recovered"]
     assert facts["source"] == "T07.mcap.partial"
     assert facts["source_sha256"] == hashlib.sha256(cut).hexdigest()
@@ -206,7 +206,7 @@ def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
     late = make_cycles(100, skipped=(1050, 1051))
     late["flags"][::10] |= np.uint32(Flag.DEADLINE_MISSED)
     path = put(partial_bytes(tmp_path, late))
-    result = TrialReader(recover(path).path).metadata["result"]
+    result = TrialReader(recover_file(path).path).metadata["result"]
     assert result == {
         "complete": "false",
         "stop_reason": "recovered",
@@ -220,7 +220,7 @@ def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
 def test_what_was_lost_is_told_in_seconds(put, left):
     """The head of the torn chunk still says how far it went."""
     last = chunks(left)[-1]
-    recovery = recover(put(left[: last.end - 5]))
+    recovery = recover_file(put(left[: last.end - 5]))
     # 50 cycles of 2 ms in the lost chunk, none of them missed
     assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
 
@@ -229,7 +229,7 @@ def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):
     last = chunks(left)[-1]
     data = bytearray(left[: last.end - 5])
     struct.pack_into("<Q", data, last.body + 8, 2**63)
-    assert recover(put(bytes(data))).seconds_dropped == 0.0
+    assert recover_file(put(bytes(data))).seconds_dropped == 0.0
 
 
 def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
@@ -238,7 +238,7 @@ def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
     writer = write_trial(tmp_path / "T01.mcap", slow)
     with pytest.raises(TrialFileError, match="median period"):
         seal(writer, "travel")
-    recovery = recover(writer.partial)
+    recovery = recover_file(writer.partial)
     assert (recovery.verified.cycles, recovery.bytes_dropped) == (100, 0)
 
 
@@ -247,7 +247,7 @@ def test_a_bad_cadence_does_not_keep_a_trial_from_being_saved(tmp_path):
 
 def test_the_source_stays_and_the_copy_is_read_only(put, left):
     path = put(left)
-    recovery = recover(path)
+    recovery = recover_file(path)
     assert path.read_bytes() == left
     assert recovery.path == path.parent / "T07.recovered.mcap"
     assert stat.S_IMODE(recovery.path.stat().st_mode) == 0o444
@@ -259,7 +259,7 @@ def test_the_source_stays_and_the_copy_is_read_only(put, left):
 
 def test_a_whole_file_is_said_to_be_whole(put, sealed):
     path = put(sealed)
-    recovery = recover(path)
+    recovery = recover_file(path)
     assert (recovery.path, recovery.is_new) == (path, False)
     assert recovery.verified.is_complete
     assert [p.name for p in path.parent.iterdir()] == [path.name]
@@ -274,9 +274,9 @@ def looks(path):
 
 def test_a_second_recovery_finds_the_first(put, left):
     path = put(left)
-    first = recover(path)
+    first = recover_file(path)
     written = looks(first.path)
-    second = recover(path)
+    second = recover_file(path)
     assert (first.is_new, second.is_new) == (True, False)
     assert (second.path, second.messages) == (first.path, first.messages)
     assert looks(first.path) == written
@@ -284,10 +284,10 @@ def test_a_second_recovery_finds_the_first(put, left):
 
 def test_another_recovered_file_is_never_overwritten(put, left):
     path = put(left)
-    other = recover(path).path.read_bytes()
+    other = recover_file(path).path.read_bytes()
     put(left[:-100])
     with pytest.raises(TrialFileError, match="exists already"):
-        recover(path)
+        recover_file(path)
     assert recovered_path(path).read_bytes() == other
 
 
@@ -299,7 +299,7 @@ def test_a_full_disk_leaves_no_half_file(put, left, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(TrialFileError, match="No space left") as caught:
-        recover(path)
+        recover_file(path)
     assert caught.value.path == recovered_path(path)
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
@@ -310,12 +310,12 @@ def test_a_full_disk_leaves_no_half_file(put, left, monkeypatch):
 def test_a_file_with_nothing_in_it_is_refused(put, data):
     path = put(data)
     with pytest.raises(TrialFileError, match="nothing to save"):
-        recover(path)
+        recover_file(path)
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
 
 def test_a_name_that_is_no_text_is_taken_all_the_same(put, left):
-    recovery = recover(put(left, os.fsdecode(b"T\xff07.mcap.partial")))
+    recovery = recover_file(put(left, os.fsdecode(b"T\xff07.mcap.partial")))
     assert recovery.verified.cycles == 300
 
 

@@ -15,7 +15,7 @@ from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag
 from acquisition.schema import TRUTH
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import (
     FLIGHT_TOPICS,
     TRUTH_TOPICS,
@@ -192,7 +192,7 @@ def test_a_gap_between_two_blocks_is_counted(tmp_path):
 
 
 def test_verify_reports_size_digest_and_cadence(trial):
-    verified = verify(trial)
+    verified = verify_file(trial)
     content = trial.read_bytes()
     assert verified.sha256 == hashlib.sha256(content).hexdigest()
     assert (verified.size, verified.cycles) == (len(content), 600)
@@ -238,7 +238,7 @@ def test_publishing_never_replaces_a_file(tmp_path):
     with pytest.raises(TrialFileError, match="File exists"):
         publish(writer)
     assert path.read_bytes() == b"came in between"
-    assert verify(writer.partial, writer.counts).cycles == 10
+    assert verify_file(writer.partial, writer.counts).cycles == 10
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path):
@@ -327,44 +327,44 @@ def test_verify_refuses_a_wrong_cadence(tmp_path):
     cycles = make_cycles(50)
     cycles["host_ns"] = START_NS + 1_030_000 * 2 * np.arange(50)  # 3 % slow
     with pytest.raises(TrialFileError, match=r"2\.060 ms"):
-        verify(sealed_anyway(tmp_path, cycles).partial)
+        verify_file(sealed_anyway(tmp_path, cycles).partial)
 
 
 def test_verify_accepts_a_cadence_within_two_percent(tmp_path):
     cycles = make_cycles(50)
     cycles["host_ns"] = START_NS + 1_009_000 * 2 * np.arange(50)  # 0.9 % slow
-    assert verify(sealed_anyway(tmp_path, cycles).partial).cycles == 50
+    assert verify_file(sealed_anyway(tmp_path, cycles).partial).cycles == 50
 
 
 def test_verify_refuses_cycles_out_of_order(tmp_path):
     cycles = make_cycles(50)
     cycles["cycle"][[10, 11]] = cycles["cycle"][[11, 10]]
     with pytest.raises(TrialFileError, match="out of order"):
-        verify(sealed_anyway(tmp_path, cycles).partial)
+        verify_file(sealed_anyway(tmp_path, cycles).partial)
 
 
 def test_verify_refuses_a_cycle_that_comes_twice(tmp_path):
     cycles = make_cycles(50)
     cycles["cycle"][11] = cycles["cycle"][10]
     with pytest.raises(TrialFileError, match="out of order"):
-        verify(sealed_anyway(tmp_path, cycles).partial)
+        verify_file(sealed_anyway(tmp_path, cycles).partial)
 
 
 def test_verify_refuses_fewer_than_two_cycles(tmp_path):
     with pytest.raises(TrialFileError, match="fewer than two"):
-        verify(sealed_anyway(tmp_path, make_cycles(1)).partial)
+        verify_file(sealed_anyway(tmp_path, make_cycles(1)).partial)
 
 
 def test_verify_refuses_an_empty_trial(tmp_path):
     with pytest.raises(TrialFileError, match="fewer than two"):
-        verify(sealed_anyway(tmp_path, make_cycles(0)).partial)
+        verify_file(sealed_anyway(tmp_path, make_cycles(0)).partial)
 
 
 def test_verify_refuses_other_messages_than_were_written(tmp_path):
     writer = sealed_anyway(tmp_path, make_cycles(20))
     writer.counts.messages["/events"] = 1
     with pytest.raises(TrialFileError, match="other messages"):
-        verify(writer.partial, writer.counts)
+        verify_file(writer.partial, writer.counts)
 
 
 @pytest.mark.parametrize("name", ["trial", "clock", "provenance", "channels", "result"])
@@ -378,7 +378,7 @@ def test_verify_wants_every_metadata_record(tmp_path, monkeypatch, name):
     monkeypatch.setattr(Writer, "add_metadata", forgetful)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError, match=f"metadata {name}|no trial of Traction"):
-        verify(writer.partial)
+        verify_file(writer.partial)
 
 
 def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
@@ -390,7 +390,7 @@ def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(Writer, "add_attachment", careless)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError, match=r"no sound attachment config\.toml"):
-        verify(writer.partial)
+        verify_file(writer.partial)
 
 
 @pytest.mark.parametrize(
@@ -419,7 +419,7 @@ def test_verify_says_so_when_metadata_make_no_sense(
     monkeypatch.setattr(Writer, "add_metadata", lying)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError):
-        verify(writer.partial)
+        verify_file(writer.partial)
 
 
 def test_a_full_disk_keeps_the_partial_and_says_how_to_recover(tmp_path, monkeypatch):

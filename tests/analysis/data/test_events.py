@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from analysis.data.events import find_slips
-from analysis.data.prepare import PrepareOptions, Smoothed, prepare
+from analysis.data.prepare import PrepareOptions, Smoothed, prepare_trial
 
 DT = 0.002
 
@@ -100,4 +100,4 @@ def test_a_slip_cut_off_by_the_end_of_the_record_is_still_described():
 )
 def test_slips_agree_with_an_independent_analysis(slice_trials, key, slips):
     (series,) = [s for s in slice_trials[key[:2]] if s.name.endswith(key)]
-    assert len(find_slips(prepare(series, PrepareOptions()).smooth)) == slips
+    assert len(find_slips(prepare_trial(series, PrepareOptions()).smooth)) == slips

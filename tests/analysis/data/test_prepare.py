@@ -4,7 +4,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.data.prepare import PrepareOptions, foot_velocity, moving_average, prepare
+from analysis.data.prepare import (
+    PrepareOptions,
+    foot_velocity,
+    moving_average,
+    prepare_trial,
+)
 
 
 @given(
@@ -48,7 +53,7 @@ def test_velocity_is_missing_across_four_missing_samples():
 def test_both_ends_of_the_window_are_kept(make_series):
     v = np.repeat([0.005, 0.0049, 0.2, 0.2001, -0.01], 4)
     options = PrepareOptions(smoothing=1, downsample=1)
-    kept = prepare(make_series(v), options)
+    kept = prepare_trial(make_series(v), options)
     assert kept.indices.tolist() == [0, 1, 2, 3, 8, 9, 10, 11]
     shares = kept.shares
     assert (shares.window, shares.sticking) == (0.4, 0.2)
@@ -58,13 +63,13 @@ def test_both_ends_of_the_window_are_kept(make_series):
 
 def test_thinning_starts_at_the_first_sample_and_comes_after_smoothing(make_series):
     series = make_series(np.full(53, 0.1))
-    kept = prepare(series, PrepareOptions())
+    kept = prepare_trial(series, PrepareOptions())
     assert kept.indices.tolist() == list(range(0, 53, 5))
     assert kept.F_t[4] == pytest.approx(series.F_t[15:26].mean())
 
 
 def test_travel_is_the_integral_of_velocity(make_series):
-    trial = prepare(make_series(np.full(1001, 0.1)), PrepareOptions())
+    trial = prepare_trial(make_series(np.full(1001, 0.1)), PrepareOptions())
     assert trial.travel == pytest.approx(0.2)
 
 
@@ -76,7 +81,7 @@ def test_a_trial_counts_with_250_samples_and_nine_tenths_of_the_container(
     make_series, samples, container, is_countable
 ):
     options = PrepareOptions(container_travel=container)
-    trial = prepare(make_series(np.full(samples, 0.1)), options)
+    trial = prepare_trial(make_series(np.full(samples, 0.1)), options)
     assert trial.is_countable is is_countable
 
 
@@ -113,4 +118,4 @@ def test_options_that_make_no_sense_are_refused(choice):
 def test_kept_samples_agree_with_an_independent_analysis(slice_trials, key, kept):
     (series,) = [s for s in slice_trials[key[:2]] if s.name.endswith(key)]
     # one sample on the edge of the window may fall either way
-    assert abs(prepare(series, PrepareOptions()).kept - kept) <= 1
+    assert abs(prepare_trial(series, PrepareOptions()).kept - kept) <= 1

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
@@ -20,7 +20,7 @@ SMALL_FIT = FitOptions(gp_points=60, models=(TUSTIN, GP_SE))
 @pytest.fixture
 def trials(slice_trials):
     return {
-        terrain: [prepare(series, PrepareOptions()) for series in recorded]
+        terrain: [prepare_trial(series, PrepareOptions()) for series in recorded]
         for terrain, recorded in slice_trials.items()
     }
 

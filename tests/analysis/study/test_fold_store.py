@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.fold_store import ResultStore, decode, encode, task_key
 from analysis.study.jobs import run_tasks
@@ -22,7 +22,7 @@ ANY = st.recursive(
 @pytest.fixture(scope="module")
 def task(slice_trials):
     trials = {
-        name: [prepare(series, PrepareOptions()) for series in slice_trials[name]]
+        name: [prepare_trial(series, PrepareOptions()) for series in slice_trials[name]]
         for name in ("S0", "TF")
     }
     options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_noise"))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.series import TractionSeries
 from analysis.study.metrics import Prediction
@@ -77,7 +77,7 @@ def first_order(rho, sd=2.0, count=4000):
     t = np.arange(count) * 0.01
     flat = np.full(count, 0.05)
     series = TractionSeries("S0", "drawn", t, flat, flat + 3.0, sd * z)
-    return prepare(series, PrepareOptions(smoothing=1, downsample=1))
+    return prepare_trial(series, PrepareOptions(smoothing=1, downsample=1))
 
 
 def around_nothing(trial, sd=2.0):
@@ -301,7 +301,7 @@ def test_no_point_is_too_far_away_for_an_answer(F_n, v_t):
 
 
 def kept(series):
-    return prepare(series, PrepareOptions())
+    return prepare_trial(series, PrepareOptions())
 
 
 def test_a_trial_that_was_never_seen_is_recognised(path):

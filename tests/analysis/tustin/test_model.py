@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from acquisition.errors import SettingsError
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.tustin.bootstrap import bootstrap_tustin
 from analysis.tustin.box_least_squares import solve_in_box
@@ -35,7 +35,7 @@ def samples(vectors):
 
 @pytest.fixture
 def stones(slice_trials):
-    trials = [prepare(series, PrepareOptions()) for series in slice_trials["S0"]]
+    trials = [prepare_trial(series, PrepareOptions()) for series in slice_trials["S0"]]
     return SampleTable.of(trials)
 
 

@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from analysis.data.events import find_slips
-from analysis.data.prepare import PrepareOptions, prepare
+from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.series import TractionSeries
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 from analysis.validation.bands import BANDS, Band, BandResult, hold_against_bands
-from analysis.validation.model_measures import model_measures
-from analysis.validation.slip_measures import GroundTrials, slip_measures
+from analysis.validation.model_measures import measure_models
+from analysis.validation.slip_measures import GroundTrials, measure_slips
 from tests.fakes.point_foot import PointFoot
 
 BAND = Band("X1", "something", 0.2, 0.4)
@@ -54,13 +54,13 @@ def test_several_values_are_told_by_the_smallest_and_the_largest():
 
 
 def ground(trials, *, is_plate):
-    prepared = tuple(prepare(series, PrepareOptions()) for series in trials)
+    prepared = tuple(prepare_trial(series, PrepareOptions()) for series in trials)
     slips = tuple(find_slips(trial.smooth) for trial in prepared)
     return GroundTrials(is_plate, tuple(trials), prepared, slips)
 
 
 def failed(grounds, ids):
-    measures = slip_measures(grounds)
+    measures = measure_slips(grounds)
     found = hold_against_bands(measures)
     return {f.band.id for f in found if f.band.id in ids and not f.is_met}
 
@@ -107,7 +107,7 @@ def toy_measures():
     trials = {name: [drawn(name, k, samples=2000) for k in range(5)] for name in names}
     fit = FitOptions(models=(TUSTIN, GP_SE), gp_points=60, draws=0)
     study = run_study(trials, StudyOptions(fit=fit, n_jobs=1), simulated=True)
-    return study, model_measures(study)
+    return study, measure_models(study)
 
 
 def test_own_errors_are_those_of_the_study(toy_measures):
@@ -162,7 +162,7 @@ def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
         ]
         for name in names
     }
-    renamed = model_measures(run_study(trials, study.options, simulated=True))
+    renamed = measure_models(run_study(trials, study.options, simulated=True))
     assert renamed.keys() == measures.keys()
     assert renamed["B8"] == [1.0]  # stones and plates are never confused
 
@@ -170,4 +170,4 @@ def test_plates_are_known_by_their_stones_and_not_by_their_names(toy_measures):
 def test_a_study_without_plates_has_no_such_measures(toy_measures):
     study, _ = toy_measures
     stones = {n: r for n, r in study.terrains.items() if n in ("S0", "B0")}
-    assert model_measures(replace(study, terrains=stones)) == {}
+    assert measure_models(replace(study, terrains=stones)) == {}

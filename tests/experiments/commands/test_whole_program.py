@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from tests.experiments.program import journal, only_session, sidecar, traction
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(300)]
@@ -51,7 +51,7 @@ def test_ctrl_c_in_a_running_trial_closes_it_and_keeps_the_earlier_one(
     assert out.splitlines()[-2] == "ARM: idle, braked."
     folder = only_session(tmp_path)
     path = folder / "trials" / "T01.mcap"
-    assert verify(path).sha256 == sidecar(path)["sha256"]
+    assert verify_file(path).sha256 == sidecar(path)["sha256"]
     assert journal(folder)[-1]["reason"] == "unfinished"
     assert not list(folder.rglob("*.partial"))
 
@@ -70,7 +70,7 @@ def test_a_session_killed_at_once_leaves_the_earlier_trial_as_it_was(config, tmp
         process.kill()
         process.wait(timeout=60)
     path = only_session(tmp_path) / "trials" / "T01.mcap"
-    assert verify(path).sha256 == sidecar(path)["sha256"]
+    assert verify_file(path).sha256 == sidecar(path)["sha256"]
 
 
 def test_the_report_of_a_session_is_marked_as_simulated_and_compares_with_the_truth(

@@ -6,7 +6,7 @@ import pytest
 from acquisition.devices import SafetyMode
 from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import (
     digest,
@@ -79,7 +79,7 @@ def test_a_stale_sensor_is_told_with_age_limit_and_what_the_arm_does(stale):
 def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
     path = stale.folder / "rejected" / "T01a.mcap"
     facts = sidecar(path)
-    assert verify(path).sha256 == facts["sha256"] == digest(path)
+    assert verify_file(path).sha256 == facts["sha256"] == digest(path)
     assert (facts["verdict"], facts["status"]) == ("reject", "interrupted")
     assert facts["reason"] == "interrupted: ft-stale"
     assert path.with_suffix(".truth.mcap").exists()
@@ -137,7 +137,7 @@ def test_after_silence_the_arm_is_braked_as_its_own_devices_see_it(silence):
 def test_after_silence_the_earlier_trial_is_what_it_was(silence):
     path = silence.folder / "trials" / "T01.mcap"
     assert {p.name.split(".")[0] for p in path.parent.iterdir()} == {"T01"}
-    assert verify(path).sha256 == sidecar(path)["sha256"]  # as written when kept
+    assert verify_file(path).sha256 == sidecar(path)["sha256"]  # as written when kept
     assert sidecar(path)["verdict"] == "keep"
     assert (silence.folder / "rejected" / "T02a.mcap").exists()
 

@@ -99,5 +99,5 @@ def test_what_no_number_depends_on_has_no_default_either():
 
 
 def test_optional_settings_are_compared_as_they_are_written():
-    assert DEFAULTS["rig.ft_sensor.ranges"] == "None"
+    assert DEFAULTS["rig.ft_sensor.calibration"] == "None"
     assert differences({}, {"rig.ft_sensor.sinc": "64"}) == []

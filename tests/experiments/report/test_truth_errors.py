@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
-from analysis.data.prepare import PrepareOptions, moving_average, prepare
+from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
 
 WIDTH = 11  # samples, the smoothing of the analysis
 
@@ -61,7 +61,7 @@ def test_recovered_friction_is_near_the_true_one(pair):
     _, F_t, F_n = (measured - true)[~is_pushed].mean(axis=0)
     series = trial.series()
     tared = replace(series, F_t=series.F_t - F_t, F_n=series.F_n - F_n)
-    kept = prepare(tared, PrepareOptions())
+    kept = prepare_trial(tared, PrepareOptions())
     loaded = (kept.F_n > 1.0) & (kept.v_t > 0.03)  # beyond Stribeck: F_t = mu F_n + b v
     assert loaded.sum() > 50
     ratio = (kept.F_t[loaded] - b * kept.v_t[loaded]) / kept.F_n[loaded]

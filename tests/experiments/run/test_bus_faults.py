@@ -6,7 +6,7 @@ import pytest
 from acquisition.devices import SafetyMode
 from acquisition.sample import MOTOR_FRESH_SHIFT, SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import Prompt
 from tests.acquisition.ros import decode, messages_of
 from tests.experiments.program import (
@@ -106,7 +106,7 @@ def test_the_trial_is_kept_as_interrupted(ended):
     path = seen.folder / "rejected" / "T01a.mcap"
     facts = sidecar(path)
     assert (facts["status"], facts["verdict"]) == ("interrupted", "reject")
-    assert facts["sha256"] == verify(path).sha256 == digest(path)
+    assert facts["sha256"] == verify_file(path).sha256 == digest(path)
     assert list((seen.folder / "trials").iterdir()) == []
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import Prompt
 from experiments.session.reducer import replay
 from tests.experiments.program import (
@@ -103,7 +103,7 @@ def test_a_kill_leaves_earlier_trials_as_they_were(resumed):
 
 def test_what_was_recorded_before_the_kill_is_in_rejected(resumed):
     path = resumed.folder / "rejected" / "T02a.mcap"
-    verified = verify(path)
+    verified = verify_file(path)
     assert not verified.is_complete
     # a second before the trigger, then until the kill less half a second at most
     assert verified.duration > 1.0 + 1.0 - 0.5

@@ -14,7 +14,7 @@ import analysis.data.load
 import fakes.world.rig
 import ft_sensor.payload
 from analysis.data.load import load_trial
-from experiments.report.truth_errors import truth_errors
+from experiments.report.truth_errors import compare_with_truth
 from ft_sensor.payload import Payload
 from tests.experiments.program import only_session, run_short, write_config
 from wam.driver.transmission import Transmission
@@ -118,7 +118,7 @@ def agrees(folder, flip=None):
         if done.code:
             return False
         path = only_session(folder / "data") / "trials" / "T01.mcap"
-        found = truth_errors(load_trial(path))
+        found = compare_with_truth(load_trial(path))
     assert found is not None
     return found.v_t < LARGEST_V and max(found.F_t, found.F_n) < LARGEST_F
 

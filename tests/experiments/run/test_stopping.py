@@ -5,7 +5,7 @@ import pytest
 from acquisition.devices import SafetyMode
 from acquisition.sample import SAFETY_MODE_MASK
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from experiments.operator.prompts import Prompt
 from experiments.run.stop import StopFlag
 from tests.experiments.program import journal, run_watched, sidecar
@@ -77,7 +77,7 @@ def test_ctrl_c_ends_the_session_unfinished_with_exit_code_5(once):
 
 def test_ctrl_c_closes_the_running_trial_as_interrupted(once):
     path = once.folder / "rejected" / "T02a.mcap"
-    assert verify(path).sha256 == sidecar(path)["sha256"]
+    assert verify_file(path).sha256 == sidecar(path)["sha256"]
     assert sidecar(path)["status"] == "interrupted"
     assert sidecar(path)["reason"] == "interrupted: interrupted"
     assert not list(once.folder.rglob("*.partial"))
@@ -85,7 +85,7 @@ def test_ctrl_c_closes_the_running_trial_as_interrupted(once):
 
 def test_ctrl_c_leaves_earlier_trials_as_they_were(once):
     path = once.folder / "trials" / "T01.mcap"
-    assert verify(path).sha256 == sidecar(path)["sha256"]
+    assert verify_file(path).sha256 == sidecar(path)["sha256"]
 
 
 def test_ctrl_c_holds_the_arm_until_the_trial_is_closed_and_then_brakes_it(once):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import Journal, open_journal
 from experiments.session.states import Event, SessionPhase
@@ -171,7 +171,7 @@ def test_a_running_trial_is_recovered_rejected_and_its_source_kept(crashed):
         == "T01 will be redone, its data are in rejected/T01a.*"
     )
     rejected = crashed.folder.rejected
-    assert verify(rejected / "T01a.mcap").cycles == 201
+    assert verify_file(rejected / "T01a.mcap").cycles == 201
     assert sha256_of(rejected / "T01a.partial") == source
     assert read_json(rejected / "T01a.json")["cycles"] == 201
     assert list(crashed.folder.trials.iterdir()) == []
@@ -209,7 +209,7 @@ def kill_in_settling(data, monkeypatch, step):
     book = open_journal(crashed.folder, Now())
     assert (book.state.running, book.state.rejected) == (None, 1)
     rejected = crashed.folder.rejected
-    assert verify(rejected / "T01a.mcap").cycles == 201
+    assert verify_file(rejected / "T01a.mcap").cycles == 201
     assert (rejected / "T01a.partial").exists()
     left = [p.name for p in crashed.folder.trials.iterdir() if p.name[0] != "."]
     assert left == []

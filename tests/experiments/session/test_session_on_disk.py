@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.sample import SAFETY_MODE_MASK, Flag
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.verify import verify
+from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import TRIAL_TOPICS
 from experiments.session.reducer import replay
 from tests.acquisition.ros import decode, messages_of
@@ -94,7 +94,7 @@ def test_trial_files_are_read_only(recorded):
 
 def test_trial_files_stand_a_second_verification(recorded):
     for path in (recorded.folder / "trials").glob("*.mcap"):
-        assert verify(path).sha256 == digest(path)
+        assert verify_file(path).sha256 == digest(path)
 
 
 def test_the_loop_ran_at_500_hz_without_a_gap(cycles):

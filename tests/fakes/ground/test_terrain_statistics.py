@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from analysis.data.events import Slip, find_slips
-from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare
+from analysis.data.prepare import PreparedTrial, PrepareOptions, prepare_trial
 from analysis.study.crossval import FoldResult, plan_folds, run_fold
 from analysis.study.jobs import run_tasks
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
@@ -72,7 +72,7 @@ class Run:
 def push_across(terrain, seed, trials=TRIALS):
     """Simulate trials and find their slips."""
     prepared = tuple(
-        prepare(PointFoot(terrain, seed, trial).run(), PrepareOptions())
+        prepare_trial(PointFoot(terrain, seed, trial).run(), PrepareOptions())
         for trial in trials
     )
     return Run(prepared, tuple(find_slips(trial.smooth) for trial in prepared))

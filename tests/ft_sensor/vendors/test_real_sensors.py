@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.devices import WrenchSample
 from ft_sensor.payload import Payload
-from ft_sensor.tare import TareError, tare
+from ft_sensor.tare import TareError, take_mean
 
 REAL = Path(__file__).parents[4] / "shared" / "data" / "real"
 PRESS, CONTOUR = REAL / "granular_press_ft", REAL / "kuleuven_contour"
@@ -37,7 +37,7 @@ def samples(name, start=0.0, stop=np.inf):
 
 
 def test_the_tare_of_a_real_sensor_takes_forty_two_newtons_away():
-    result = tare(samples("zero"), LIMIT, rate=RATE)
+    result = take_mean(samples("zero"), LIMIT, rate=RATE)
     assert result.wrench[:3] == pytest.approx((6.9, 42.1, 3.5), abs=0.15)
     noise = result.deviation[:3]
     assert all(0.045 < sd < 0.085 for sd in noise)
@@ -45,7 +45,7 @@ def test_the_tare_of_a_real_sensor_takes_forty_two_newtons_away():
 
 @pytest.mark.parametrize(("name", "peak"), [("smooth_1", 331), ("smooth_2", 305)])
 def test_a_real_press_peaks_where_it_was_published(name, peak):
-    bias = np.array(tare(samples("zero"), LIMIT, rate=RATE).wrench)
+    bias = np.array(take_mean(samples("zero"), LIMIT, rate=RATE).wrench)
     payload = Payload(0.0, np.zeros(3), np.eye(3), -1.0, bias)
     raw = np.array([sample.wrench for sample in samples(f"{name}_press")])
     force = payload.contact(raw, np.broadcast_to(np.eye(3), (len(raw), 3, 3)))
@@ -59,7 +59,7 @@ def test_a_real_press_peaks_where_it_was_published(name, peak):
 
 def test_a_press_cannot_be_taken_for_a_tare():
     with pytest.raises(TareError, match="varied"):
-        tare(samples("smooth_1_press"), LIMIT, rate=RATE)
+        take_mean(samples("smooth_1_press"), LIMIT, rate=RATE)
 
 
 def upright(*turns):
