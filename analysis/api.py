@@ -16,15 +16,18 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.data.load import RecordedTrial, load_trial
-from analysis.data.prepare import PreparedTrial, PrepareOptions
-from analysis.data.prepare import prepare_trial
-from analysis.data.samples import SampleTable, TrainingSet
-from analysis.data.series import TractionSeries
-from analysis.data.tables import load_tables
-from analysis.study.crossval import FoldResult, plan_folds, run_fold
-from analysis.study.jobs import run_tasks
-from analysis.study.models import (
+from analysis.data import (
+    PreparedTrial,
+    PrepareOptions,
+    RecordedTrial,
+    SampleTable,
+    TractionSeries,
+    TrainingSet,
+    load_tables,
+    load_trial,
+    prepare_trial,
+)
+from analysis.study import (
     FITTERS,
     GP_NN,
     GP_NN_TUSTIN,
@@ -34,8 +37,12 @@ from analysis.study.models import (
     TUSTIN,
     FitOptions,
     FittedModel,
+    FoldResult,
     ModelFitter,
     TustinModel,
+    plan_folds,
+    run_fold,
+    run_tasks,
 )
 
 __all__ = [

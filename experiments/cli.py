@@ -6,7 +6,7 @@ import importlib
 import sys
 from collections.abc import Mapping, Sequence
 
-from acquisition.errors import TractionError
+from acquisition import TractionError
 from experiments.arguments import add_global_options
 
 COMMANDS = {

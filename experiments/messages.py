@@ -6,14 +6,8 @@ from dataclasses import asdict, dataclass
 from importlib import resources
 from string import Formatter
 
-from acquisition.control_loop.faults import (
-    CircuitCauses,
-    Fault,
-    GuardVerdict,
-    ReplySilence,
-)
-from acquisition.devices import SafetyMode
-from acquisition.errors import PreflightError
+from acquisition import PreflightError, SafetyMode
+from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
 
 
 @dataclass(frozen=True, slots=True)

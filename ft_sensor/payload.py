@@ -16,11 +16,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.devices import ArmReading, WrenchSample
-from acquisition.sample import Sample
-from wam.model.arm_model import ArmModel
-from wam.model.constants import GRAVITY, Array
-from wam.model.tool import Tool
+from acquisition import ArmReading, Sample, WrenchSample
+from wam.model import GRAVITY, ArmModel, Array, Tool
 
 Floats = NDArray[np.float64]
 

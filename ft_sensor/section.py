@@ -4,9 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from acquisition.settings import File, Mass, Number, SettingsSection, Whole
-from ft_sensor.serial_line.link import PortSettings
-from ft_sensor.serial_line.sensor import SerialDevice
+from acquisition import File, Mass, Number, SettingsSection, Whole
+from ft_sensor.serial_line import PortSettings, SerialDevice
 
 
 class SensorSection(SettingsSection):

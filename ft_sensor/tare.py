@@ -7,9 +7,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.clock import NS_PER_S, RATE_HZ
-from acquisition.devices import WrenchSample
-from acquisition.errors import TractionError
+from acquisition import NS_PER_S, RATE_HZ, TractionError, WrenchSample
 
 Wrench = tuple[float, float, float, float, float, float]
 

@@ -22,12 +22,14 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 TESTS = {
-    "acquisition/guard.py": ("tests/acquisition/control_loop/test_guard.py",),
-    "experiments/session.py": ("tests/experiments/session/test_reducer.py",),
-    "wam/frames.py": ("tests/wam/bus/test_frames.py",),
-    "wam/transmission.py": ("tests/wam/driver/test_transmission.py",),
+    "acquisition/control_loop/guard.py": (
+        "tests/acquisition/control_loop/test_guard.py",
+    ),
+    "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
+    "wam/bus/frames.py": ("tests/wam/bus/test_frames.py",),
+    "wam/driver/transmission.py": ("tests/wam/driver/test_transmission.py",),
     "ft_sensor/payload.py": ("tests/ft_sensor/test_payload.py",),
-    "analysis/prepare.py": ("tests/analysis/data/test_prepare.py",),
+    "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
 }
 TIMEOUT = 120.0  # s; a mutation that hangs is noticed
 _COPIED = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")

@@ -9,15 +9,16 @@ import numpy as np
 
 from acquisition.clock import RATE_HZ, Clock
 from acquisition.errors import TrialFileError
-from acquisition.ipc.layout import ProcessRole, SharedLayout
+from acquisition.ipc import ProcessRole, SharedLayout
 from acquisition.sample import Record
-from acquisition.trial_file.verify import VerifiedFile, verify_file
-from acquisition.trial_file.writer import (
+from acquisition.trial_file import (
     FLIGHT_TOPICS,
     TRIAL_TOPICS,
     TrialHeader,
     TrialWriter,
+    VerifiedFile,
     publish,
+    verify_file,
 )
 
 FLUSH_NS = 250_000_000

@@ -11,16 +11,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import SettingsError, TrialFileError
-from acquisition.sample import Record
-from acquisition.trial_file.reader import TrialReader
+from acquisition import Record, SettingsError, TrialFileError
+from acquisition.trial_file import TrialReader
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
-from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
-from ft_sensor.payload import Payload, TerrainFrame, traction
-from wam.model.arm_model import ArmModel
-from wam.model.constants import ArmConstants, Body, load_constants
-from wam.model.tool import Tool
+from ft_sensor import Payload, TerrainFrame, traction
+from ft_sensor.calibration import payload_from_toml, terrain_from_toml
+from wam.model import ArmConstants, ArmModel, Body, Tool, load_constants
 
 Array = NDArray[np.float64]
 Frame = Literal["terrain", "sole"]

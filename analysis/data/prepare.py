@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from analysis.data.series import Array, Indices, TractionSeries
 
 MINIMUM_KEPT = 250  # kept samples that make a trial count

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

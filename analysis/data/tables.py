@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from analysis.data.series import Array, TractionSeries
 from analysis.data.terrain_kinds import STONE_SIZES
 

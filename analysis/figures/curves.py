@@ -26,8 +26,8 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings.findings import StudyResults
-from analysis.study.models import GP_SE, TUSTIN
+from analysis.findings import StudyResults
+from analysis.study import GP_SE, TUSTIN
 
 
 def draw_excerpts(results: StudyResults) -> Figure | None:

@@ -4,8 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from analysis.data.quality import JOINT7_WARNING
-from analysis.data.series import Array
+from analysis.data import JOINT7_WARNING, Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -15,8 +14,7 @@ from analysis.figures.style import (
     new_figure,
     terrain_colours,
 )
-from analysis.findings.findings import StudyResults
-from analysis.findings.rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial
+from analysis.findings import PERIOD_EDGES, SKEW_EDGES, RigTrial, StudyResults
 
 
 def draw_timing(results: StudyResults) -> Figure | None:

@@ -20,7 +20,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from analysis.data.terrain_kinds import BIG, FLAT, SMALL
+from analysis.data import BIG, FLAT, SMALL
 
 __all__ = [
     "ONE_COLUMN",

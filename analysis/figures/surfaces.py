@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.data.series import Array
+from analysis.data import Array
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
@@ -20,8 +20,7 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings.findings import StudyResults
-from analysis.findings.surfaces import Surface, common_range
+from analysis.findings import StudyResults, Surface, common_range
 
 _MOST_DIGITS = 15
 _LEVELS = 14  # contours

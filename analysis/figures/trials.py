@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from analysis.data.prepare import Smoothed
-from analysis.data.series import Array
+from analysis.data import Array, Smoothed
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -17,9 +16,8 @@ from analysis.figures.style import (
     plain,
     terrain_colours,
 )
-from analysis.findings.findings import StudyResults
-from analysis.findings.trends import MEAN_FORCE, Trend
-from analysis.study.study import TerrainResult
+from analysis.findings import MEAN_FORCE, StudyResults, Trend
+from analysis.study import TerrainResult
 
 _MOST_TRIALS = 20  # side by side
 _MOST_POINTS = 400  # of a curve

@@ -14,9 +14,8 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings.findings import RESIDUAL_MODELS, StudyResults
-from analysis.study.models import GP_SE, TITLES
-from analysis.study.study import TerrainResult, mean_of
+from analysis.findings import RESIDUAL_MODELS, StudyResults
+from analysis.study import GP_SE, TITLES, TerrainResult, mean_of
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 _FIRST, _SECOND = "#0072B2", "#D55E00"

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data.terrain_kinds import LEVELS
+from analysis.data import LEVELS
 from analysis.findings.findings import StudyResults
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.trends import TREND_UNITS, NoiseSummary, ResidualBand, Trend
-from analysis.study.fits import CsvRow
-from analysis.terrains.identify import Confusion, Identification
+from analysis.study import CsvRow
+from analysis.terrains import Confusion, Identification
 
 _DIGITS = 5  # of the surfaces in fits.json
 

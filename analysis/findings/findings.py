@@ -21,9 +21,8 @@ from analysis.findings.trends import (
     residual_band,
     trends_of,
 )
-from analysis.study.models import GP_SE, TUSTIN
-from analysis.study.study import Study
-from analysis.terrains.identify import Identification, identify_study
+from analysis.study import GP_SE, TUSTIN, Study
+from analysis.terrains import Identification, identify_study
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 

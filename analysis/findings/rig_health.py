@@ -8,12 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.sample import Flag
-from analysis.data.load import RecordedTrial
-from analysis.data.prepare import moving_average
-from analysis.data.series import Array
-from ft_sensor.reading import largest_traction
-from wam.model.constants import GRAVITY
+from acquisition import Flag
+from analysis.data import Array, RecordedTrial, moving_average
+from ft_sensor import largest_traction
+from wam.model import GRAVITY
 
 HEALTH_UNITS = {
     "period": "ms",

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.samples import SampleTable
-from analysis.data.series import Array
-from analysis.study.study import Study, TerrainResult
+from analysis.data import Array, SampleTable
+from analysis.study import Study, TerrainResult
 
 _POINTS = 41  # along each axis of a surface
 _CELLS = 20  # along each axis of a coverage map

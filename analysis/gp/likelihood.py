@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from acquisition.errors import SettingsError
-from analysis.data.series import Array
+from acquisition import SettingsError
+from analysis.data import Array
 from analysis.gp.kernels import Contraction, Kernel
 from analysis.gp.noise import Noise
 

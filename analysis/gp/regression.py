@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from acquisition.errors import SettingsError
-from analysis.data.series import Array
+from acquisition import SettingsError
+from analysis.data import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Likelihood, factorise, split
 from analysis.gp.noise import ConstantNoise, Noise

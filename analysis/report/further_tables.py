@@ -2,15 +2,19 @@
 
 from collections.abc import Sequence
 
-from analysis.data.terrain_kinds import LEVELS
-from analysis.figures.sections import ReportSection
-from analysis.findings.findings import StudyResults
-from analysis.findings.trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
+from analysis.data import LEVELS
+from analysis.figures import ReportSection
+from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
 from analysis.report.page_model import ReportTable
-from analysis.study.metrics import PairedComparison, compare
-from analysis.study.models import TITLES
-from analysis.study.study import Study, TerrainResult, mean_of
-from analysis.terrains.identify import KEPT_PER_SECOND
+from analysis.study import (
+    TITLES,
+    PairedComparison,
+    Study,
+    TerrainResult,
+    compare,
+    mean_of,
+)
+from analysis.terrains import KEPT_PER_SECOND
 
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (

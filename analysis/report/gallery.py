@@ -3,19 +3,20 @@
 from dataclasses import dataclass
 
 from analysis.figures import (
+    FigureSpec,
     confusion,
     curves,
     errors,
+    render,
     rig,
+    styled,
     surfaces,
     trials,
     uncertainty,
 )
-from analysis.figures.spec import FigureSpec
-from analysis.figures.style import render, styled
-from analysis.findings.findings import StudyResults
+from analysis.findings import StudyResults
 from analysis.report.page_model import ReportFigure
-from analysis.study.jobs import run_tasks
+from analysis.study import run_tasks
 
 _FAMILIES = (curves, surfaces, errors, uncertainty, confusion, trials, rig)
 _PAGE_ORDER = (

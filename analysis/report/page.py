@@ -12,10 +12,14 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from analysis.figures.sections import ReportSection
-from analysis.findings.as_numbers import findings_rows, plain_findings
-from analysis.findings.findings import StudyResults, compute_results
-from analysis.findings.rig_health import RigTrial
+from analysis.figures import ReportSection
+from analysis.findings import (
+    RigTrial,
+    StudyResults,
+    compute_results,
+    findings_rows,
+    plain_findings,
+)
 from analysis.report.further_tables import beyond_tables
 from analysis.report.gallery import report_figures
 from analysis.report.page_model import ReportFigure, ReportTable
@@ -28,10 +32,14 @@ from analysis.report.paper_tables import (
     verdicts,
 )
 from analysis.report.rig_tables import rig_tables
-from analysis.study.atomic_files import write_atomic
-from analysis.study.fits import to_csv, to_fits, to_plain
-from analysis.study.jobs import available_cores
-from analysis.study.study import Study
+from analysis.study import (
+    Study,
+    available_cores,
+    to_csv,
+    to_fits,
+    to_plain,
+    write_atomic,
+)
 
 __all__ = ["ReportContext", "ReportTable", "write_report"]
 

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.figures.sections import ReportSection
-from analysis.figures.style import Picture
+from analysis.figures import Picture, ReportSection
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,19 @@
 
 from collections.abc import Sequence
 
-from analysis.figures.sections import ReportSection
+from analysis.figures import ReportSection
 from analysis.report.page_model import ReportTable
-from analysis.study.fits import flag_counts, tustin_medians
-from analysis.study.models import FITTERS, TITLES, TUSTIN
-from analysis.study.study import LIFTED_WARNING, Study, TerrainResult
-from analysis.tustin.model import (
+from analysis.study import (
+    FITTERS,
+    LIFTED_WARNING,
+    TITLES,
+    TUSTIN,
+    Study,
+    TerrainResult,
+    flag_counts,
+    tustin_medians,
+)
+from analysis.tustin import (
     MINIMUM_ROWS,
     NEGATIVE_B,
     NO_STRIBECK,

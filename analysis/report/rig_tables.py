@@ -4,12 +4,21 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.figures.sections import ReportSection
-from analysis.findings.findings import StudyResults
-from analysis.findings.rig_health import RigTrial
+from analysis.figures import ReportSection
+from analysis.findings import RigTrial, StudyResults
 from analysis.report.page_model import ReportTable
 
 _SATURATED = 1e-9  # share of cycles
+
+_REACH_NOTE = (
+    "Measurable: by the sensor's ranges and the lever of the foot; – where it "
+    "did not say them: without a sample out of range it is at least what was seen. "
+    "Floor: standard deviation of smoothed "
+    "F_t with the foot at rest; no model can be better than that and the drift. "
+    "Drag: what the joints' Coulomb friction takes from the hand's push if they "
+    "rub as the arm model says. It is not in F_t, which is measured below them, "
+    "but tilts the push, so that it biases F_n. Medians over trials."
+)
 
 
 def rig_tables(results: StudyResults) -> list[ReportTable]:
@@ -98,13 +107,7 @@ def reach(results: StudyResults) -> ReportTable:
             "drag of the joints [N]",
         ),
         rows,
-        note="Measurable: by the sensor's ranges and the lever of the foot; – where it "
-        "did not say them: without a sample out of range it is at least what was seen. "
-        "Floor: standard deviation of smoothed "
-        "F_t with the foot at rest; no model can be better than that and the drift. "
-        "Drag: what the joints' Coulomb friction takes from the hand's push if they "
-        "rub as the arm model says. It is not in F_t, which is measured below them, "
-        "but tilts the push, so that it biases F_n. Medians over trials.",
+        note=_REACH_NOTE,
         section=ReportSection.REACH,
     )
 

@@ -5,22 +5,25 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquisition.errors import SettingsError
-from analysis.data.load import Frame
-from analysis.figures.sections import ReportSection
+from acquisition import SettingsError
+from analysis.data import Frame
+from analysis.figures import ReportSection
 from analysis.report.further_tables import paired_cell
 from analysis.report.page_model import ReportTable
-from analysis.study.metrics import PairedComparison, compare
-from analysis.study.models import (
+from analysis.study import (
     FITTERS,
     GP_NN,
     GP_NN_TUSTIN,
     GP_SE_TUSTIN,
     TITLES,
     TUSTIN,
+    PairedComparison,
+    Study,
+    StudyOptions,
+    compare,
+    mean_of,
 )
-from analysis.study.study import Study, StudyOptions, mean_of
-from analysis.tustin.model import TustinForm
+from analysis.tustin import TustinForm
 
 VALUES = {
     "smoothing": "an odd number of samples, e.g. smoothing=15",

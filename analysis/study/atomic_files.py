@@ -4,7 +4,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 
 
 def write_atomic(path: Path, content: bytes) -> None:

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.errors import TractionError
-from analysis.data.prepare import PreparedTrial
-from analysis.data.samples import SampleTable, TrainingSet
-from analysis.data.series import Indices
+from acquisition import TractionError
+from analysis.data import Indices, PreparedTrial, SampleTable, TrainingSet
 from analysis.study.metrics import Score, mean_absolute_error, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 

@@ -20,19 +20,16 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data.samples import SampleTable
-from analysis.gp import kernels, noise
-from analysis.gp.arcsine import Arcsine
-from analysis.gp.regression import GaussianProcess
-from analysis.gp.search import Start
+from analysis.data import SampleTable
+from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise
 from analysis.study.atomic_files import write_atomic
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
+from analysis.tustin import Interval, Profiles
 from analysis.tustin import model as tustin
-from analysis.tustin.identifiability import Interval, Profiles
 
 Types = Mapping[str, type]
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 
 from joblib import Parallel, delayed, parallel_config
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

@@ -9,10 +9,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.data.samples import SampleTable, TrainingSet
-from analysis.data.series import Array
-from analysis.gp.noise import ConstantNoise, LogLinearNoise
-from analysis.gp.regression import GaussianProcess, fit_gp
+from analysis.data import Array, SampleTable, TrainingSet
+from analysis.gp import ConstantNoise, GaussianProcess, LogLinearNoise, fit_gp
 from analysis.study.metrics import Prediction, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]

@@ -5,17 +5,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from acquisition.errors import SettingsError
-from analysis.data.events import Slip, find_slips
-from analysis.data.prepare import (
+from acquisition import SettingsError
+from analysis.data import (
     MINIMUM_KEPT,
     PreparedTrial,
     PrepareOptions,
+    SampleTable,
+    Slip,
+    TractionSeries,
+    find_slips,
+    kind_title,
     prepare_trial,
+    terrain_kind,
 )
-from analysis.data.samples import SampleTable
-from analysis.data.series import TractionSeries
-from analysis.data.terrain_kinds import kind_title, terrain_kind
 from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
@@ -171,9 +173,7 @@ def run_study(
     if not any(trials.values()):
         raise SettingsError("There is no trial to analyse.", hint="Record some first.")
     prepared = {
-        terrain: tuple(
-            prepare_trial(series, options.prepare) for series in recorded
-        )
+        terrain: tuple(prepare_trial(series, options.prepare) for series in recorded)
         for terrain, recorded in trials.items()
     }
     tasks, notes = plan_folds(prepared, options.fit)
@@ -196,15 +196,10 @@ def run_study(
         )
         for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
     }
-    warnings = tuple(
-        warning
-        for result in results.values()
-        for warning in _warnings(
-            result, options.prepare.container_travel is not None
-        )
-    )
-    contradictions = tuple(_contradictions(trials))
-    return Study(simulated, options, results, tuple(notes), contradictions + warnings)
+    is_bounded = options.prepare.container_travel is not None
+    warnings = [w for result in results.values() for w in _warnings(result, is_bounded)]
+    warnings = (*_contradictions(trials), *warnings)
+    return Study(simulated, options, results, tuple(notes), warnings)
 
 
 def _in_turn(

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.errors import TractionError
-from analysis.data.samples import SampleTable
+from acquisition import TractionError
+from analysis.data import SampleTable
 from analysis.study.models import FitOptions
-from analysis.tustin.bootstrap import bootstrap_tustin
-from analysis.tustin.identifiability import Interval
-from analysis.tustin.model import TustinFit, fit_tustin
+from analysis.tustin import Interval, TustinFit, bootstrap_tustin, fit_tustin
 
 _STREAM = 1_000_000  # apart from the folds, which have the same kind of seed
 

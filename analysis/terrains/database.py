@@ -21,9 +21,9 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import SettingsError
-from analysis.data.series import Array
-from analysis.study.metrics import Prediction
+from acquisition import SettingsError
+from analysis.data import Array
+from analysis.study import Prediction
 from analysis.terrains.table import Table
 
 FORMAT, VERSION = "traction-terrain-db", 1

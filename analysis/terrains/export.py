@@ -8,13 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import SettingsError, TractionError
-from analysis.data.prepare import PreparedTrial, PrepareOptions
-from analysis.data.samples import SampleTable, TrainingSet
-from analysis.data.series import Array
-from analysis.study.jobs import Store, Workers, run_tasks
-from analysis.study.models import GP_SE, TITLES, FitOptions, ModelFitter
-from analysis.study.study import Study
+from acquisition import SettingsError, TractionError
+from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
+from analysis.study import (
+    GP_SE,
+    TITLES,
+    FitOptions,
+    ModelFitter,
+    Store,
+    Study,
+    Workers,
+    run_tasks,
+)
 from analysis.terrains.database import FORMAT, VERSION
 from analysis.terrains.identify import Identification
 

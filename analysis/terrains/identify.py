@@ -9,11 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.prepare import PreparedTrial
-from analysis.data.terrain_kinds import groups_of
-from analysis.study.jobs import run_tasks
-from analysis.study.models import GP_SE
-from analysis.study.study import Study, TerrainResult
+from analysis.data import PreparedTrial, groups_of
+from analysis.study import GP_SE, Study, TerrainResult, run_tasks
 from analysis.terrains.scores import (
     Expert,
     Predictor,

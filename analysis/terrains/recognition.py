@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from analysis.data.prepare import PreparedTrial
+from analysis.data import PreparedTrial
 from analysis.terrains.database import KnownTerrain, TerrainDatabase
 from analysis.terrains.scores import Expert, TerrainScores, score_trial
 

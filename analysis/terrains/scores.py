@@ -16,9 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.prepare import PreparedTrial
-from analysis.data.series import Array
-from analysis.study.metrics import Prediction
+from analysis.data import Array, PreparedTrial
+from analysis.study import Prediction
 
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data.series import Array
-from analysis.study.metrics import Prediction
+from analysis.data import Array
+from analysis.study import Prediction
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from analysis.data.series import Array
+from analysis.data import Array
 
 RIDGE = 1e-12  # relative; keeps collinear columns solvable
 _FREE = 0

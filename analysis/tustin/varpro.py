@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data.series import Array
+from analysis.data import Array
 from analysis.tustin.box_least_squares import solve_in_box
 
 _GRID = (16, 14)  # points over log v_s and log delta_s

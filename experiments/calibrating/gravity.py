@@ -6,12 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from experiments.calibrating.pose_walk import PoseWalk
-from experiments.run.console_loop import ConsoleLoop
-from experiments.session.store import iso_utc
-from wam.calibration.gravity_file import GravityCalibration
-from wam.calibration.poses import MeasurementPose, choose_poses, plan_halts
-from wam.model.constants import Array
-from wam.model.moments import MomentFit, check_fit, fit_moments
+from experiments.run import ConsoleLoop
+from experiments.session import iso_utc
+from wam.calibration import (
+    GravityCalibration,
+    MeasurementPose,
+    choose_poses,
+    plan_halts,
+)
+from wam.model import Array, MomentFit, check_fit, fit_moments
 
 AVERAGE = 0.5  # s of torques that are averaged
 

@@ -4,15 +4,19 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition.errors import PreflightError, TractionError
+from acquisition import PreflightError, TractionError
 from experiments.messages import FaultContext, fault_text, rest_text
-from experiments.operator.prompts import Prompt
-from experiments.run.activation import activate
-from experiments.run.console_loop import TICK, ConsoleLoop
-from experiments.run.stop import ArmFaultError, StopRequestedError
-from wam.calibration.poses import APPROACH_SPEED, MeasurementPose, way_seconds
-from wam.control.joint_move import JointMove
-from wam.model.constants import Array
+from experiments.operator import Prompt
+from experiments.run import (
+    TICK,
+    ArmFaultError,
+    ConsoleLoop,
+    StopRequestedError,
+    activate,
+)
+from wam.calibration import APPROACH_SPEED, MeasurementPose, way_seconds
+from wam.control import JointMove
+from wam.model import Array
 
 INTERRUPTED = 130
 _NOTHING = "Nothing was written."

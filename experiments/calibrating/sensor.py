@@ -4,16 +4,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition.errors import PreflightError
-from acquisition.ipc.layout import WRENCH_SLOTS
-from acquisition.sample import Record
+from acquisition import PreflightError, Record
+from acquisition.ipc import WRENCH_SLOTS
 from experiments.calibrating.pose_walk import PoseWalk
-from experiments.run.console_loop import ConsoleLoop
-from experiments.session.store import iso_utc
-from ft_sensor.calibration.fit import SensorFit, check_residual, fit_sensor
-from ft_sensor.calibration.sensor_file import SensorCalibration
-from wam.calibration.poses import MeasurementPose, choose_orientations, plan_halts
-from wam.model.constants import Array
+from experiments.run import ConsoleLoop
+from experiments.session import iso_utc
+from ft_sensor.calibration import (
+    SensorCalibration,
+    SensorFit,
+    check_residual,
+    fit_sensor,
+)
+from wam.calibration import MeasurementPose, choose_orientations, plan_halts
+from wam.model import Array
 
 AVERAGE = 2.0  # s of readings that are averaged in each orientation
 _FEWEST = 100  # readings in an average

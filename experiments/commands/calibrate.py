@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.run.console_loop import ConsoleLoop
-    from experiments.settings.load import Settings
-    from experiments.settings.matrix import TerrainRow
+    from experiments.run import ConsoleLoop
+    from experiments.settings import Settings, TerrainRow
 
 EXAMPLES = """\
   traction calibrate terrain --terrain S10  where the container of a terrain stands
@@ -51,17 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.calibrating.pose_walk import guided
-    from experiments.operator.console import Console
-    from experiments.operator.scripted import choose_operator
-    from experiments.operator.terminal import keyboard
-    from experiments.preflight.preflight import connect_rig, run_preflight
-    from experiments.rig.bus_log import logging_bus
-    from experiments.rig.rig import FakeOptions
-    from experiments.rig.simulation import SimulatedHand
-    from experiments.run.console_loop import ConsoleLoop
-    from experiments.run.stop import StopFlag, handle_signals
-    from experiments.settings.load import load_settings
+    from experiments.calibrating import guided
+    from experiments.operator import Console, choose_operator, keyboard
+    from experiments.preflight import connect_rig, run_preflight
+    from experiments.rig import FakeOptions, SimulatedHand, logging_bus
+    from experiments.run import ConsoleLoop, StopFlag, handle_signals
+    from experiments.settings import load_settings
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -84,9 +78,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.gravity import GravityGuide
-    from experiments.session.store import write_new_text
-    from wam.calibration.gravity_file import gravity_to_toml
+    from experiments.calibrating import GravityGuide
+    from experiments.session import write_new_text
+    from wam.calibration import gravity_to_toml
 
     found = GravityGuide(console_loop).run(args.poses, is_forced=args.force)
     write_new_text(out, gravity_to_toml(found))
@@ -94,9 +88,9 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.sensor import SensorGuide
-    from experiments.session.store import write_new_text
-    from ft_sensor.calibration.sensor_file import sensor_to_toml
+    from experiments.calibrating import SensorGuide
+    from experiments.session import write_new_text
+    from ft_sensor.calibration import sensor_to_toml
 
     tool = console_loop.rig.model.tool
     assert tool is not None
@@ -111,9 +105,9 @@ def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> N
 
 
 def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
-    from experiments.calibrating.terrain import TerrainGuide
-    from experiments.session.store import iso_utc, write_new_text
-    from ft_sensor.calibration.files import terrain_to_toml
+    from experiments.calibrating import TerrainGuide
+    from experiments.session import iso_utc, write_new_text
+    from ft_sensor.calibration import terrain_to_toml
 
     rig = console_loop.rig
     fit, points = TerrainGuide(console_loop).run(is_forced=args.force)
@@ -151,7 +145,7 @@ def _without_old(
 
 def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
     """Return where the file goes, beside rig.toml; what is simulated is marked."""
-    from experiments.rig.gravity import gravity_path
+    from experiments.rig import gravity_path
 
     names = {
         "sensor": "ft_sensor.toml",
@@ -165,7 +159,7 @@ def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> 
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     nothing = "Nothing was started."
     if not args.fake and (args.fast or args.operator_script):
@@ -183,7 +177,7 @@ def _check_arguments(args: argparse.Namespace) -> None:
 
 def _check_out(out: Path) -> None:
     """Refuse before the arm moves what could not be written afterwards."""
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     if out.exists():
         raise SettingsError(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator.console import Console
+    from experiments.operator import Console
 
 EXAMPLES = """\
   traction check --fake                     the page with simulated devices
@@ -43,13 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
-    from experiments.operator.console import GOOD, Console
-    from experiments.preflight.preflight import connect_rig, run_preflight
-    from experiments.rig.bus_log import logging_bus
-    from experiments.rig.gravity import read_gravity
-    from experiments.rig.rig import FakeOptions
-    from experiments.settings.load import load_settings
-    from experiments.settings.origins import origin_lines
+    from experiments.operator import GOOD, Console
+    from experiments.preflight import connect_rig, run_preflight
+    from experiments.rig import FakeOptions, logging_bus, read_gravity
+    from experiments.settings import load_settings, origin_lines
 
     console = Console(color=not args.no_color)
     if args.explain:
@@ -73,10 +70,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _explain(name: str, console: Console) -> int:
-    from acquisition.control_loop.states import transition_lines
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
+    from acquisition.control_loop import transition_lines
     from experiments.messages import CATALOGUE, catalogue_table, explanation
-    from experiments.session.states import table_lines
+    from experiments.session import table_lines
 
     pages = {
         "states": lambda: [*table_lines(), *transition_lines()],

@@ -26,15 +26,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the tables and return the exit code."""
-    from acquisition.errors import SettingsError
-    from experiments.operator.console import Console
-    from experiments.report.export import export_sessions
-    from experiments.report.sessions import (
+    from acquisition import SettingsError
+    from experiments.operator import Console
+    from experiments.report import (
         ReportRequest,
         choose_sessions,
+        export_sessions,
         export_terrains,
     )
-    from experiments.settings.load import load_settings
+    from experiments.settings import load_settings
 
     if (args.to is None) == (args.terrain_db is None):
         raise SettingsError(

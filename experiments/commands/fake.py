@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator.console import Console
-    from experiments.settings.load import Settings
-    from experiments.tools.pendant import Press, Pressable, TimedPress
+    from experiments.operator import Console
+    from experiments.settings import Settings
+    from experiments.tools import Press, Pressable, TimedPress
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -55,13 +55,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Serve until told to stop and return the exit code."""
-    from acquisition.clock import SystemClock
-    from experiments.operator.console import Console
-    from experiments.rig.bus_log import open_bus_log
-    from experiments.rig.fake import build_server
-    from experiments.run.stop import StopFlag, handle_signals
-    from experiments.settings.load import load_settings
-    from experiments.tools.pendant import PRESSES, Lines, Pendant
+    from acquisition import SystemClock
+    from experiments.operator import Console
+    from experiments.rig import build_server, open_bus_log
+    from experiments.run import StopFlag, handle_signals
+    from experiments.settings import load_settings
+    from experiments.tools import PRESSES, Lines, Pendant
 
     bus = _split(args.can) if args.can else None
     script = _read_script(args.script)
@@ -95,9 +94,9 @@ def _serve_sensor(
     settings: Settings, line: tuple[Path, str] | None, console: Console
 ) -> int:
     """Serve a sensor without an arm until told to stop."""
-    from acquisition.errors import SettingsError
-    from experiments.rig.fake import build_sensor_server
-    from experiments.run.stop import StopFlag, handle_signals
+    from acquisition import SettingsError
+    from experiments.rig import build_sensor_server
+    from experiments.run import StopFlag, handle_signals
 
     if line is None:
         raise SettingsError(
@@ -125,7 +124,7 @@ def _press(server: Pressable, presses: list[Press]) -> bool:
 
 
 def _split(text: str) -> tuple[str, str]:
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     interface, colon, channel = text.partition(":")
     if not (interface and colon and channel):
@@ -138,8 +137,8 @@ def _split(text: str) -> tuple[str, str]:
 
 
 def _read_script(path: Path | None) -> tuple[TimedPress, ...] | None:
-    from acquisition.errors import SettingsError
-    from experiments.tools.pendant import parse_script
+    from acquisition import SettingsError
+    from experiments.tools import parse_script
 
     if path is None:
         return None

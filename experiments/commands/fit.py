@@ -32,16 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
-    from acquisition.clock import SystemClock
-    from analysis.data.prepare import PrepareOptions
-    from analysis.data.tables import load_tables, parse_columns, parse_stones
-    from analysis.report.page import ReportContext, write_report
-    from analysis.study.models import FitOptions
-    from analysis.study.study import StudyOptions, run_study
-    from experiments.operator.console import Console
-    from experiments.report.progress import fitting
-    from experiments.report.sessions import REPORTED
-    from experiments.session.store import iso_utc
+    from acquisition import SystemClock
+    from analysis.data import PrepareOptions, load_tables, parse_columns, parse_stones
+    from analysis.report import ReportContext, write_report
+    from analysis.study import FitOptions, StudyOptions, run_study
+    from experiments.operator import Console
+    from experiments.report import REPORTED, fitting
+    from experiments.session import iso_utc
 
     console = Console(color=not args.no_color)
     columns = parse_columns(args.columns) if args.columns else None

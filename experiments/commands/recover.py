@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from acquisition.trial_file.recover import Recovery
-    from experiments.operator.console import Console
+    from acquisition.trial_file import Recovery
+    from experiments.operator import Console
 
 EXAMPLES = """\
   traction recover data/sessions/2027-03-14_S012_S10   every .partial below a folder
@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Recover every file and return the exit code."""
-    from acquisition.errors import TrialFileError
-    from acquisition.trial_file.recover import recover_file
-    from experiments.operator.console import Console
+    from acquisition import TrialFileError
+    from acquisition.trial_file import recover_file
+    from experiments.operator import Console
 
     console = Console(color=not args.no_color)
     sources = find_sources(args.files)
@@ -60,7 +60,7 @@ def find_sources(names: list[str]) -> list[Path]:
     Raises:
         SettingsError: a name means no file.
     """
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     found: dict[Path, None] = {}
     for name in names:
@@ -89,7 +89,7 @@ def _matching(pattern: Path) -> list[Path]:
 
 
 def _tell(recovery: Recovery, console: Console) -> None:
-    from experiments.operator.console import GOOD, WARNING
+    from experiments.operator import GOOD, WARNING
 
     source, verified = recovery.source, recovery.verified
     held = f"{verified.cycles} cycles, {recovery.messages} messages"
@@ -108,7 +108,7 @@ def lost_text(recovery: Recovery) -> str:
     """Return what was lost in words, for the operator."""
     if not recovery.bytes_dropped:
         return "Lost: nothing that was on the disk. The source is kept."
-    from acquisition.clock import RATE_HZ
+    from acquisition import RATE_HZ
 
     lost = f"Lost: {recovery.bytes_dropped} bytes at the end"
     if recovery.seconds_dropped > 0.0:

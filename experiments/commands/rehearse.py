@@ -11,9 +11,9 @@ from experiments.arguments import FRICTION
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.validation.bands import BandResult
-    from experiments.operator.console import Console
-    from experiments.tools.acceptance import AcceptancePlan
+    from analysis.validation import BandResult
+    from experiments.operator import Console
+    from experiments.tools import AcceptancePlan
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
@@ -46,15 +46,10 @@ def run(args: argparse.Namespace) -> int:
     """Record, analyse and judge; return 6 if a band is not met."""
     import json
 
-    from experiments.operator.console import Console
-    from experiments.session.store import write_text
-    from experiments.settings.load import load_settings
-    from experiments.tools.acceptance import (
-        AcceptancePlan,
-        analyse,
-        as_plain,
-        record_study,
-    )
+    from experiments.operator import Console
+    from experiments.session import write_text
+    from experiments.settings import load_settings
+    from experiments.tools import AcceptancePlan, analyse, as_plain, record_study
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -84,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
 def _print(
     plan: AcceptancePlan, found: Sequence[BandResult], folder: Path, console: Console
 ) -> int:
-    from experiments.operator.console import BAD, GOOD
+    from experiments.operator import BAD, GOOD
 
     rows = [
         [
@@ -118,7 +113,7 @@ def _free_folder(data: Path, seed: int) -> Path:
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     for name, value, least, most in (
         ("seed", args.seed, 0, 10**9),

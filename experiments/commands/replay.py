@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from experiments.operator.console import Console
-    from wam.bus.decoder import BusSummary, DecodedLine
+    from experiments.operator import Console
+    from wam.bus import BusSummary, DecodedLine
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
@@ -52,7 +52,7 @@ def _speed(text: str) -> float:
 
 def run(args: argparse.Namespace) -> int:
     """Show a trial or a bus log and return the exit code."""
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     is_trial = args.session is not None and args.trial is not None
     if is_trial == (args.can is not None) or (args.session and not args.trial):
@@ -64,11 +64,10 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _show_trial(args: argparse.Namespace) -> int:
-    from acquisition.clock import SystemClock
-    from experiments.operator.console import Console
-    from experiments.report.playback import play
-    from experiments.session.annotations import trial_path
-    from experiments.session.store import find_session
+    from acquisition import SystemClock
+    from experiments.operator import Console
+    from experiments.report import play
+    from experiments.session import find_session, trial_path
 
     console = Console(color=not args.no_color)
     path = trial_path(find_session(args.data, args.session), args.trial)
@@ -77,10 +76,9 @@ def _show_trial(args: argparse.Namespace) -> int:
 
 
 def _show_log(args: argparse.Namespace) -> int:
-    from acquisition.errors import SettingsError
-    from experiments.operator.console import Console
-    from wam.bus.decoder import BusReader
-    from wam.bus.log import LONGEST_LINE, parse_log
+    from acquisition import SettingsError
+    from experiments.operator import Console
+    from wam.bus import LONGEST_LINE, BusReader, parse_log
 
     console = Console(color=not args.no_color)
     reader = BusReader()

@@ -35,14 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
-    from analysis.report.what_if import parse_choice
-    from experiments.operator.console import Console
-    from experiments.report.sessions import (
-        ReportRequest,
-        choose_sessions,
-        report_sessions,
-    )
-    from experiments.settings.load import load_settings
+    from analysis.report import parse_choice
+    from experiments.operator import Console
+    from experiments.report import ReportRequest, choose_sessions, report_sessions
+    from experiments.settings import load_settings
 
     choices = [parse_choice(text) for text in args.what_if]
     console = Console(color=not args.no_color)

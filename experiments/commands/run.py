@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from experiments.arguments import FRICTION, PACES, add_fault, data_option
 
 if TYPE_CHECKING:
-    from experiments.run.resume import ResumeRequest
-    from experiments.run.session import SessionRequest
-    from experiments.session.unfinished import UnfinishedSession
+    from experiments.run import ResumeRequest, SessionRequest
+    from experiments.session import UnfinishedSession
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -60,13 +59,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
-    from experiments.operator.console import Console
-    from experiments.operator.scripted import choose_operator
-    from experiments.rig.rig import FakeOptions
-    from experiments.run.resume import resume_session
-    from experiments.run.session import OpenMode, SessionRequest, run_session
-    from experiments.session.states import Event
-    from experiments.settings.load import load_settings
+    from experiments.operator import Console, choose_operator
+    from experiments.rig import FakeOptions
+    from experiments.run import OpenMode, SessionRequest, resume_session, run_session
+    from experiments.session import Event
+    from experiments.settings import load_settings
 
     _check_arguments(args)
     settings = load_settings(args.config)
@@ -95,9 +92,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | None:
     """Return the session to be resumed instead, None when none is in the way."""
-    from experiments.run.resume import close
-    from experiments.run.resume_prompt import ResumeChoice, choose_resume
-    from experiments.session.unfinished import find_unfinished
+    from experiments.run import ResumeChoice, choose_resume, close
+    from experiments.session import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
     found = [
@@ -120,7 +116,7 @@ def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | 
 
 
 def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRequest:
-    from experiments.run.resume import ResumeRequest
+    from experiments.run import ResumeRequest
 
     return ResumeRequest(
         data=request.data,
@@ -136,7 +132,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
 
 
 def _check_arguments(args: argparse.Namespace) -> None:
-    from acquisition.errors import SettingsError
+    from acquisition import SettingsError
 
     nothing = "Nothing was started."
     if not args.fake and (args.fast or args.fault or args.operator_script):

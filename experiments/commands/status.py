@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from experiments.operator.console import Console
-    from experiments.session.matrix_board import MatrixRow
+    from experiments.operator import Console
+    from experiments.session import MatrixRow
 
 EXAMPLES = """\
   traction status                           the board, and what comes next
@@ -37,14 +37,9 @@ def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
     import json
 
-    from experiments.operator.console import Console
-    from experiments.session.matrix_board import (
-        DigestCache,
-        count_board,
-        next_steps,
-        parse_where,
-    )
-    from experiments.settings.load import load_settings
+    from experiments.operator import Console
+    from experiments.session import DigestCache, count_board, next_steps, parse_where
+    from experiments.settings import load_settings
 
     settings = load_settings(args.config)
     where, digest = parse_where(args.where), DigestCache()
@@ -98,7 +93,7 @@ def _plain(board: Sequence[MatrixRow]) -> list[str]:
 
 def _follow(look: Callable[[], list[str]], console: Console) -> int:
     """Show what `look` returns whenever it has changed, until Ctrl-C."""
-    from acquisition.clock import SystemClock
+    from acquisition import SystemClock
 
     clock = SystemClock()
     shown: list[str] = []

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from acquisition.errors import SettingsError
-from acquisition.simulation import SimulationControl
+from acquisition import SettingsError, SimulationControl
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
 
 _PATTERN = re.compile(

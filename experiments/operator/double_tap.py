@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.ipc.loop_client import LoopClient
+from acquisition.ipc import LoopClient
 
 PRESSED = 8.0  # F_n above which the foot is pressed down [N]
 RELEASED = 5.0  # and below which it is let go: it rests with less than that [N]

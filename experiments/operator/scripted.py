@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from experiments.messages import CATALOGUE
 from experiments.operator.keys import REJECT_REASONS, Operand, script_keys
 from experiments.operator.prompts import (

@@ -10,7 +10,7 @@ import tty
 from types import TracebackType
 from typing import Self
 
-from acquisition.clock import SystemClock
+from acquisition import SystemClock
 from experiments.operator.keys import (
     REJECT_REASONS,
     KeyAction,

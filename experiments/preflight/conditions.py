@@ -7,13 +7,11 @@ from typing import Any
 
 from pydantic import BaseModel, TypeAdapter
 
-from acquisition.errors import SessionError
-from experiments.operator.console import WARNING, Console
-from experiments.rig.rig import Rig
-from experiments.session.store import SessionFolder, read_json, write_json
-from experiments.settings.matrix import TerrainRow
-from experiments.settings.origins import flatten
-from experiments.settings.rig import RigSettings
+from acquisition import SessionError
+from experiments.operator import WARNING, Console
+from experiments.rig import Rig
+from experiments.session import SessionFolder, read_json, write_json
+from experiments.settings import RigSettings, TerrainRow, flatten
 
 FILE = "conditions.json"
 VERSION = 2  # of the file; 1 had no number

@@ -3,16 +3,21 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.errors import SessionError
+from acquisition import SessionError
 from experiments.messages import CATALOGUE
-from experiments.operator.console import GOOD, WARNING, Console
-from experiments.operator.keys import KeyAction
-from experiments.operator.prompts import OperatorInput, Prompt
-from experiments.operator.terminal import wait_for_key
+from experiments.operator import (
+    GOOD,
+    WARNING,
+    Console,
+    KeyAction,
+    OperatorInput,
+    Prompt,
+    wait_for_key,
+)
 from experiments.preflight.conditions import FOOT, read_conditions
 from experiments.preflight.host_checks import CheckResult
-from experiments.session.store import SessionFolder, list_sessions
-from experiments.settings.matrix import TerrainRow
+from experiments.session import SessionFolder, list_sessions
+from experiments.settings import TerrainRow
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.sample import Record
-from experiments.operator.console import BAD, GOOD, WARNING
-from ft_sensor.reading import axis_names, largest_traction
-from ft_sensor.serial_line.sensor import BURSTY
+from acquisition import Record
+from experiments.operator import BAD, GOOD, WARNING
+from ft_sensor import axis_names, largest_traction
+from ft_sensor.serial_line import BURSTY
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"

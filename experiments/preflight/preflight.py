@@ -6,17 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.control_loop.timing import SLOW_EXCHANGE_NS, loop_report
-from acquisition.devices import SafetyMode
-from acquisition.errors import (
+from acquisition import (
     LinkError,
     LinkTimeoutError,
     PreflightError,
+    SafetyMode,
     TractionError,
 )
+from acquisition.control_loop import SLOW_EXCHANGE_NS, loop_report
 from experiments import provenance
 from experiments.messages import preflight_error
-from experiments.operator.console import BAD, GOOD, WARNING, Console
+from experiments.operator import BAD, GOOD, WARNING, Console
 from experiments.preflight.host_checks import (
     CheckResult,
     DiskProbe,
@@ -27,13 +27,9 @@ from experiments.preflight.host_checks import (
     free_bytes,
     reach_words,
 )
-from experiments.rig.backend import EXCHANGE_CYCLES
-from experiments.rig.gravity import gravity_words
-from experiments.rig.rig import FakeOptions, Rig, build_rig
-from experiments.settings.load import Settings
-from experiments.settings.matrix import TerrainRow
-from experiments.settings.rig import RigSettings
-from wam.driver.health import complaints, temperature_range
+from experiments.rig import EXCHANGE_CYCLES, FakeOptions, Rig, build_rig, gravity_words
+from experiments.settings import RigSettings, Settings, TerrainRow
+from wam.driver import complaints, temperature_range
 
 LOOP_TEST = 5.0  # s
 STEPPED_TEST = 0.3  # s

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import SessionError, TrialFileError
-from analysis.data.load import RecordedTrial, load_trial
-from analysis.data.prepare import PrepareOptions, prepare_trial
-from experiments.operator.console import WARNING, Console
-from experiments.session.store import SessionFolder, sha256_of, write_new_text
+from acquisition import SessionError, TrialFileError
+from analysis.data import PrepareOptions, RecordedTrial, load_trial, prepare_trial
+from experiments.operator import WARNING, Console
+from experiments.session import SessionFolder, sha256_of, write_new_text
 
 DICTIONARY, INDEX, SUMS = "data_dictionary.csv", "trials.csv", "SHA256SUMS"
 _FORMAT = "%.12g"  # beyond the resolution of every instrument here

@@ -5,11 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition.clock import NS_PER_S, RATE_HZ, Clock
-from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
-from analysis.data.load import RecordedTrial, load_trial
-from experiments.operator.console import Console
-from experiments.operator.screens import RecordingView, recording_lines
+from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag
+from analysis.data import RecordedTrial, load_trial
+from experiments.operator import Console, RecordingView, recording_lines
 
 _PICTURES = 8  # per second of the person's time
 _LINES = 1.0  # seconds of the trial between two lines without a terminal

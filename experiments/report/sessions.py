@@ -4,24 +4,33 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, TrialFileError
-from analysis.data.load import RecordedTrial, load_trial
-from analysis.data.prepare import PrepareOptions
-from analysis.findings.rig_health import summarise_rig
-from analysis.report.page import ReportContext, write_report
-from analysis.report.what_if import StudyVariant, plain_choice, side_by_side
-from analysis.study.fold_store import ResultStore
-from analysis.study.models import FITTERS, GP_SE, GP_SE_NOISE, FitOptions
-from analysis.study.study import Study, StudyOptions, run_study
-from analysis.terrains.export import database_of
-from analysis.terrains.identify import identify_study
+from acquisition import SessionError, SystemClock, TrialFileError
+from analysis.data import PrepareOptions, RecordedTrial, load_trial
+from analysis.findings import summarise_rig
+from analysis.report import (
+    ReportContext,
+    StudyVariant,
+    plain_choice,
+    side_by_side,
+    write_report,
+)
+from analysis.study import (
+    FITTERS,
+    GP_SE,
+    GP_SE_NOISE,
+    FitOptions,
+    ResultStore,
+    Study,
+    StudyOptions,
+    run_study,
+)
+from analysis.terrains import database_of, identify_study
 from experiments.messages import CATALOGUE
-from experiments.operator.console import Console
+from experiments.operator import Console
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables
 from experiments.report.truth_errors import truth_tables
-from experiments.session.store import (
+from experiments.session import (
     SessionFolder,
     find_session,
     iso_utc,

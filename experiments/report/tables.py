@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from analysis.data.load import RecordedTrial
-from analysis.figures.sections import ReportSection
-from analysis.report.page_model import ReportTable
-from experiments.session.store import SessionFolder, read_json
+from analysis.data import RecordedTrial
+from analysis.figures import ReportSection
+from analysis.report import ReportTable
+from experiments.session import SessionFolder, read_json
 
 _ROW = (
     ("incline_deg", "incline [°]"),

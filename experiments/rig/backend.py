@@ -3,13 +3,11 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from acquisition.clock import PERIOD_NS, Clock
-from acquisition.control_loop.realtime import Grant
-from acquisition.devices import SafetyMode
-from acquisition.ipc.loop_client import LoopClient
-from acquisition.recording.recorder import TrialRecording
-from wam.driver.arm import WamArm
-from wam.driver.startup import ArmInfo
+from acquisition import PERIOD_NS, Clock, SafetyMode
+from acquisition.control_loop import Grant
+from acquisition.ipc import LoopClient
+from acquisition.recording import TrialRecording
+from wam.driver import ArmInfo, WamArm
 
 EXCHANGE_CYCLES = 100
 

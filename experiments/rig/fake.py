@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from acquisition.clock import Clock, SystemClock
-from acquisition.devices import WrenchSensor
-from acquisition.errors import SettingsError
-from acquisition.ipc.layout import SharedLayout
-from acquisition.simulation import SimulationControl
+from acquisition import (
+    Clock,
+    SettingsError,
+    SimulationControl,
+    SystemClock,
+    WrenchSensor,
+)
+from acquisition.ipc import SharedLayout
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
     LoopConfig,
@@ -21,20 +24,15 @@ from experiments.rig.build import (
     terrain_frame,
 )
 from experiments.rig.inline import InProcessBackend
-from experiments.settings.load import Settings
-from experiments.settings.matrix import TerrainRow
-from experiments.settings.rig import RigSettings
-from ft_sensor.serial_line.link import SerialPort
-from ft_sensor.serial_line.sensor import SerialSensor
-from ft_sensor.vendors.registry import AnySensor
-from wam.model.arm_model import ArmModel
-from wam.model.tool import tool_facts, tool_of
+from experiments.settings import RigSettings, Settings, TerrainRow
+from ft_sensor.serial_line import SerialPort, SerialSensor
+from ft_sensor.vendors import AnySensor
+from wam.model import ArmModel, tool_facts, tool_of
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from fakes.serving.puck_server import PuckServer
-    from fakes.serving.sensor_server import SensorLine, SensorServer
+    from fakes.serving import PuckServer, SensorLine, SensorServer
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +95,10 @@ def stepped(
 
     `models`: the arm with its tool, and as the control law weighs it.
     """
-    from fakes.clock import SteppedClock
-    from fakes.plant.plant import PlantOptions
-    from fakes.plant.push import PACES
-    from fakes.serving.rig_process import scene_of
-    from fakes.world.rig import FakeRig, LocalSimulation
+    from fakes import SteppedClock
+    from fakes.plant import PACES, PlantOptions
+    from fakes.serving import scene_of
+    from fakes.world import FakeRig, LocalSimulation
 
     clock, facts = SteppedClock(), world.facts()
     model, law_model = models
@@ -146,8 +143,8 @@ def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSe
 
 def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
     """Return a serial sensor of `kind` at `path`, as rig.toml has it if it fits."""
-    from fakes.sensor.kinds import SensorChoice
-    from fakes.serving.sensor_server import SensorLine
+    from fakes.sensor import SensorChoice
+    from fakes.serving import SensorLine
 
     section = settings.rig.ft_sensor
     facts: dict[str, Any] = {"kind": kind}
@@ -164,7 +161,7 @@ def build_sensor_server(settings: Settings, line: tuple[Path, str]) -> SensorSer
     Raises:
         SettingsError: the path is in use or cannot be one.
     """
-    from fakes.serving.sensor_server import SensorServer, hanging_load
+    from fakes.serving import SensorServer, hanging_load
 
     tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
     served = _sensor_line(settings, *line)
@@ -192,7 +189,7 @@ def build_server(
         SettingsError: the socket's path is in use or cannot be one.
         LinkError: the bus cannot be opened.
     """
-    from fakes.serving.puck_server import HomePose, build_home_server, open_can_port
+    from fakes.serving import HomePose, build_home_server, open_can_port
 
     row = settings.matrix.terrains[0]
     port = open_can_port(*bus, settings.rig.can.bitrate)

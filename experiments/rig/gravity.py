@@ -2,19 +2,17 @@
 
 from pathlib import Path
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from experiments.rig.build import build_tool
-from experiments.settings.calibrations import NOTHING, check_kind, read_calibration
-from experiments.settings.load import Settings
-from experiments.settings.rig import RigSettings
-from wam.calibration.gravity_file import (
-    GravityCalibration,
-    fits_tool,
-    gravity_from_toml,
+from experiments.settings import (
+    NOTHING,
+    RigSettings,
+    Settings,
+    check_kind,
+    read_calibration,
 )
-from wam.model.arm_model import ArmModel
-from wam.model.constants import load_constants
-from wam.model.gravity import gravity_model
+from wam.calibration import GravityCalibration, fits_tool, gravity_from_toml
+from wam.model import ArmModel, gravity_model, load_constants
 
 _INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 

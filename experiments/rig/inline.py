@@ -5,17 +5,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from acquisition.clock import Clock
-from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import Grant
-from acquisition.devices import SafetyMode, WrenchSensor
-from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.loop_client import LoopClient
-from acquisition.recording.recorder import Recorder
+from acquisition import Clock, SafetyMode, WrenchSensor
+from acquisition.control_loop import Grant, Loop
+from acquisition.ipc import LoopClient, SharedLayout
+from acquisition.recording import Recorder
 from experiments.rig.backend import measure_exchange
 from experiments.rig.build import LoopConfig, build_loop_server
-from wam.driver.arm import WamArm
-from wam.driver.startup import ArmInfo
+from wam.driver import ArmInfo, WamArm
 
 _GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
 

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition.clock import PERIOD_NS, Clock
-from acquisition.control_loop.realtime import Grant, choose_cores
-from acquisition.devices import SafetyMode
-from acquisition.errors import TractionError
-from acquisition.ipc.child import Child, ProcessLostError
-from acquisition.ipc.layout import SharedLayout
-from acquisition.ipc.loop_client import LoopClient
-from acquisition.ipc.rpc import make_proxy
-from acquisition.recording.recorder_process import RemoteRecorder
-from acquisition.simulation import DeviceServer
+from acquisition import PERIOD_NS, Clock, DeviceServer, SafetyMode, TractionError
+from acquisition.control_loop import Grant, choose_cores
+from acquisition.ipc import (
+    Child,
+    LoopClient,
+    ProcessLostError,
+    SharedLayout,
+    make_proxy,
+)
+from acquisition.recording import RemoteRecorder
 from experiments.rig.services import ArmService, SensorService
-from wam.driver.startup import ArmInfo
+from wam.driver import ArmInfo
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
 

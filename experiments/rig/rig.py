@@ -7,9 +7,8 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition.clock import Clock, SystemClock
-from acquisition.ipc.layout import SharedLayout
-from acquisition.simulation import SimulationControl
+from acquisition import Clock, SimulationControl, SystemClock
+from acquisition.ipc import SharedLayout
 from experiments.arguments import FRICTION
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
@@ -20,12 +19,9 @@ from experiments.rig.fake import SimulatedRig, stepped
 from experiments.rig.gravity import build_law_model, read_gravity
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
 from experiments.rig.simulation import connect_simulation
-from experiments.settings.calibrations import with_calibrations
-from experiments.settings.load import Settings
-from experiments.settings.matrix import TerrainRow
-from ft_sensor.payload import Payload, TerrainFrame, payload_of
-from wam.model.arm_model import ArmModel
-from wam.model.constants import load_constants
+from experiments.settings import Settings, TerrainRow, with_calibrations
+from ft_sensor import Payload, TerrainFrame, payload_of
+from wam.model import ArmModel, load_constants
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,17 +9,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition.clock import SystemClock
-from acquisition.control_loop.loop import Loop
-from acquisition.control_loop.realtime import Grant, RealtimeRequest, request
-from acquisition.devices import SafetyMode, WrenchSensor
-from acquisition.errors import TractionError
-from acquisition.ipc.channel import ChannelClosedError
-from acquisition.ipc.child import ChildContext, name_process
-from acquisition.ipc.layout import ProcessRole
-from acquisition.ipc.loop_server import LoopServer
-from acquisition.ipc.rpc import RpcServer, bind
-from acquisition.ipc.shared_sensor import SharedSensor, publish
+from acquisition import SafetyMode, SystemClock, TractionError, WrenchSensor
+from acquisition.control_loop import Grant, Loop, RealtimeRequest, request
+from acquisition.ipc import (
+    ChannelClosedError,
+    ChildContext,
+    LoopServer,
+    ProcessRole,
+    RpcServer,
+    SharedSensor,
+    bind,
+    name_process,
+    publish,
+)
 from experiments.rig.backend import measure_exchange
 from experiments.rig.build import (
     LoopConfig,
@@ -32,16 +34,16 @@ from experiments.rig.build import (
 )
 from experiments.rig.gravity import build_law_model
 from experiments.rig.services import ArmService, SensorService
-from experiments.settings.matrix import TerrainRow
-from experiments.settings.rig import RigSettings
-from ft_sensor.serial_line.link import open_port
-from ft_sensor.serial_line.reconnect import ReconnectingSensor, stream_facts
-from ft_sensor.serial_line.sensor import SerialSensor
-from wam.bus.link import CanLink, open_bus
-from wam.driver.arm import WamArm
-from wam.driver.startup import ArmInfo
-from wam.model.arm_model import ArmModel
-from wam.model.constants import load_constants
+from experiments.settings import RigSettings, TerrainRow
+from ft_sensor.serial_line import (
+    ReconnectingSensor,
+    SerialSensor,
+    open_port,
+    stream_facts,
+)
+from wam.bus import CanLink, open_bus
+from wam.driver import ArmInfo, WamArm
+from wam.model import ArmModel, load_constants
 
 CONTROL_PRIORITY = 80
 READER_PRIORITY = 60

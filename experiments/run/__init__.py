@@ -3,3 +3,7 @@
 `session` opens and closes, `runner` goes from trial to trial on one `context`,
 `console_loop` lets time pass, `resume` continues. Begin with `runner`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,10 +1,9 @@
 """The pendant activates the arm: torques are ready before, a person says when."""
 
-from acquisition.control_loop.states import ArmState
-from acquisition.devices import SafetyMode
-from acquisition.sample import MOTOR_FRESH_SHIFT
+from acquisition import MOTOR_FRESH_SHIFT, SafetyMode
+from acquisition.control_loop import ArmState
 from experiments.messages import preflight_error, pucks_have
-from experiments.operator.prompts import Prompt
+from experiments.operator import Prompt
 from experiments.run.console_loop import ConsoleLoop
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]

@@ -3,22 +3,22 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
-from acquisition.control_loop.faults import GuardVerdict
-from acquisition.errors import TractionError
-from acquisition.ipc.loop_client import LoopClient
+from acquisition import TractionError
+from acquisition.control_loop import GuardVerdict
+from acquisition.ipc import LoopClient
 from experiments.messages import FaultContext, fault_text
-from experiments.operator.console import Console
-from experiments.operator.double_tap import FootKeys
-from experiments.operator.feedback import OperatorFeedback, build_feedback
-from experiments.operator.prompts import OperatorInput
-from experiments.rig.rig import Rig
+from experiments.operator import (
+    Console,
+    FootKeys,
+    OperatorFeedback,
+    OperatorInput,
+    build_feedback,
+)
+from experiments.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session.journal import Journal
-from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
-from experiments.trial.files import TrialArchive
-from experiments.trial.header import SessionMetadata
+from experiments.session import Event, Journal, TrialName
+from experiments.trial import SessionMetadata, TrialArchive
 
 
 @dataclass(slots=True)

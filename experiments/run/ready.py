@@ -3,18 +3,21 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition.control_loop.states import ArmState
-from acquisition.errors import SessionError
-from experiments.operator.keys import NOTE_KEYS, KeyAction, key_action, screen_keys
-from experiments.operator.prompts import Prompt
-from experiments.operator.screens import ReadyView, ready_lines
+from acquisition import SessionError
+from acquisition.control_loop import ArmState
+from experiments.operator import (
+    NOTE_KEYS,
+    KeyAction,
+    Prompt,
+    ReadyView,
+    key_action,
+    ready_lines,
+    screen_keys,
+)
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.annotations import LONGEST_TEXT, clean_text
-from experiments.session.states import Event
-from experiments.session.trial_files import add_remark
-from experiments.session.trial_name import TrialName
-from experiments.trial.quality import review_trial
+from experiments.session import LONGEST_TEXT, Event, TrialName, add_remark, clean_text
+from experiments.trial import review_trial
 
 
 def wait_ready(context: RunContext, name: TrialName) -> None:

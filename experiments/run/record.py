@@ -4,26 +4,25 @@ from collections.abc import Callable
 
 import numpy as np
 
-from acquisition.clock import RATE_HZ
-from acquisition.control_loop.states import ArmState
-from acquisition.errors import TractionError, TrialFileError
-from acquisition.ipc.child import ProcessLostError
-from acquisition.sample import MOTOR_FRESH_SHIFT, Flag
-from acquisition.trial_file.writer import TrialHeader
-from experiments.fault_injection.plan import FaultTrigger
+from acquisition import MOTOR_FRESH_SHIFT, RATE_HZ, Flag, TractionError, TrialFileError
+from acquisition.control_loop import ArmState
+from acquisition.ipc import ProcessLostError
+from acquisition.trial_file import TrialHeader
+from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, FaultContext
-from experiments.operator.feedback import FeedbackSignal
-from experiments.operator.prompts import Prompt
-from experiments.operator.screens import RecordingView, live_line, recording_lines
-from experiments.rig.rig import Rig
+from experiments.operator import (
+    FeedbackSignal,
+    Prompt,
+    RecordingView,
+    live_line,
+    recording_lines,
+)
+from experiments.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.sidecar import TrialOutcome
-from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
-from experiments.trial.header import EndDetector, PaceMonitor, trial_header
-from experiments.trial.quality import review_trial
+from experiments.session import Event, TrialName, TrialOutcome
+from experiments.trial import EndDetector, PaceMonitor, review_trial, trial_header
 
 HISTORY = 5.0  # s of traction in the sparklines
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT

@@ -8,21 +8,23 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, SettingsError
+from acquisition import SessionError, SettingsError, SystemClock
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
-from experiments.operator.console import Console
-from experiments.operator.scripted import choose_operator
-from experiments.rig.rig import FakeOptions
+from experiments.operator import Console, choose_operator
+from experiments.rig import FakeOptions
 from experiments.run.session import OpenMode, SessionRequest, run_session
-from experiments.session.crash_recovery import recover_session
-from experiments.session.journal import Journal, open_journal
-from experiments.session.lock import session_lock
-from experiments.session.reducer import refusal
-from experiments.session.states import Event, SessionPhase
-from experiments.session.store import SessionFolder
-from experiments.settings.load import load_settings
+from experiments.session import (
+    Event,
+    Journal,
+    SessionFolder,
+    SessionPhase,
+    open_journal,
+    recover_session,
+    refusal,
+    session_lock,
+)
+from experiments.settings import load_settings
 
 _FAKE = TypeAdapter(FakeOptions)
 _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)

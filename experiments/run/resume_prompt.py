@@ -3,13 +3,18 @@
 from collections.abc import Sequence
 from enum import Enum
 
-from acquisition.errors import SessionError
+from acquisition import SessionError
 from experiments.messages import CATALOGUE
-from experiments.operator.console import WARNING, Console
-from experiments.operator.keys import KeyAction
-from experiments.operator.prompts import OperatorInput, Prompt
-from experiments.operator.terminal import TerminalInput, wait_for_key
-from experiments.session.unfinished import UnfinishedSession
+from experiments.operator import (
+    WARNING,
+    Console,
+    KeyAction,
+    OperatorInput,
+    Prompt,
+    TerminalInput,
+    wait_for_key,
+)
+from experiments.session import UnfinishedSession
 
 
 class ResumeChoice(Enum):

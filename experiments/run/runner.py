@@ -2,18 +2,19 @@
 
 import traceback
 
-from acquisition.control_loop.states import ArmState
-from acquisition.errors import TractionError
-from analysis.data.prepare import MINIMUM_TRAVEL_SHARE
+from acquisition import TractionError
+from acquisition.control_loop import ArmState
+from analysis.data import MINIMUM_TRAVEL_SHARE
 from experiments.messages import CATALOGUE, FaultContext, rest_text
-from experiments.operator.keys import (
+from experiments.operator import (
     REJECT_REASONS,
+    EndView,
     KeyAction,
+    Prompt,
+    end_lines,
     key_action,
     screen_keys,
 )
-from experiments.operator.prompts import Prompt
-from experiments.operator.screens import EndView, end_lines
 from experiments.run.activation import activate
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, open_context
@@ -21,12 +22,8 @@ from experiments.run.ready import take_note, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.tare import take_end_tare, take_tare
-from experiments.session.journal import Journal
-from experiments.session.sidecar import TrialOutcome
-from experiments.session.states import Event
-from experiments.session.store import write_text
-from experiments.session.trial_name import TrialName
-from experiments.trial.header import SessionMetadata
+from experiments.session import Event, Journal, TrialName, TrialOutcome, write_text
+from experiments.trial import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
 _ENDED = "session ended at the review"

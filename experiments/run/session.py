@@ -6,43 +6,36 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from experiments.arguments import data_option
-from experiments.fault_injection.host_faults import HostFaults
-from experiments.fault_injection.plan import plan_faults
-from experiments.operator.console import Console
-from experiments.operator.prompts import OperatorInput
-from experiments.operator.terminal import keyboard
-from experiments.preflight.conditions import (
+from experiments.fault_injection import HostFaults, plan_faults
+from experiments.operator import Console, OperatorInput, keyboard
+from experiments.preflight import (
+    LOOP_TEST,
+    Preflight,
     check_conditions,
+    confirm_foot,
+    connect_rig,
+    last_foot,
     rig_conditions,
+    run_preflight,
     sensor_conditions,
     write_conditions,
 )
-from experiments.preflight.foot_check import confirm_foot, last_foot
-from experiments.preflight.preflight import (
-    LOOP_TEST,
-    Preflight,
-    connect_rig,
-    run_preflight,
-)
-from experiments.rig.bus_log import logging_bus
-from experiments.rig.rig import FakeOptions, Rig
-from experiments.rig.simulation import SimulatedHand
+from experiments.rig import FakeOptions, Rig, SimulatedHand, logging_bus
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
-from experiments.session.journal import Journal
-from experiments.session.lock import session_lock
-from experiments.session.matrix_board import next_steps
-from experiments.session.states import Event
-from experiments.session.store import (
+from experiments.session import (
+    Event,
+    Journal,
     create_session,
+    next_steps,
+    session_lock,
     session_utc_ns,
     write_json,
     write_text,
 )
-from experiments.settings.load import Settings
-from experiments.settings.matrix import TerrainRow
-from experiments.trial.header import SessionMetadata, collect_metadata
+from experiments.settings import Settings, TerrainRow
+from experiments.trial import SessionMetadata, collect_metadata
 
 
 @dataclass(frozen=True, slots=True)

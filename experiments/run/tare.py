@@ -4,21 +4,19 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from acquisition.errors import PreflightError, TractionError
-from acquisition.ipc.layout import unpack_wrenches
-from experiments.fault_injection.plan import FaultTrigger
+from acquisition import PreflightError, TractionError
+from acquisition.ipc import unpack_wrenches
+from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
-from experiments.operator.prompts import Prompt
-from experiments.rig.rig import Rig
+from experiments.operator import Prompt
+from experiments.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
-from ft_sensor.calibration.sensor_file import sensor_from_toml
-from ft_sensor.payload import Payload
-from ft_sensor.tare import TareError, TareResult, take_mean
-from wam.model.constants import Array
+from experiments.session import Event, TrialName
+from ft_sensor import Payload, TareError, TareResult, take_mean
+from ft_sensor.calibration import sensor_from_toml
+from wam.model import Array
 
 TARE_SECONDS = 1.0
 STILL_SECONDS = 0.3

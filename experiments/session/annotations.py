@@ -5,9 +5,8 @@ import pwd
 import re
 from pathlib import Path
 
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError
-from experiments.operator.console import WARNING
+from acquisition import SessionError, SystemClock
+from experiments.operator import WARNING
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import Journal, open_journal
 from experiments.session.lock import session_lock

@@ -2,9 +2,13 @@
 
 from pathlib import Path
 
-from acquisition.errors import TrialFileError
-from acquisition.trial_file.recover import recover_file, recovered_path
-from acquisition.trial_file.verify import VerifiedFile, verify_file
+from acquisition import TrialFileError
+from acquisition.trial_file import (
+    VerifiedFile,
+    recover_file,
+    recovered_path,
+    verify_file,
+)
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialOutcome, sidecar_of
 from experiments.session.states import OPEN, Event, SessionPhase

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from acquisition.clock import Clock
-from acquisition.errors import SessionError
+from acquisition import Clock, SessionError
 from experiments.session.reducer import SessionState, apply, refusal, replay
 from experiments.session.store import SessionFolder, iso_utc, read_json, write_json
 from experiments.session.trial_files import decision_of, move_trial_files

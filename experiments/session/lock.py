@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError
+from acquisition import SessionError, SystemClock
 from experiments.messages import CATALOGUE
 from experiments.session.store import SessionFolder, iso_utc, read_json
 

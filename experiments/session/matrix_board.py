@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from experiments.arguments import data_option
 from experiments.session.lock import owner_of
 from experiments.session.store import SessionFolder, list_sessions, read_json, sha256_of
 from experiments.session.unfinished import find_unfinished
-from experiments.settings.matrix import MatrixSettings, TerrainRow
+from experiments.settings import MatrixSettings, TerrainRow
 
 KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
 _Digest = Callable[[Path], str]

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from acquisition.trial_file.verify import VerifiedFile
+from acquisition.trial_file import VerifiedFile
 from experiments.session.trial_name import TrialName
 
 COMPLETE = frozenset({"travel", "key", "time-limit"})

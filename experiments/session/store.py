@@ -12,8 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
-from acquisition.clock import SystemClock
-from acquisition.errors import SessionError, SettingsError, TrialFileError
+from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"

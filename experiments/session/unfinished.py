@@ -4,9 +4,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.errors import TrialFileError
-from acquisition.trial_file.chunks import read_file
-from acquisition.trial_file.salvage import recorded_seconds
+from acquisition import TrialFileError
+from acquisition.trial_file import read_file, recorded_seconds
 from experiments.messages import CATALOGUE
 from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay

@@ -8,12 +8,16 @@ from typing import TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
-from ft_sensor.calibration.files import terrain_facts, terrain_from_toml
-from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_from_toml
+from ft_sensor.calibration import (
+    SensorCalibration,
+    sensor_from_toml,
+    terrain_facts,
+    terrain_from_toml,
+)
 
 _LARGEST = 1_000_000  # bytes; a calibration has a few thousand
 NOTHING = "Nothing was started."

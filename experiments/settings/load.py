@@ -10,7 +10,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from experiments.settings.matrix import MatrixSettings, TerrainRow
 from experiments.settings.rig import RigSettings
 from experiments.settings.sensor import build_device

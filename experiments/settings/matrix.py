@@ -4,14 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from acquisition.settings import (
-    File,
-    Near,
-    Number,
-    SettingsSection,
-    Vector3,
-    Whole,
-)
+from acquisition import File, Near, Number, SettingsSection, Vector3, Whole
 
 _Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]

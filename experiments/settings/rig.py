@@ -4,9 +4,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from acquisition.clock import RATE_HZ
-from acquisition.control_loop.guard import GuardLimits
-from acquisition.settings import (
+from acquisition import (
+    RATE_HZ,
     File,
     Mass,
     Number,
@@ -15,7 +14,8 @@ from acquisition.settings import (
     Vector3,
     Whole,
 )
-from ft_sensor.vendors.registry import AnySensor
+from acquisition.control_loop import GuardLimits
+from ft_sensor.vendors import AnySensor
 
 _Turn = Annotated[Whole, Field(ge=0, lt=65536)]  # counts of one motor turn
 _SevenPositive = tuple[

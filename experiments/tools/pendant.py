@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from acquisition.clock import NS_PER_S
-from acquisition.errors import SettingsError
+from acquisition import NS_PER_S, SettingsError
 
 Press = Literal["activate", "idle", "estop", "quit"]
 PendantButton = Literal["activate", "idle", "estop"]

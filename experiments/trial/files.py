@@ -6,15 +6,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import TrialFileError
-from acquisition.trial_file.verify import VerifiedFile
-from acquisition.trial_file.writer import TrialHeader
-from analysis.data.quality import CoverageGrid, suggest
-from experiments.rig.rig import Rig
-from experiments.session.reducer import KEEP
-from experiments.session.sidecar import TrialOutcome, sidecar_of
-from experiments.session.store import read_json, write_json
-from experiments.session.trial_name import TrialName
+from acquisition import TrialFileError
+from acquisition.trial_file import TrialHeader, VerifiedFile
+from analysis.data import CoverageGrid, suggest
+from experiments.rig import Rig
+from experiments.session import (
+    KEEP,
+    TrialName,
+    TrialOutcome,
+    read_json,
+    sidecar_of,
+    write_json,
+)
 from experiments.trial.header import SessionMetadata, write_flight, write_truth
 from experiments.trial.quality import Review
 

@@ -7,12 +7,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.sample import Flag
-from analysis.data.events import find_slips
-from analysis.data.load import load_trial
-from analysis.data.prepare import MINIMUM_KEPT, PrepareOptions, prepare_trial
-from analysis.data.quality import JOINT7_WARNING, coverage, quick_ratio
-from experiments.operator.console import GOOD, WARNING
+from acquisition import Flag
+from analysis.data import (
+    JOINT7_WARNING,
+    MINIMUM_KEPT,
+    PrepareOptions,
+    coverage,
+    find_slips,
+    load_trial,
+    prepare_trial,
+    quick_ratio,
+)
+from experiments.operator import GOOD, WARNING
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd

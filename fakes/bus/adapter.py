@@ -2,9 +2,9 @@
 
 import can
 
-from acquisition.errors import LinkError
+from acquisition import LinkError
 from fakes.bus.hub import Frame
-from wam.bus.link import open_bus
+from wam.bus import open_bus
 
 _DRAIN_AT_MOST = 512
 

@@ -5,7 +5,7 @@ import select
 import socket
 from pathlib import Path
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
 
 CLIENTS = 32

@@ -6,9 +6,8 @@ from typing import NoReturn
 
 import can
 
-from acquisition.clock import NS_PER_S, Clock
-from fakes.pucks.network import PuckNetwork
-from fakes.pucks.wire import WiredNetwork
+from acquisition import NS_PER_S, Clock
+from fakes.pucks import PuckNetwork, WiredNetwork
 
 _PATIENCE_NS = NS_PER_S
 

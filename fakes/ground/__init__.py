@@ -3,3 +3,7 @@
 `terrain` is what a foot can stand and slip on, `stones` and `plate` the two kinds, each
 one trial's ground. Begin with `terrain`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wam.model.arm_model import drive_inertia_matrix
-from wam.model.constants import ArmConstants, Array
+from wam.model import ArmConstants, Array, drive_inertia_matrix
 
 _STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
 _EPSILON = 0.01  # rad/s, where Coulomb friction saturates

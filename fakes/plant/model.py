@@ -4,10 +4,8 @@
 import numpy as np
 import pinocchio as pin
 
-from ft_sensor.payload import TerrainFrame
-from wam.model.arm_model import add_point, build_pinocchio
-from wam.model.constants import ArmConstants
-from wam.model.tool import Tool
+from ft_sensor import TerrainFrame
+from wam.model import ArmConstants, Tool, add_point, build_pinocchio
 
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]

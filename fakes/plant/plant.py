@@ -18,18 +18,16 @@ from math import floor
 import numpy as np
 import pinocchio as pin
 
-from acquisition.clock import PERIOD_NS
-from fakes.ground.contact import NO_CONTACT
-from fakes.ground.terrain import Terrain
+from acquisition import PERIOD_NS
+from fakes.ground import NO_CONTACT, Terrain
 from fakes.plant.gauges import Wrench, WristGauges
 from fakes.plant.hand import Hand
 from fakes.plant.joints import JointLoads, JointResistance, JointState
 from fakes.plant.model import FOREARM_MASS, arm_and_hand
 from fakes.plant.push import HandView
 from fakes.truth import Truth
-from ft_sensor.payload import TerrainFrame
-from wam.model.constants import GRAVITY, ArmConstants, Array
-from wam.model.tool import Tool
+from ft_sensor import TerrainFrame
+from wam.model import GRAVITY, ArmConstants, Array, Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
@@ -80,7 +78,7 @@ class ArmPlant:
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
-        self._resistance = JointResistance(constants, options.friction, self._dt)
+        self.resistance = JointResistance(constants, options.friction, self._dt)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
@@ -234,7 +232,7 @@ class ArmPlant:
 
     def _resist(self, q: list[float], qd: list[float]) -> None:
         """Take friction and stops as they are at `q` [rad] and `qd` [rad/s]."""
-        now = self._resistance.at(q, qd)
+        now = self.resistance.at(q, qd)
         self._model.armature = np.array(now.inertias)
         self._loads.resist(now.damping)
         self._stops = np.array(now.springs)

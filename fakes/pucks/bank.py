@@ -4,18 +4,13 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Protocol
 
-from acquisition.devices import SafetyMode
+from acquisition import SafetyMode
 from fakes.pucks.event_queue import EventQueue
 from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
-from wam.bus.frames import (
-    MOTOR_NODES,
-    Property,
-    encode_position,
-    wrap_position,
-)
+from wam.bus import MOTOR_NODES, Property, encode_position, wrap_position
 
 
 class MotorSide(Protocol):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fakes.pucks.event_queue import FRAME_NS, EventQueue
-from wam.bus.frames import compose_id
+from wam.bus import compose_id
 
 # FROM 31 TO 9 wins every arbitration against pucks, FROM 11 TO group 11 (what the
 # finger of a hand says) loses all of them; nobody here has or hears either.

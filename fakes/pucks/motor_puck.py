@@ -2,14 +2,14 @@
 
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower
-from wam.bus.frames import position_reply_id
-from wam.bus.properties import (
+from wam.bus import (
     MAGNETIC_ENCODER,
     Device,
     PuckMode,
     PuckRole,
     PuckStatus,
     names,
+    position_reply_id,
     property_number,
 )
 

@@ -4,7 +4,7 @@ Seven motor pucks, the safety module and, where there is one, the force/torque s
 as far as hosts have described them.
 """
 
-from acquisition.devices import SafetyMode
+from acquisition import SafetyMode
 from fakes.pucks.bank import MotorSide, PuckBank
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
@@ -16,7 +16,7 @@ from fakes.pucks.safety_module import (
     PendantAction,
     Strainable,
 )
-from wam.bus.frames import (
+from wam.bus import (
     GROUP_BIT,
     MOTOR_NODES,
     SAFETY_NODE,
@@ -27,7 +27,7 @@ from wam.bus.frames import (
     decode_request,
     decode_torques,
 )
-from wam.driver.safety_module import PendantWord
+from wam.driver import PendantWord
 
 
 class PuckNetwork:

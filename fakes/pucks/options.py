@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from acquisition.devices import SafetyMode
+from acquisition import SafetyMode
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,13 +7,23 @@ the one is an option, the other the mode that the pucks go to.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
-from acquisition.devices import SafetyMode
+from acquisition import SafetyMode
 from fakes.pucks.event_queue import NEVER, EventQueue
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.speed_monitor import SpeedMonitor
-from wam.bus.frames import SAFETY_NODE, Group, Property, compose_id, encode_reply
-from wam.bus.properties import Device, PuckMode, PuckRole, PuckStatus, names
-from wam.driver.safety_module import (
+from wam.bus import (
+    SAFETY_NODE,
+    Device,
+    Group,
+    Property,
+    PuckMode,
+    PuckRole,
+    PuckStatus,
+    compose_id,
+    encode_reply,
+    names,
+)
+from wam.driver import (
     COUNTS_PER_SPEED,
     MONITORS,
     PendantButton,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fakes.randomness import NormalStream, exact_step
-from ft_sensor.reading import Wrench
+from ft_sensor import Wrench
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +49,14 @@ class SensorErrors:
         torque: ErrorScale = TORQUE_ERRORS,
     ) -> None:
         self._scales = (force,) * 3 + (torque,) * 3
-        self._offset = [0.0] * 6
+        self.offset = [0.0] * 6
         self.new_trial(rng)
-        self._offset = self._level = _within(self._level, force.bias)
+        self.offset = self._level = _within(self._level, force.bias)
 
     def new_trial(self, rng: np.random.Generator) -> None:
         """Draw bias and drift from `rng`, and everything after from it too."""
         self._normals = NormalStream(rng)
-        pairs = zip(self._offset, self._scales, strict=True)
+        pairs = zip(self.offset, self._scales, strict=True)
         self._level = [o + s.bias * self._normals.next() for o, s in pairs]
         self._drifts = [s.drift * self._normals.next() for s in self._scales]
         self._is_settled = False
@@ -69,7 +69,7 @@ class SensorErrors:
         The error of a trial is what remains after its tare. A tare that saw the bias
         of the trial before would add it to the next one's.
         """
-        self._level, self._drifts = self._offset, [0.0] * 6
+        self._level, self._drifts = self.offset, [0.0] * 6
         self._is_settled = True
         self._pace_drifts(self._step_ns)
 

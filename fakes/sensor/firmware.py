@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from ft_sensor.reading import Wrench
+from ft_sensor import Wrench
 
 Saying = tuple[int, bytes]  # when it is said [ns], and what
 FULL_COUNT = 32767  # of a sensor that sends 16-bit counts

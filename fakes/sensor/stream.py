@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
 from fakes.sensor.stream_faults import ByteFault, StreamFaults, damage
-from ft_sensor.reading import ALL_AXES, Wrench
-from ft_sensor.serial_line.framing import wire_time_ns
+from ft_sensor import ALL_AXES, Wrench
+from ft_sensor.serial_line import wire_time_ns
 
 Source = Callable[[int], Sequence[float]]
 
@@ -54,13 +54,13 @@ class SensorStream:
         self.faults = StreamFaults()
         self.resets_on_open = False
         self.warming = 0.0
-        self._firmware = firmware
+        self.firmware = firmware
         self._source = source
         self._pending: deque[Saying] = deque()
         self._wire_free_ns = self._paused_until_ns = start_ns
         self._is_silent = self._is_skipping = self._is_saturated = False
         self._fault: tuple[ByteFault, int] | None = None
-        self._on_since_ns = firmware.on_since_ns
+        self.on_since_ns = firmware.on_since_ns
         self._clock_start_us = self._device_us = clock_start_us
         self._number = 0
         self._schedule: SampleSchedule | None = None
@@ -70,7 +70,7 @@ class SensorStream:
 
     def reset(self, t_ns: int) -> None:
         """Switch the power off and on at `t_ns`; settings are lost."""
-        said = self._firmware.power_up(t_ns)
+        said = self.firmware.power_up(t_ns)
         self._begin_anew()
         self._say(said)
 
@@ -82,8 +82,8 @@ class SensorStream:
     def receive(self, t_ns: int, data: bytes) -> None:
         """Take bytes written by the client at `t_ns`."""
         self._sample_until(t_ns)
-        said = self._firmware.receive(t_ns, data)
-        if self._firmware.on_since_ns != self._on_since_ns:
+        said = self.firmware.receive(t_ns, data)
+        if self.firmware.on_since_ns != self.on_since_ns:
             self._begin_anew()
         self._say(said)
 
@@ -141,7 +141,7 @@ class SensorStream:
 
     def _begin_anew(self) -> None:
         """Let clock, counter and line begin with the power."""
-        self._on_since_ns = self._wire_free_ns = self._firmware.on_since_ns
+        self.on_since_ns = self._wire_free_ns = self.firmware.on_since_ns
         self._pending.clear()
         self._is_skipping = False
         self._number = 0
@@ -153,13 +153,13 @@ class SensorStream:
 
     def _follow_schedule(self) -> None:
         """Begin the samples of a new schedule of the firmware."""
-        schedule = self._firmware.schedule
+        schedule = self.firmware.schedule
         if schedule is self._schedule:
             return
         self._schedule = schedule
         self._count = 0
         self._frame_wire_ns = wire_time_ns(
-            self._firmware.frame_size, self._firmware.baudrate
+            self.firmware.frame_size, self.firmware.baudrate
         )
         if schedule is not None:
             self._sample_ns = schedule.first_ns
@@ -184,7 +184,7 @@ class SensorStream:
         if self._wire_free_ns > t_ns + period_ns:
             self._is_skipping = True  # the line is too slow for the rate
             return
-        data = self._firmware.frame(self._measured(t_ns, wrench), self.status)
+        data = self.firmware.frame(self._measured(t_ns, wrench), self.status)
         self._is_skipping = False
         if self._fault is not None:
             data = damage(data, *self._fault)
@@ -194,7 +194,7 @@ class SensorStream:
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = 0.0
         if self.warming:
-            warmth = self.warming * (t_ns - self._on_since_ns) * 1e-9
+            warmth = self.warming * (t_ns - self.on_since_ns) * 1e-9
             pairs = zip(wrench, _PER_DEGREE, strict=True)
             wrench = [value + warmth * gain for value, gain in pairs]
         saturated = ALL_AXES if self._is_saturated else 0
@@ -203,7 +203,7 @@ class SensorStream:
             saturated |= beyond
         fx, fy, fz, tx, ty, tz = wrench
         if not self.is_clock_frozen:
-            passed_ns = round((t_ns - self._on_since_ns) * self._firmware.clock_rate)
+            passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
             self._device_us = self._clock_start_us + passed_ns // 1000
         return Measurement(
             self.faults.show((fx, fy, fz, tx, ty, tz)),
@@ -218,7 +218,7 @@ class SensorStream:
         """Put `data` on the wire as soon as it is free, not before `t_ns`."""
         if self._is_silent:
             return
-        wire_ns = wire_time_ns(len(data), self._firmware.baudrate)
+        wire_ns = wire_time_ns(len(data), self.firmware.baudrate)
         begin_ns = t_ns if t_ns > self._wire_free_ns else self._wire_free_ns
         self._wire_free_ns = end_ns = begin_ns + wire_ns
         self._pending.append((end_ns, data))

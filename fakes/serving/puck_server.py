@@ -7,24 +7,25 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.clock import PERIOD_NS, Clock
-from acquisition.devices import SafetyMode
-from fakes.bus.adapter import CanPort
-from fakes.bus.hub import Frame, SocketHub
-from fakes.plant.plant import ArmPlant
-from fakes.pucks.bank import MotorSide
-from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
-from fakes.pucks.network import PuckNetwork
-from fakes.pucks.options import NetworkOptions
-from fakes.pucks.safety_module import PendantAction
-from fakes.pucks.wire import WiredNetwork
+from acquisition import PERIOD_NS, Clock, SafetyMode
+from fakes.bus import CanPort, Frame, SocketHub
+from fakes.plant import ArmPlant
+from fakes.pucks import (
+    SENSOR_FORCE_ERRORS,
+    SENSOR_TORQUE_ERRORS,
+    Load,
+    MotorSide,
+    NetworkOptions,
+    PendantAction,
+    PuckNetwork,
+    WiredNetwork,
+)
 from fakes.randomness import trial_generator
-from fakes.sensor.errors import SensorErrors
+from fakes.sensor import SensorErrors
 from fakes.serving.sensor_server import SensorLine, SensorServer
 from fakes.world_clock import TICK_NS, WorldClock
-from ft_sensor.payload import TerrainFrame
-from wam.model.constants import load_constants
-from wam.model.tool import Tool
+from ft_sensor import TerrainFrame
+from wam.model import Tool, load_constants
 
 _SEED = 1  # of the sensor's errors
 

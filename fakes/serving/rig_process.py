@@ -10,30 +10,32 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.clock import SystemClock
-from acquisition.control_loop.realtime import RealtimeRequest, request
-from acquisition.ipc.channel import Channel, ChannelClosedError
-from acquisition.ipc.child import ChildContext, name_process
-from acquisition.ipc.rpc import RpcServer, bind
-from acquisition.sample import Record
-from acquisition.simulation import (
+from acquisition import (
     DeviceServer,
+    Record,
     ServedDevices,
     SimulationControl,
+    SystemClock,
     TruthSource,
 )
-from fakes.bus.hub import SocketHub
-from fakes.plant.plant import PlantOptions
-from fakes.plant.push import PACES
-from fakes.pucks.wire import WiredNetwork
-from fakes.sensor.kinds import SensorChoice
-from fakes.sensor.pty import SerialPty
+from acquisition.control_loop import RealtimeRequest, request
+from acquisition.ipc import (
+    Channel,
+    ChannelClosedError,
+    ChildContext,
+    RpcServer,
+    bind,
+    name_process,
+)
+from fakes.bus import SocketHub
+from fakes.plant import PACES, PlantOptions
+from fakes.pucks import WiredNetwork
+from fakes.sensor import SensorChoice, SerialPty
 from fakes.truth import Truth, truth_records
-from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
+from fakes.world import FakeRig, LocalSimulation, SimulatedScene
 from fakes.world_clock import TICK_NS, WorldClock
-from ft_sensor.payload import TerrainFrame
-from wam.model.constants import load_constants
-from wam.model.tool import tool_of
+from ft_sensor import TerrainFrame
+from wam.model import load_constants, tool_of
 
 PRIORITY = 70
 TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile

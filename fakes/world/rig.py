@@ -6,22 +6,21 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.clock import PERIOD_NS, Clock
-from acquisition.errors import SettingsError
-from acquisition.sample import Record
-from fakes.bus.in_process import FakeCanBus
+from acquisition import PERIOD_NS, Clock, Record, SettingsError
+from fakes.bus import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground.terrain import Container, make_terrain
-from fakes.plant.plant import ArmPlant, PlantOptions
-from fakes.plant.push import Pace
-from fakes.pucks.ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
-from fakes.pucks.network import PuckNetwork
-from fakes.pucks.options import NetworkOptions
-from fakes.pucks.safety_module import PendantAction
+from fakes.ground import Container, make_terrain
+from fakes.plant import ArmPlant, Pace, PlantOptions
+from fakes.pucks import (
+    SENSOR_FORCE_ERRORS,
+    SENSOR_TORQUE_ERRORS,
+    Load,
+    NetworkOptions,
+    PendantAction,
+    PuckNetwork,
+)
 from fakes.randomness import trial_generators
-from fakes.sensor.errors import SensorErrors
-from fakes.sensor.kinds import SensorChoice, make_stream
-from fakes.sensor.port import FakeSerialPort
+from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
@@ -30,11 +29,9 @@ from fakes.world.faults import (
     network_faults,
     stream_faults,
 )
-from ft_sensor.payload import TerrainFrame
-from wam.bus.frames import SENSOR_NODE
-from wam.model.arm_model import ArmModel
-from wam.model.constants import ArmConstants, Array
-from wam.model.tool import Tool
+from ft_sensor import TerrainFrame
+from wam.bus import SENSOR_NODE
+from wam.model import ArmConstants, ArmModel, Array, Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
 LAG_NS = 600_000  # more than a cycle may be late

@@ -7,9 +7,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from ft_sensor.payload import Payload, TerrainFrame
-from wam.model.constants import Array
+from wam.model import Array
 
 
 def payload_to_toml(payload: Payload, sole: Array) -> str:

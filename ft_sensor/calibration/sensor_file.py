@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from ft_sensor.calibration.fit import Floats, SensorFit
-from wam.model.constants import Array
+from wam.model import Array
 
 _HEAVIEST = 5.0  # kg; what a wrist sensor carries
 _MOST = 200  # orientations

@@ -28,7 +28,7 @@ class ClockFit:
 
     def restart(self) -> None:
         """Forget everything: the device's clock has jumped."""
-        self._least: deque[tuple[int, int]] = deque(maxlen=SPAN)
+        self.least: deque[tuple[int, int]] = deque(maxlen=SPAN)
         self._window: tuple[int, int] | None = None  # device time and offset
         self._begun_ns = 0
         self._origin_ns = 0
@@ -49,7 +49,7 @@ class ClockFit:
             self._begun_ns = device_ns
             self._window = (device_ns, offset)
         elif device_ns - self._begun_ns >= WINDOW_NS:
-            self._least.append(window)
+            self.least.append(window)
             self._begun_ns = device_ns
             self._window = (device_ns, offset)
             self._draw_line()
@@ -69,7 +69,7 @@ class ClockFit:
     def _hold_least(self) -> None:
         """Before there is a line the least delay so far has to do."""
         assert self._window is not None
-        found = min((offset for _, offset in self._least), default=self._window[1])
+        found = min((offset for _, offset in self.least), default=self._window[1])
         self._offset_ns = float(min(found, self._window[1]))
 
     def _draw_line(self) -> None:
@@ -78,10 +78,10 @@ class ClockFit:
         Delays are only ever too long, so what stands highest above the last line goes:
         a stall does not tilt the new one.
         """
-        if len(self._least) < _FEWEST:
+        if len(self.least) < _FEWEST:
             return
-        self._origin_ns = self._least[-1][0]
-        points = np.array(self._least, dtype=np.int64)
+        self._origin_ns = self.least[-1][0]
+        points = np.array(self.least, dtype=np.int64)
         base = int(points[-1, 1])
         t = (points[:, 0] - self._origin_ns).astype(float)
         y = (points[:, 1] - base).astype(float)

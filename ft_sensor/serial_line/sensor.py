@@ -4,9 +4,7 @@ import contextlib
 from dataclasses import asdict, dataclass
 from typing import Protocol
 
-from acquisition.clock import NS_PER_S, Clock
-from acquisition.devices import WrenchSample
-from acquisition.errors import TractionError
+from acquisition import NS_PER_S, Clock, TractionError, WrenchSample
 from ft_sensor.reading import Reading, StreamTiming, Wrench
 from ft_sensor.serial_line.framing import FrameScanner, ScanCounters
 from ft_sensor.serial_line.link import PortSettings, SerialLink
@@ -91,7 +89,7 @@ class SerialSensor:
     def __init__(self, link: SerialLink, clock: Clock, device: SerialDevice) -> None:
         self._link = link
         self._clock = clock
-        self._device = device
+        self.device = device
         self._facts: dict[str, str] = {}
         self._rate = 0.0
         self._begin(device.scanner())
@@ -105,7 +103,7 @@ class SerialSensor:
             DeviceFaultError: it refused what it was told, its numbers cannot be
                 trusted, or its rate is below 495 Hz.
         """
-        device, scanner = self._device, self._device.scanner()
+        device, scanner = self.device, self.device.scanner()
         dialog = SerialDialog(self._link, self._clock, scanner)
         self._facts = device.start(dialog)
         self._rate = dialog.measure_rate(device.timing, device.line.rate_check)
@@ -155,7 +153,7 @@ class SerialSensor:
 
     def describe(self) -> dict[str, str]:
         """Return what the sensor is and how it is set up, as text."""
-        device = self._device
+        device = self.device
         return {
             **self._facts,
             "port": device.line.port,
@@ -173,11 +171,11 @@ class SerialSensor:
         """Stop the stream and give the port back; never raises."""
         # A port that is gone or closed has no stream to stop.
         with contextlib.suppress(TractionError):
-            self._link.write(self._device.stop)
+            self._link.write(self.device.stop)
         self._link.close()
 
     def _begin(self, scanner: FrameScanner[Reading]) -> None:
-        timing = self._device.timing
+        timing = self.device.timing
         self._scanner = scanner
         self._timestamper = SampleTimestamper(timing)
         self._bursts = self._reads = 0

@@ -14,7 +14,7 @@ from enum import IntFlag
 from typing import NamedTuple
 
 from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
-from ft_sensor.serial_line.framing import FrameScanner
+from ft_sensor.serial_line import FrameScanner
 
 HEADER = 0xAA
 FRAME_SIZE = 37

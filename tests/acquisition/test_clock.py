@@ -40,6 +40,10 @@ class UnevenClock(SteppedClock):
         return utc
 
 
+class Timespec(ctypes.Structure):
+    _fields_ = (("sec", ctypes.c_int64), ("nsec", ctypes.c_int64))
+
+
 def test_the_system_clock_does_not_go_back():
     clock = SystemClock()
     readings = [clock.now_ns() for _ in range(1000)]
@@ -67,7 +71,7 @@ def test_a_sleep_is_asked_for_as_an_absolute_time(monkeypatch):
     asked = []
 
     def nanosleep(clock_id, flags, deadline, rest):
-        value = deadline._obj
+        value = ctypes.cast(deadline, ctypes.POINTER(Timespec)).contents
         asked.append((clock_id, flags, value.sec, value.nsec, rest))
         return 0
 
@@ -113,8 +117,9 @@ def test_the_last_part_before_a_deadline_is_watched_not_slept(monkeypatch):
     clock = SystemClock(spin_ns=300_000)
     woken = []
 
-    def nanosleep(*_):
-        woken.append(clock._deadline.sec * 10**9 + clock._deadline.nsec)
+    def nanosleep(clock_id, flags, deadline, rest):
+        value = ctypes.cast(deadline, ctypes.POINTER(Timespec)).contents
+        woken.append(value.sec * 10**9 + value.nsec)
         return 0
 
     monkeypatch.setattr(clock, "_nanosleep", nanosleep)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-import fakes.world.rig
+import fakes.world
 from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.ipc.loop_server import LoopServer
@@ -63,13 +63,13 @@ def watch_builds(patch: pytest.MonkeyPatch) -> Built:
     """Return what will be built while `patch` lasts."""
     built = Built()
 
-    class SeenRig(fakes.world.rig.FakeRig):
+    class SeenRig(fakes.world.FakeRig):
         def __init__(self, scene, constants, tool, clock, *arguments, **named):
             super().__init__(scene, constants, tool, clock, *arguments, **named)
             built.rigs.append(self)
             built.clocks.append(clock)
 
-    patch.setattr(fakes.world.rig, "FakeRig", SeenRig)
+    patch.setattr(fakes.world, "FakeRig", SeenRig)
     patch.setattr(
         fake, "InProcessBackend", _seen(fake.InProcessBackend, built.backends)
     )

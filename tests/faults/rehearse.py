@@ -9,7 +9,7 @@ import pytest
 
 import experiments.run.runner
 import experiments.run.session
-import fakes.world.rig
+import fakes.world
 from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.guard import GuardLimits
@@ -146,7 +146,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
     """Let every simulated rig, cycle and torque frame be seen."""
     scenes: list[SimulatedScene] = []
 
-    class Rig(fakes.world.rig.FakeRig):
+    class Rig(fakes.world.FakeRig):
         def __init__(self, scene, constants, tool, clock, *arguments, **named):
             super().__init__(scene, constants, tool, clock, *arguments, **named)
             scenes.append(SimulatedScene(self, clock, patch))
@@ -175,7 +175,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
         usual_mend(simulation)
 
     patch.setattr(LocalSimulation, "clear_faults", clear_faults)
-    patch.setattr(fakes.world.rig, "FakeRig", Rig)
+    patch.setattr(fakes.world, "FakeRig", Rig)
     patch.setattr(Cycle, "__call__", call)
     return scenes
 

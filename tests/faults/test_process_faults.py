@@ -58,9 +58,10 @@ import fcntl, sys, termios
 if sys.stdout.isatty():
     fcntl.ioctl(1, termios.TIOCSCTTY, 0)
 from pathlib import Path
-from experiments.operator.prompts import AutoKeys, Prompt, RehearsedHand
+from experiments.operator import AutoOperator, Prompt
+from experiments.rig.simulation import SimulatedHand
 prompt, marker = sys.argv.pop(1), Path(sys.argv.pop(1))
-answer, follow = AutoKeys.answer, RehearsedHand.follow
+answer, follow = AutoOperator.answer, SimulatedHand.follow
 def waiting(keys, asked):
     is_last = prompt == "end" and asked.prompt is Prompt.LIFT and asked.trial == 0
     if asked.prompt.value == prompt or is_last:
@@ -72,7 +73,7 @@ def idle(hand, asked):
     is_held = prompt == "support" and asked.prompt.value == prompt
     if not is_held or marker.with_suffix(".over").exists():
         follow(hand, asked)
-AutoKeys.answer, RehearsedHand.follow = waiting, idle
+AutoOperator.answer, SimulatedHand.follow = waiting, idle
 from experiments.cli import main
 sys.exit(main())
 """

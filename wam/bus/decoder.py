@@ -9,7 +9,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
 
-from acquisition.devices import SafetyMode
+from acquisition import SafetyMode
 from wam.bus.frames import (
     HOST,
     MOTOR_NODES,

@@ -6,9 +6,8 @@ from typing import NamedTuple, Protocol
 
 import can
 
-from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
-from acquisition.errors import LinkError
-from acquisition.ipc.frame_tape import FrameTape
+from acquisition import NS_PER_S, Clock, LinkError, utc_offset_ns
+from acquisition.ipc import FrameTape
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)

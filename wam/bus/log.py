@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappushpop
 
-from acquisition.clock import NS_PER_S, Clock, utc_offset_ns
-from acquisition.errors import TractionError
+from acquisition import NS_PER_S, Clock, TractionError, utc_offset_ns
 
 LONGEST_LINE = 120  # characters
 _LINE = re.compile(

@@ -7,7 +7,7 @@ and asks here. The tables are in `puck_tables`.
 from enum import Enum, IntEnum
 from functools import cache
 
-from acquisition.errors import SettingsError
+from acquisition import SettingsError
 from wam.bus.property_tables import COMMON, MOTOR, SAFETY, SENSOR, WIDE
 
 MODERN = 61  # from here on motor and safety firmware have tables of their own

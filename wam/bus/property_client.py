@@ -1,7 +1,6 @@
 """Properties of the devices on the bus, read and set outside the loop."""
 
-from acquisition.clock import Clock
-from acquisition.errors import LinkTimeoutError
+from acquisition import Clock, LinkTimeoutError
 from wam.bus.frames import (
     HOST,
     FrameError,

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from acquisition.errors import SettingsError
-from wam.model.constants import Array, Body
-from wam.model.tool import Tool, tool_facts, tool_of
+from acquisition import SettingsError
+from wam.model import Array, Body, Tool, tool_facts, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
 _LARGEST_MOMENT = 10.0  # kg m; a Barrett arm's largest is 3

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.errors import SettingsError
-from wam.control.joint_move import TOP_SPEED, JointMove
-from wam.model.arm_model import ArmModel
-from wam.model.constants import ArmConstants, Array
-from wam.model.moments import regressor
+from acquisition import SettingsError
+from wam.control import TOP_SPEED, JointMove
+from wam.model import ArmConstants, ArmModel, Array, regressor
 
 OFFSET = 0.03  # rad; a pose is approached from this far on both sides
 APPROACH_SPEED = 0.05  # rad/s, on the last bit
@@ -23,7 +21,7 @@ _STEP = 0.04  # rad between two looks at a path
 _SLACK = 0.002  # m a path may sag below its ends
 # How far from the upright pose a candidate may be [rad]: no wild contortions. Gravity
 # does not see joint 1, so the arm is not swung about.
-_REACH = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
+REACH = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +204,7 @@ def _candidates(model: ArmModel, floor: float, count: int) -> list[Array]:
     rng = np.random.default_rng(_SEED)
     away = MARGIN + OFFSET
     constants = model.constants
-    drawn = np.array(UPRIGHT) + _REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
+    drawn = np.array(UPRIGHT) + REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
     drawn = np.clip(drawn, constants.q_lower + away, constants.q_upper - away)
     heights = np.min([lowest(model, drawn + d) for d in (-OFFSET, 0.0, OFFSET)], axis=0)
     reachable = list(drawn[heights > floor])

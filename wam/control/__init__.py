@@ -4,3 +4,7 @@
 (`joint_lock`), soft walls before the stops (`soft_walls`) and moves in joint space
 (`joint_move`). Begin with `controller`.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading, Vector
+from acquisition import ArmReading, Vector
+from acquisition.control_loop import ArmState
 from wam.control.joint_lock import JointLock, LockGains
 from wam.control.joint_move import TOP_SPEED, JointMove, joint_pd
 from wam.control.soft_walls import SoftWalls
-from wam.model.arm_model import ArmModel
-from wam.model.gravity import VirtualMass, compensation
+from wam.model import ArmModel, VirtualMass, compensation
 
 _JOINT7 = 6
 MOVE_SHARE = 0.9  # of the torque limits that a move may use, gravity included

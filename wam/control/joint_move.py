@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wam.model.constants import Array
+from wam.model import Array
 
 TOP_SPEED = 0.5  # rad/s
 ACCELERATION = 0.5  # rad/s^2

@@ -7,7 +7,7 @@ position lies on or past two stops, and an arm that starts there is not thrown o
 
 from dataclasses import dataclass
 
-from acquisition.devices import ArmReading, Vector
+from acquisition import ArmReading, Vector
 
 DEPTH = 0.1  # rad
 _REACH = 0.2  # rad in which the spring would reach the torque limit

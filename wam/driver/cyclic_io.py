@@ -6,20 +6,21 @@ Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from acquisition.clock import Clock
-from acquisition.errors import DeviceFaultError, LinkError
-from wam.bus.frames import (
+from acquisition import Clock, DeviceFaultError, LinkError
+from wam.bus import (
+    MODERN,
     MOTOR_NODES,
+    Device,
     Group,
+    Link,
     Payload,
     decode_position,
     encode_get,
     encode_torques,
     group_id,
     position_reply_id,
+    property_number,
 )
-from wam.bus.link import Link
-from wam.bus.properties import MODERN, Device, property_number
 from wam.driver.settings import ArmSettings
 from wam.driver.status_poller import StatusPoller
 from wam.driver.transmission import MOTORS

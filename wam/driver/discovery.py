@@ -2,12 +2,8 @@
 
 from collections.abc import Iterable, Sequence
 
-from acquisition.clock import Clock
-from acquisition.devices import SafetyMode
-from acquisition.errors import DeviceFaultError, PreflightError
-from wam.bus.frames import MOTOR_NODES, SAFETY_NODE
-from wam.bus.properties import PuckStatus
-from wam.bus.property_client import PropertyClient
+from acquisition import Clock, DeviceFaultError, PreflightError, SafetyMode
+from wam.bus import MOTOR_NODES, SAFETY_NODE, PropertyClient, PuckStatus
 from wam.driver.safety_module import SafetyModule
 
 _STAT = 5  # the same in every firmware

@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from acquisition.clock import NS_PER_S
-from wam.bus.frames import MOTOR_NODES, Property
-from wam.bus.properties import Device, property_number
+from acquisition import NS_PER_S
+from wam.bus import MOTOR_NODES, Device, Property, property_number
 
 # The loop asks each puck something every 0.7 s; four questions without an answer and
 # what it said before is no longer news.

@@ -6,12 +6,8 @@ The host may only ask it to go down; up is the pendant's business.
 from dataclasses import dataclass
 from enum import IntEnum
 
-from acquisition.clock import Clock
-from acquisition.devices import SafetyMode
-from acquisition.errors import DeviceFaultError, LinkError
-from wam.bus.frames import SAFETY_NODE
-from wam.bus.properties import Device, property_number
-from wam.bus.property_client import PropertyClient
+from acquisition import Clock, DeviceFaultError, LinkError, SafetyMode
+from wam.bus import SAFETY_NODE, Device, PropertyClient, property_number
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
 WARNING_SHARE = 0.9  # of the fault's value, where no warning is given

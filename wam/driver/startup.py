@@ -5,28 +5,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.clock import Clock
-from acquisition.devices import SafetyMode
-from acquisition.errors import DeviceFaultError, PreflightError
-from wam.bus.frames import MOTOR_NODES, SAFETY_NODE, Group
-from wam.bus.properties import (
+from acquisition import Clock, DeviceFaultError, PreflightError, SafetyMode
+from wam.bus import (
     MAGNETIC_ENCODER,
     MODERN,
+    MOTOR_NODES,
     OLDEST_DRIVEN,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
+    SAFETY_NODE,
     Device,
+    Group,
+    PropertyClient,
     PuckMode,
     PuckStatus,
     device_of,
     property_number,
 )
-from wam.bus.property_client import PropertyClient
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.safety_module import PendantWord, SafetyModule
 from wam.driver.settings import ArmSettings
-from wam.model.constants import Array
+from wam.model import Array
 
 LARGEST = 0.03  # rad; by eye an arm is put against its stops to about a degree
 

@@ -6,18 +6,20 @@ Half a millisecond of a 2 ms cycle is free on the bus; a question and its answer
 
 from typing import Final
 
-from acquisition.devices import SafetyMode
-from wam.bus.frames import (
+from acquisition import SafetyMode
+from wam.bus import (
+    MODERN,
     MOTOR_NODES,
     SAFETY_NODE,
+    Device,
+    Link,
     Payload,
     decode_reply,
     encode_get,
     encode_set,
+    property_number,
     property_reply_id,
 )
-from wam.bus.link import Link
-from wam.bus.properties import MODERN, Device, property_number
 from wam.driver.health import HealthTable
 from wam.driver.safety_module import PendantWord, decode_mode, decode_pendant
 from wam.driver.settings import ArmSettings

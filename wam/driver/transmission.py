@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.devices import Vector
-from acquisition.errors import DeviceFaultError, SettingsError
+from acquisition import DeviceFaultError, SettingsError, Vector
 
 MOTORS = 7
 # The smaller of the cable's limit (MT) and nine tenths of the safety module's warning.

@@ -14,8 +14,7 @@ from pydantic import (
     model_validator,
 )
 
-from acquisition.errors import SettingsError
-from acquisition.settings import SettingsSection
+from acquisition import SettingsError, SettingsSection
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]

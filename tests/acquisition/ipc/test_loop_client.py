@@ -13,7 +13,7 @@ STOPPED = verdict_for(Fault.FT_STALE, ForceAge(26.0, 20.0))
 
 
 class Room:
-    """A desk whose loop obeys every command, or does not."""
+    """A client whose loop obeys every command, or none."""
 
     def __init__(self):
         self.clock = SteppedClock()

@@ -46,13 +46,13 @@ import json, resource, sys, time
 from pathlib import Path
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.recover import recover
+from acquisition.trial_file.recover import recover_file
 pages = int(Path("/proc/self/statm").read_text().split()[0])
 limit = pages * resource.getpagesize() + int(sys.argv[1])
 resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 for path in map(Path, sys.argv[2:]):
     said = {"name": path.stem}
-    for job in (lambda p: TrialReader(p).cycles(), recover):
+    for job in (lambda p: TrialReader(p).cycles(), recover_file):
         start = time.process_time()
         try:
             job(path)
@@ -61,7 +61,7 @@ for path in map(Path, sys.argv[2:]):
         else:
             reason = None
         seconds = time.process_time() - start
-        said["recover" if job is recover else "read"] = [reason, seconds]
+        said["recover" if job is recover_file else "read"] = [reason, seconds]
     print(json.dumps(said))
 """
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import fakes.world.rig
+import fakes.world
 from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
 from experiments.calibrating import pose_walk as walk
@@ -37,7 +37,7 @@ def perturbed(constants):
     return replace(constants, links=links)
 
 
-class HeavierRig(fakes.world.rig.FakeRig):
+class HeavierRig(fakes.world.FakeRig):
     """A rig whose arm weighs otherwise than the drawings say."""
 
     made: ClassVar[list["HeavierRig"]] = []
@@ -57,13 +57,13 @@ def calibrate(out, *options, press=None, is_quick=True):
     goes less far and stops for a shorter time than a real one may.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world.rig, "FakeRig", HeavierRig)
+        patch.setattr(fakes.world, "FakeRig", HeavierRig)
         if is_quick:
             patch.setattr(walk, "SETTLE", 0.1)
             patch.setattr(gravity, "AVERAGE", 0.1)
             patch.setattr(calibration_poses, "POINT_SPEED", 0.6)
             patch.setattr(calibration_poses, "APPROACH_SPEED", 0.1)
-            patch.setattr(calibration_poses, "_REACH", 0.6 * calibration_poses._REACH)
+            patch.setattr(calibration_poses, "REACH", 0.6 * calibration_poses.REACH)
         if press is not None:
             usual = AutoOperator.answer
 

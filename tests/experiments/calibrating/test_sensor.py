@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import fakes.world
 import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
@@ -35,7 +36,7 @@ QUICK = ("--fake", "--fast", "--operator-script", "auto")
 MASS, COM, ANGLE = 0.62, np.array([0.014, -0.006, 0.055]), np.radians(25.0)
 
 
-class OtherRig(fakes.world.rig.FakeRig):
+class OtherRig(fakes.world.FakeRig):
     """A rig whose sensor is turned and whose foot weighs otherwise than rig.toml says.
 
     The sensor reads the reaction, too.
@@ -60,7 +61,7 @@ class DriftingErrors(SensorErrors):
 
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world.rig, "FakeRig", rig)
+        patch.setattr(fakes.world, "FakeRig", rig)
         patch.setattr(fakes.world.rig, "SensorErrors", errors)
         patch.setattr(walk, "SETTLE", 0.2)
         patch.setattr(sensor, "AVERAGE", 0.4)
@@ -154,7 +155,7 @@ def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated)
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
     config = write_config(tmp_path, rig=change)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world.rig, "FakeRig", OtherRig)
+        patch.setattr(fakes.world, "FakeRig", OtherRig)
         patch.setattr(OtherRig, "is_in_the_air", False)
         done = run_short(config, tmp_path / "data")
     assert done.code == 0, done.err
@@ -232,7 +233,7 @@ def test_a_touched_plate_gives_incline_and_heading(tmp_path):
     assert "0.0 mm rms off the plane" in done.out
 
 
-class TiltedRig(fakes.world.rig.FakeRig):
+class TiltedRig(fakes.world.FakeRig):
     """A rig whose container is two degrees steeper than the matrix says."""
 
     def __init__(self, scene, *rest, **options):
@@ -242,7 +243,7 @@ class TiltedRig(fakes.world.rig.FakeRig):
 
 def test_a_container_that_is_inclined_otherwise_is_refused(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world.rig, "FakeRig", TiltedRig)
+        patch.setattr(fakes.world, "FakeRig", TiltedRig)
         done, out = touch(tmp_path, "S10")
         assert done.code == 2
         assert "the matrix says 10.0 (limit 1.0)" in done.err

@@ -15,6 +15,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
+from experiments import settings
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS
 from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
@@ -26,7 +27,6 @@ from experiments.run import tare as taring
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
-from experiments.settings import load as settings
 from ft_sensor import tare
 from tests.experiments.built import Built, watch_builds
 from tests.experiments.program import (

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import Action, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
 from experiments.operator.prompts import Prompt

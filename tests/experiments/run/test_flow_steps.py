@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from acquisition.control_loop.guard import Action, GuardVerdict
+from acquisition.control_loop.faults import Action, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from experiments.operator.keys import REJECT_REASONS
 from experiments.run.console_loop import TICK

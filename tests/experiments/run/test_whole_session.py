@@ -49,8 +49,8 @@ def digests(folder):
 
 def shorten(monkeypatch):
     """Let every push end by key before the foot has crossed the container, at once."""
-    for module in ("operator", "scripted"):
-        monkeypatch.setattr(f"experiments.{module}.READY_SECONDS", 0.1)
+    for module in ("prompts", "scripted"):
+        monkeypatch.setattr(f"experiments.operator.{module}.READY_SECONDS", 0.1)
     usual = AutoOperator.answer
 
     def answer(self, asked):

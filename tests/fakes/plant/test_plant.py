@@ -336,9 +336,9 @@ def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, tim
     plant.q[6] = CONSTANTS.q_upper[6] - away
     release(plant)
     taken = []
-    at = plant._resistance.at
+    at = plant.resistance.at
     monkeypatch.setattr(
-        plant._resistance, "at", lambda *state: taken.append(0) or at(*state)
+        plant.resistance, "at", lambda *state: taken.append(0) or at(*state)
     )
     plant.advance(plant.t_ns + CYCLE_NS)
     assert len(taken) == times  # at the beginning of the cycle, and in four substeps

@@ -106,6 +106,6 @@ def test_no_session_begins_with_an_offset_that_its_tares_would_be_refused_for():
     sizes = []
     for seed in range(2000):
         errors = SensorErrors(np.random.default_rng(seed))
-        sizes.append(np.linalg.norm(errors._offset[:3]))
+        sizes.append(np.linalg.norm(errors.offset[:3]))
     assert max(sizes) == pytest.approx(3.5 * FORCE_ERRORS.bias)
     assert np.median(sizes) == pytest.approx(1.54 * FORCE_ERRORS.bias, rel=0.05)

@@ -83,7 +83,7 @@ def test_a_day_needs_no_more_memory_than_a_minute():
     for k in range(86_400 // 10):  # a message every 10 s shows the arithmetic
         t = 10 * k * S
         fit.offer(t, t + 30_000 + (k * 7919) % 1_000_000)
-    assert len(fit._least) == 32
-    assert sys.getsizeof(fit._least) < 2000
+    assert len(fit.least) == 32
+    assert sys.getsizeof(fit.least) < 2000
     end = 86_400 * S
     assert abs(fit.host_ns(end) - end) < 700_000  # one message per window

@@ -231,7 +231,7 @@ def test_newest_sample_is_one_wire_time_before_its_arrival():
 
 def test_true_sampling_time_is_within_one_period_before_the_date():
     bench = Bench().opened()
-    start = bench.device._on_since_ns
+    start = bench.device.on_since_ns
     for sample in bench.run(100 * MS):
         late = sample.t_ns - (start + sample.counter * 1000)
         assert -1000 <= late <= 1_250_000  # the counter shows whole microseconds

@@ -180,14 +180,14 @@ def test_a_failing_sensor_is_refused_at_the_start():
 
 def test_firmware_of_the_older_protocol_is_named():
     bench = SensorBench("optoforce", is_deaf=True)
-    bench.device._firmware.frame = lambda shown, status: bytes((55, 67)) + bytes(20)
+    bench.device.firmware.frame = lambda shown, status: bytes((55, 67)) + bytes(20)
     with pytest.raises(DeviceFaultError, match="older protocol"):
         bench.sensor.open()
 
 
 def test_a_sensor_without_serial_number_is_refused():
     bench = SensorBench("optoforce")
-    bench.device._firmware.receive = lambda t_ns, data: (
+    bench.device.firmware.receive = lambda t_ns, data: (
         []
         if data == optoforce.ASK_SERIAL
         else [(t_ns + MS, optoforce.encode_configuration_answer(0))]

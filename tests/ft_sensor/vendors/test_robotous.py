@@ -174,7 +174,7 @@ def test_a_new_sensor_is_told_to_speak_faster_and_its_power_to_be_cycled():
     driver = RobotousDevice(
         PortSettings("/dev/sensor", 115200, 0.25), RobotousSettings()
     )
-    bench.sensor._device = driver
+    bench.sensor.device = driver
     with pytest.raises(DeviceFaultError, match="921600 baud from its next") as error:
         bench.sensor.open()
     assert "Cycle its power and set baudrate = 921600" in error.value.hint

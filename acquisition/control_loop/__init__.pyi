@@ -1,0 +1,43 @@
+from .cycle import Cycle, CycleOutputs
+from .faults import (
+    CircuitCauses,
+    Fault,
+    GuardVerdict,
+    ReplySilence,
+    from_plain,
+    to_plain,
+    verdict_for,
+)
+from .guard import GuardLimits
+from .loop import Loop, LoopStats, Tick
+from .realtime import Grant, RealtimeRequest, choose_cores, die_with_parent, request
+from .states import ArmState, ControlStatus, transition_lines
+from .timing import SLOW_EXCHANGE_NS, LoopReport, loop_report, pack_timing
+
+__all__ = [
+    "SLOW_EXCHANGE_NS",
+    "ArmState",
+    "CircuitCauses",
+    "ControlStatus",
+    "Cycle",
+    "CycleOutputs",
+    "Fault",
+    "Grant",
+    "GuardLimits",
+    "GuardVerdict",
+    "Loop",
+    "LoopReport",
+    "LoopStats",
+    "RealtimeRequest",
+    "ReplySilence",
+    "Tick",
+    "choose_cores",
+    "die_with_parent",
+    "from_plain",
+    "loop_report",
+    "pack_timing",
+    "request",
+    "to_plain",
+    "transition_lines",
+    "verdict_for",
+]

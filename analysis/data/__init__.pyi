@@ -1,0 +1,51 @@
+from .events import Slip, find_slips
+from .load import Frame, RecordedTrial, load_trial
+from .prepare import (
+    MINIMUM_KEPT,
+    MINIMUM_TRAVEL_SHARE,
+    PreparedTrial,
+    PrepareOptions,
+    Smoothed,
+    moving_average,
+    prepare_trial,
+)
+from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, suggest
+from .samples import SampleTable, TrainingSet
+from .series import Array, Indices, TractionSeries
+from .tables import load_tables, parse_columns, parse_stones
+from .terrain_kinds import BIG, FLAT, LEVELS, SMALL, groups_of, kind_title, terrain_kind
+
+__all__ = [
+    "BIG",
+    "FLAT",
+    "JOINT7_WARNING",
+    "LEVELS",
+    "MINIMUM_KEPT",
+    "MINIMUM_TRAVEL_SHARE",
+    "SMALL",
+    "Array",
+    "CoverageGrid",
+    "Frame",
+    "Indices",
+    "PrepareOptions",
+    "PreparedTrial",
+    "RecordedTrial",
+    "SampleTable",
+    "Slip",
+    "Smoothed",
+    "TractionSeries",
+    "TrainingSet",
+    "coverage",
+    "find_slips",
+    "groups_of",
+    "kind_title",
+    "load_tables",
+    "load_trial",
+    "moving_average",
+    "parse_columns",
+    "parse_stones",
+    "prepare_trial",
+    "quick_ratio",
+    "suggest",
+    "terrain_kind",
+]

@@ -1,0 +1,20 @@
+# pyright: reportUnknownVariableType=false
+from . import confusion, curves, errors, rig, surfaces, trials, uncertainty
+from .sections import ReportSection
+from .spec import FigureSpec
+from .style import Picture, render, styled
+
+__all__ = [
+    "FigureSpec",
+    "Picture",
+    "ReportSection",
+    "confusion",
+    "curves",
+    "errors",
+    "render",
+    "rig",
+    "styled",
+    "surfaces",
+    "trials",
+    "uncertainty",
+]

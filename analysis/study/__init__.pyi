@@ -1,0 +1,72 @@
+from .atomic_files import write_atomic
+from .crossval import FoldResult, ModelFold, plan_folds, run_fold
+from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
+from .fold_store import ResultStore
+from .jobs import Store, Workers, available_cores, run_tasks
+from .metrics import PairedComparison, Prediction, compare
+from .models import (
+    FITTERS,
+    GP_NN,
+    GP_NN_TUSTIN,
+    GP_SE,
+    GP_SE_NOISE,
+    GP_SE_TUSTIN,
+    TITLES,
+    TUSTIN,
+    FitOptions,
+    FittedModel,
+    GpModel,
+    ModelFitter,
+    TustinModel,
+)
+from .noise_selection import NAMES
+from .study import (
+    LIFTED_WARNING,
+    Study,
+    StudyOptions,
+    TerrainResult,
+    mean_of,
+    run_study,
+)
+
+__all__ = [
+    "FITTERS",
+    "GP_NN",
+    "GP_NN_TUSTIN",
+    "GP_SE",
+    "GP_SE_NOISE",
+    "GP_SE_TUSTIN",
+    "LIFTED_WARNING",
+    "NAMES",
+    "TITLES",
+    "TUSTIN",
+    "CsvRow",
+    "FitOptions",
+    "FittedModel",
+    "FoldResult",
+    "GpModel",
+    "ModelFitter",
+    "ModelFold",
+    "PairedComparison",
+    "Prediction",
+    "ResultStore",
+    "Store",
+    "Study",
+    "StudyOptions",
+    "TerrainResult",
+    "TustinModel",
+    "Workers",
+    "available_cores",
+    "compare",
+    "flag_counts",
+    "mean_of",
+    "plan_folds",
+    "run_fold",
+    "run_study",
+    "run_tasks",
+    "to_csv",
+    "to_fits",
+    "to_plain",
+    "tustin_medians",
+    "write_atomic",
+]

@@ -1,0 +1,15 @@
+from .database import load
+from .export import database_of
+from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
+from .recognition import Recognition, recognise
+
+__all__ = [
+    "KEPT_PER_SECOND",
+    "Confusion",
+    "Identification",
+    "Recognition",
+    "database_of",
+    "identify_study",
+    "load",
+    "recognise",
+]

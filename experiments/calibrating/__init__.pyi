@@ -1,0 +1,11 @@
+from .gravity import GravityGuide
+from .pose_walk import guided
+from .sensor import SensorGuide
+from .terrain import TerrainGuide
+
+__all__ = [
+    "GravityGuide",
+    "SensorGuide",
+    "TerrainGuide",
+    "guided",
+]

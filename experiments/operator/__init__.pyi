@@ -1,0 +1,46 @@
+from .console import BAD, GOOD, WARNING, Console
+from .double_tap import FootKeys
+from .feedback import FeedbackSignal, OperatorFeedback, build_feedback
+from .keys import NOTE_KEYS, REJECT_REASONS, KeyAction, key_action, screen_keys
+from .prompts import OperatorInput, Prompt, PromptState
+from .screens import (
+    EndView,
+    ReadyView,
+    RecordingView,
+    end_lines,
+    live_line,
+    ready_lines,
+    recording_lines,
+)
+from .scripted import choose_operator
+from .terminal import TerminalInput, keyboard, wait_for_key
+
+__all__ = [
+    "BAD",
+    "GOOD",
+    "NOTE_KEYS",
+    "REJECT_REASONS",
+    "WARNING",
+    "Console",
+    "EndView",
+    "FeedbackSignal",
+    "FootKeys",
+    "KeyAction",
+    "OperatorFeedback",
+    "OperatorInput",
+    "Prompt",
+    "PromptState",
+    "ReadyView",
+    "RecordingView",
+    "TerminalInput",
+    "build_feedback",
+    "choose_operator",
+    "end_lines",
+    "key_action",
+    "keyboard",
+    "live_line",
+    "ready_lines",
+    "recording_lines",
+    "screen_keys",
+    "wait_for_key",
+]

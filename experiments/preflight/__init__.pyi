@@ -1,0 +1,24 @@
+from .conditions import (
+    check_conditions,
+    rig_conditions,
+    sensor_conditions,
+    write_conditions,
+)
+from .foot_check import confirm_foot, last_foot
+from .host_checks import free_bytes
+from .preflight import LOOP_TEST, Preflight, connect_rig, run_preflight, start_devices
+
+__all__ = [
+    "LOOP_TEST",
+    "Preflight",
+    "check_conditions",
+    "confirm_foot",
+    "connect_rig",
+    "free_bytes",
+    "last_foot",
+    "rig_conditions",
+    "run_preflight",
+    "sensor_conditions",
+    "start_devices",
+    "write_conditions",
+]

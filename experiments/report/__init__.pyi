@@ -1,0 +1,23 @@
+from .export import export_sessions
+from .playback import play
+from .progress import fitting
+from .sessions import (
+    REPORTED,
+    ReportRequest,
+    choose_sessions,
+    export_terrains,
+    report_sessions,
+)
+from .truth_errors import compare_with_truth
+
+__all__ = [
+    "REPORTED",
+    "ReportRequest",
+    "choose_sessions",
+    "compare_with_truth",
+    "export_sessions",
+    "export_terrains",
+    "fitting",
+    "play",
+    "report_sessions",
+]

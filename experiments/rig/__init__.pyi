@@ -1,0 +1,23 @@
+from .backend import EXCHANGE_CYCLES
+from .bus_log import logging_bus, open_bus_log
+from .fake import build_sensor_server, build_server
+from .gravity import gravity_path, gravity_words, read_gravity
+from .processes import MultiProcessBackend
+from .rig import FakeOptions, Rig, build_rig
+from .simulation import SimulatedHand
+
+__all__ = [
+    "EXCHANGE_CYCLES",
+    "FakeOptions",
+    "MultiProcessBackend",
+    "Rig",
+    "SimulatedHand",
+    "build_rig",
+    "build_sensor_server",
+    "build_server",
+    "gravity_path",
+    "gravity_words",
+    "logging_bus",
+    "open_bus_log",
+    "read_gravity",
+]

@@ -1,0 +1,26 @@
+from .activation import activate
+from .console_loop import TICK, ConsoleLoop
+from .resume import ResumeRequest, close, redo, resume_request, resume_session
+from .resume_prompt import ResumeChoice, choose_resume
+from .session import OpenMode, SessionRequest, run_session
+from .stop import ArmFaultError, StopFlag, StopRequestedError, handle_signals
+
+__all__ = [
+    "TICK",
+    "ArmFaultError",
+    "ConsoleLoop",
+    "OpenMode",
+    "ResumeChoice",
+    "ResumeRequest",
+    "SessionRequest",
+    "StopFlag",
+    "StopRequestedError",
+    "activate",
+    "choose_resume",
+    "close",
+    "handle_signals",
+    "redo",
+    "resume_request",
+    "resume_session",
+    "run_session",
+]

@@ -1,0 +1,75 @@
+from .annotations import (
+    LONGEST_TEXT,
+    add_note,
+    change_verdict,
+    clean_text,
+    looks_like_trial,
+    parse_trial,
+    trial_path,
+)
+from .crash_recovery import recover_session
+from .journal import Journal, open_journal
+from .lock import LOCK_FILE, session_lock, sign
+from .matrix_board import DigestCache, MatrixRow, count_board, next_steps, parse_where
+from .reducer import KEEP, refusal
+from .sidecar import TrialOutcome, sidecar_of
+from .states import Event, SessionPhase, table_lines
+from .store import (
+    SessionFolder,
+    create_session,
+    find_session,
+    iso_utc,
+    list_sessions,
+    read_json,
+    session_utc_ns,
+    sha256_of,
+    write_json,
+    write_new_text,
+    write_text,
+)
+from .trial_files import add_remark
+from .trial_name import TrialName
+from .unfinished import UnfinishedSession, find_unfinished
+
+__all__ = [
+    "KEEP",
+    "LOCK_FILE",
+    "LONGEST_TEXT",
+    "DigestCache",
+    "Event",
+    "Journal",
+    "MatrixRow",
+    "SessionFolder",
+    "SessionPhase",
+    "TrialName",
+    "TrialOutcome",
+    "UnfinishedSession",
+    "add_note",
+    "add_remark",
+    "change_verdict",
+    "clean_text",
+    "count_board",
+    "create_session",
+    "find_session",
+    "find_unfinished",
+    "iso_utc",
+    "list_sessions",
+    "looks_like_trial",
+    "next_steps",
+    "open_journal",
+    "parse_trial",
+    "parse_where",
+    "read_json",
+    "recover_session",
+    "refusal",
+    "session_lock",
+    "session_utc_ns",
+    "sha256_of",
+    "sidecar_of",
+    "sign",
+    "table_lines",
+    "trial_path",
+    "write_json",
+    "write_new_text",
+    "write_text",
+]

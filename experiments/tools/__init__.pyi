@@ -1,0 +1,19 @@
+from .acceptance import AcceptancePlan, analyse, as_plain, record_study
+from .bench import BenchReport, run_bench
+from .pendant import PRESSES, Lines, Pendant, Press, Pressable, TimedPress, parse_script
+
+__all__ = [
+    "PRESSES",
+    "AcceptancePlan",
+    "BenchReport",
+    "Lines",
+    "Pendant",
+    "Press",
+    "Pressable",
+    "TimedPress",
+    "analyse",
+    "as_plain",
+    "parse_script",
+    "record_study",
+    "run_bench",
+]

@@ -1,0 +1,17 @@
+from .errors import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
+from .kinds import SensorChoice, make_stream
+from .port import FakeSerialPort
+from .pty import SerialPty
+from .stream import SensorStream, Source
+
+__all__ = [
+    "FORCE_ERRORS",
+    "TORQUE_ERRORS",
+    "FakeSerialPort",
+    "SensorChoice",
+    "SensorErrors",
+    "SensorStream",
+    "SerialPty",
+    "Source",
+    "make_stream",
+]

@@ -1,0 +1,14 @@
+from .puck_server import HomePose, PuckServer, build_home_server, open_can_port
+from .rig_process import scene_of
+from .sensor_server import SensorLine, SensorServer, hanging_load
+
+__all__ = [
+    "HomePose",
+    "PuckServer",
+    "SensorLine",
+    "SensorServer",
+    "build_home_server",
+    "hanging_load",
+    "open_can_port",
+    "scene_of",
+]

@@ -1,0 +1,7 @@
+from .rig import FakeRig, LocalSimulation, SimulatedScene
+
+__all__ = [
+    "FakeRig",
+    "LocalSimulation",
+    "SimulatedScene",
+]

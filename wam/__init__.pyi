@@ -1,0 +1,9 @@
+from . import bus, calibration, control, driver, model
+
+__all__ = [
+    "bus",
+    "calibration",
+    "control",
+    "driver",
+    "model",
+]

@@ -1,0 +1,27 @@
+from .gravity_file import (
+    GravityCalibration,
+    fits_tool,
+    gravity_from_toml,
+    gravity_to_toml,
+)
+from .poses import (
+    APPROACH_SPEED,
+    MeasurementPose,
+    choose_orientations,
+    choose_poses,
+    plan_halts,
+    way_seconds,
+)
+
+__all__ = [
+    "APPROACH_SPEED",
+    "GravityCalibration",
+    "MeasurementPose",
+    "choose_orientations",
+    "choose_poses",
+    "fits_tool",
+    "gravity_from_toml",
+    "gravity_to_toml",
+    "plan_halts",
+    "way_seconds",
+]

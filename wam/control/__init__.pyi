@@ -1,0 +1,13 @@
+from .controller import FootController
+from .joint_lock import LockGains
+from .joint_move import TOP_SPEED, JointMove
+from .soft_walls import SoftWalls, Walls
+
+__all__ = [
+    "TOP_SPEED",
+    "FootController",
+    "JointMove",
+    "LockGains",
+    "SoftWalls",
+    "Walls",
+]

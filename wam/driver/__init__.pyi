@@ -1,0 +1,33 @@
+from .arm import WamArm
+from .health import complaints, health_facts, temperature_range
+from .safety_module import (
+    COUNTS_PER_SPEED,
+    MONITORS,
+    WARNING_SHARE,
+    PendantButton,
+    PendantWord,
+    SafetyLevel,
+    SafetyLimits,
+    encode_pendant,
+)
+from .settings import ArmSettings
+from .startup import ArmInfo, check_home, home_error
+
+__all__ = [
+    "COUNTS_PER_SPEED",
+    "MONITORS",
+    "WARNING_SHARE",
+    "ArmInfo",
+    "ArmSettings",
+    "PendantButton",
+    "PendantWord",
+    "SafetyLevel",
+    "SafetyLimits",
+    "WamArm",
+    "check_home",
+    "complaints",
+    "encode_pendant",
+    "health_facts",
+    "home_error",
+    "temperature_range",
+]

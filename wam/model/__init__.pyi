@@ -1,0 +1,30 @@
+# pyright: reportUnknownVariableType=false
+from .arm_model import ArmModel, add_point, build_pinocchio, drive_inertia_matrix, urdf
+from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
+from .gravity import VirtualMass, compensation, gravity_model
+from .moments import MomentFit, check_fit, fit_moments, regressor
+from .tool import Tool, sensor_body, tool_facts, tool_of
+
+__all__ = [
+    "GRAVITY",
+    "ArmConstants",
+    "ArmModel",
+    "Array",
+    "Body",
+    "MomentFit",
+    "Tool",
+    "VirtualMass",
+    "add_point",
+    "build_pinocchio",
+    "check_fit",
+    "compensation",
+    "drive_inertia_matrix",
+    "fit_moments",
+    "gravity_model",
+    "load_constants",
+    "regressor",
+    "sensor_body",
+    "tool_facts",
+    "tool_of",
+    "urdf",
+]
