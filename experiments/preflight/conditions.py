@@ -12,6 +12,7 @@ from experiments.operator import WARNING, Console
 from experiments.rig import Rig
 from experiments.session import SessionFolder, read_json, write_json
 from experiments.settings import RigSettings, TerrainRow, flatten
+from ft_sensor.vendors import SECTIONS
 
 FILE = "conditions.json"
 VERSION = 2  # of the file; 1 had no number
@@ -68,15 +69,18 @@ def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
     }
 
 
-def default_conditions() -> dict[str, str]:
+def default_conditions(sensor_kind: str = "") -> dict[str, str]:
     """Return the conditions of settings that are left out, by name.
 
     A setting that a session of an older version does not have had this value then.
+
+    Args:
+        sensor_kind: `ft_sensor.kind`, whose section has the sensor's defaults.
     """
-    defaults = {
-        "rig": _defaults(RigSettings),
-        "terrain": _defaults(TerrainRow),
-    }
+    rig = _defaults(RigSettings)
+    if sensor_kind in SECTIONS:
+        rig["ft_sensor"] = _defaults(SECTIONS[sensor_kind])
+    defaults = {"rig": rig, "terrain": _defaults(TerrainRow)}
     return {**_texts(defaults), _GRAVITY: _NO_GRAVITY}
 
 
@@ -103,7 +107,7 @@ def differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:
     A condition that was not written then had its default value. One that is not known
     any more is left out: no setting can bring it back.
     """
-    before = {**default_conditions(), **then}
+    before = {**default_conditions(now.get("rig.ft_sensor.kind", "")), **then}
     return [
         f"{name} was {before.get(name, 'not there')}, is {value}"
         for name, value in now.items()

@@ -2,11 +2,12 @@ from . import bota, optoforce, robotous
 from .barrett import BarrettSensor
 from .bota import Acknowledgement, BootText, BotaFrame
 from .optoforce import OptoForceFrame
-from .registry import AnySensor
+from .registry import SECTIONS, AnySensor
 from .robotous import MODELS, RobotousFrame
 
 __all__ = [
     "MODELS",
+    "SECTIONS",
     "Acknowledgement",
     "AnySensor",
     "BarrettSensor",

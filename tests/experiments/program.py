@@ -90,7 +90,7 @@ class Watched:
 def run_watched(config, data, *arguments, press=None):
     """Run a session and keep hold of the simulated rig.
 
-    `press(asked, rig)` returns the key pressed, or None for what AutoOperator would press.
+    `press(asked, rig)` returns the key pressed, or None to leave it to AutoOperator.
     """
     with pytest.MonkeyPatch.context() as patch:
         built = watch_builds(patch)

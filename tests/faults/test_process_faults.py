@@ -58,7 +58,7 @@ import fcntl, sys, termios
 if sys.stdout.isatty():
     fcntl.ioctl(1, termios.TIOCSCTTY, 0)
 from pathlib import Path
-from experiments.operator import AutoOperator, Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.rig.simulation import SimulatedHand
 prompt, marker = sys.argv.pop(1), Path(sys.argv.pop(1))
 answer, follow = AutoOperator.answer, SimulatedHand.follow

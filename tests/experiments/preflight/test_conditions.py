@@ -98,6 +98,14 @@ def test_what_no_number_depends_on_has_no_default_either():
     assert not [name for name in DEFAULTS if name.startswith("rig.operator.")]
 
 
-def test_optional_settings_are_compared_as_they_are_written():
-    assert DEFAULTS["rig.ft_sensor.calibration"] == "None"
-    assert differences({}, {"rig.ft_sensor.sinc": "64"}) == []
+def test_optional_settings_of_the_sensor_in_use_are_compared_as_they_are_written():
+    assert default_conditions("bota")["rig.ft_sensor.calibration"] == "None"
+    now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "None"}
+    assert differences({"rig.ft_sensor.kind": "bota"}, now) == []
+    assert differences({"rig.ft_sensor.sinc": "64"}, {}) == []
+
+
+def test_a_default_of_the_sensor_that_was_changed_since_is_named():
+    now = {"rig.ft_sensor.kind": "bota", "rig.ft_sensor.calibration": "other.toml"}
+    (text,) = differences({"rig.ft_sensor.kind": "bota"}, now)
+    assert "rig.ft_sensor.calibration" in text

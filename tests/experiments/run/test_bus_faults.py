@@ -65,7 +65,7 @@ SILENT = {"puck-silent", "puck-reboot", "bus-off", "can-silence"}
 
 
 def hurry(asked):
-    """Press the keys that make a session short; None where AutoOperator knows better."""
+    """Press the keys of a short session; None leaves it to AutoOperator."""
     if asked.prompt is Prompt.READY:
         return " " if asked.since > 0.1 else ""
     return None

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from acquisition.control_loop.faults import Action, GuardVerdict
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from acquisition.errors import SessionError
 from experiments.operator.prompts import Prompt
@@ -14,8 +14,8 @@ from experiments.session.trial_name import TrialName
 from tests.experiments.run.bench import Keys, make_loop
 
 NAME = TrialName(3, 2)
-STANDING = GuardVerdict(Action.HOLD, "joint-limit")
-WORSE = GuardVerdict(Action.IDLE, "estop")
+STANDING = GuardVerdict(Action.HOLD, Fault.JOINT_LIMIT)
+WORSE = GuardVerdict(Action.IDLE, Fault.E_STOP)
 
 
 def test_a_tick_lets_20_ms_pass_and_returns_the_key():

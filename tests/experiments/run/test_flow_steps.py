@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from acquisition.control_loop.faults import Action, GuardVerdict
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
 from experiments.operator.keys import REJECT_REASONS
 from experiments.run.console_loop import TICK
@@ -101,7 +101,7 @@ def test_quit_at_the_review_rejects_the_trial_and_ends(tmp_path):
 def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, capsys):
     context = make_context(tmp_path, Keys("k"))
     outcome = reviewed(context)
-    context.loop_client.status.verdict = GuardVerdict(Action.HOLD, "console-silent")
+    context.loop_client.status.verdict = GuardVerdict(Action.HOLD, Fault.CONSOLE_SILENT)
     ask_verdict(context, FIRST, outcome)
     assert context.journal.state.kept == (1,)
     assert "ARM: holding" in capsys.readouterr().err
@@ -110,7 +110,7 @@ def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, 
 def test_a_fault_that_takes_the_arm_away_rejects_the_trial(tmp_path):
     context = make_context(tmp_path, Keys())
     outcome = reviewed(context)
-    context.loop_client.status.verdict = GuardVerdict(Action.IDLE, "estop")
+    context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
     with pytest.raises(ArmFaultError):
         ask_verdict(context, FIRST, outcome)
     assert names(context)[-1] == Event.TRIAL_REJECTED

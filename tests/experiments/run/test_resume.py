@@ -40,7 +40,7 @@ def digests(folder):
 
 
 def short(asked):
-    """End a recording at once and keep it; None where AutoOperator knows better."""
+    """End a recording at once and keep it; None leaves it to AutoOperator."""
     if asked.prompt is Prompt.RECORDING:
         return " " if asked.since > 0.3 else ""
     return "k" if asked.prompt is Prompt.REVIEW else None

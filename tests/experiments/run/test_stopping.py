@@ -12,7 +12,7 @@ from tests.experiments.program import journal, run_watched, sidecar
 
 
 def short_trial(asked):
-    """End a recording at once and keep it; None where AutoOperator knows better."""
+    """End a recording at once and keep it; None leaves it to AutoOperator."""
     if asked.prompt is Prompt.RECORDING:
         return " " if asked.since > 0.3 else ""
     return "k" if asked.prompt is Prompt.REVIEW else None
