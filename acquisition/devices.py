@@ -95,6 +95,11 @@ class Arm(Protocol):
         """Return the last known state of the safety circuit; does not wait."""
         ...
 
+    @property
+    def safety_heard_ns(self) -> int:
+        """Return when the safety circuit last told its state [ns], 0 = never."""
+        ...
+
     def safety_warnings(self) -> tuple[str, ...]:
         """Return the monitors that warn, such as "velocity"; does not wait."""
         ...

@@ -49,8 +49,6 @@ CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _IDLE = ArmState.IDLE
 _UNKNOWN = ArmState.UNKNOWN
-_ACTIVE = SafetyMode.ACTIVE
-_E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
 _REQUEST_IDLE = ArmEvent.REQUEST_IDLE
@@ -107,7 +105,6 @@ class Cycle:
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
         self._reported: GuardVerdict | None = None
-        self._was_active = False
         self.is_recording = False
         self.replies_ns = 0
         self.status = ControlStatus()
@@ -221,7 +218,6 @@ class Cycle:
         if state is _IDLE:
             self._sample.torque_command[:] = 0.0
         self.status.state = state
-        self._was_active = self.status.safety is SafetyMode.ACTIVE
         self.law.enter(state, reading)
 
     def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -233,18 +229,16 @@ class Cycle:
         status = self.status
         if self._wrench_ns:
             status.ft_age_ns = tick.now_ns - self._wrench_ns
-        self._was_active |= status.safety is _ACTIVE
-        is_commanded = status.state not in _UNPOWERED
-        has_power = self._was_active or status.safety is _E_STOP
         seen = Observation(
             reading=reading,
             safety=status.safety,
+            safety_age_ns=tick.now_ns - self._arm.safety_heard_ns,
             foot_speed=self._speed,
             joint7_offset=self.law.joint7_offset(reading),
             ft_age_ns=status.ft_age_ns,
             tau=tau,
             is_recording=self.is_recording,
-            is_powered=is_commanded and has_power,
+            is_commanded=status.state not in _UNPOWERED,
             is_late=tick.is_late,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)

@@ -6,7 +6,7 @@ from acquisition import PERIOD_NS
 from fakes.plant import ArmPlant
 from fakes.pucks import FRAME_NS, NOMINAL_VOLTAGE, BusFaults, PuckNetwork
 from fakes.sensor import SensorStream
-from wam.bus import MOTOR_NODES, SENSOR_NODE, position_reply_id
+from wam.bus import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
@@ -40,6 +40,8 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "safety-torque": lambda: network.trip("torque"),
         "safety-heartbeat": lambda: network.trip("heartbeat"),
         "safety-voltage": lambda: network.set_bus_voltage(_LOW_VOLTAGE),
+        "safety-silent": lambda: network.silence(SAFETY_NODE),
+        "safety-disobedient": network.disobey,
         "estop": lambda: network.pendant("estop"),
         "pendant-idle": lambda: network.pendant("idle"),
     }
@@ -53,6 +55,8 @@ def clear_network_faults(network: PuckNetwork) -> None:
     """
     network.faults.clear_faults()
     network.reset_monitors()
+    network.silence(SAFETY_NODE, is_mute=False)
+    network.disobey(is_disobedient=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     for node in MOTOR_NODES:
         network.silence(node, is_mute=False)

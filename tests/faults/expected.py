@@ -269,6 +269,18 @@ TABLE: dict[str, Row] = {
         preflight=_IN_STOP,
         idle=_UNPOWERED,
     ),
+    "safety-silent": _ending(
+        "The safety module has not told its mode for ",
+        Arm(250, "driven", HOLD, "UNKNOWN - support it"),
+        "safety-silent",
+        preflight=_refused("The safety module does not answer"),
+        idle=Cell(
+            End.ENDED,
+            "The safety module has not told its mode for ",
+            why="found when torques are made ready",
+        ),
+    ),
+    "safety-disobedient": _row(OK),
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
     "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
     "ft-garbled": _sensor(20, _FEW, _NO_FRAME),

@@ -90,7 +90,7 @@ class WamArm:
         info = StartUp(self._properties, self._clock, self._settings).run()
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
         self._poller.set_firmware(info.safety_vers)
-        self._poller.note_mode(info.safety_mode)
+        self._poller.note_mode(info.safety_mode, self._clock.now_ns())
         self._poller.is_lowering = False
         self._poller.note_pendant(info.pendant)
         health = [puck.health for puck in info.pucks]
@@ -161,6 +161,11 @@ class WamArm:
         """Return the last known mode; UNKNOWN when the module stopped answering."""
         return self._poller.mode
 
+    @property
+    def safety_heard_ns(self) -> int:
+        """When the safety module last told its mode [monotonic ns], 0 = never."""
+        return self._poller.heard_ns
+
     def safety_warnings(self) -> tuple[str, ...]:
         """Return the monitors of the safety module that warn, as last heard."""
         return self._poller.warnings
@@ -187,7 +192,8 @@ class WamArm:
         """
         if self._is_closed:
             return self._poller.mode in BRAKED
-        self._poller.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
+        mode = self._safety.lower_to_idle(self._settings.idle_ns)
+        self._poller.note_mode(mode, self._clock.now_ns())
         if self._poller.mode not in BRAKED:
             self._poller.is_lowering = True
             return False

@@ -39,6 +39,7 @@ class Arm:
 
     def __init__(self):
         self.mode = SafetyMode.ACTIVE
+        self.safety_heard_ns = START_NS
         self.is_confirmed = True
         self.q, self.qd = np.zeros(7), np.zeros(7)
         self.missing = 0
@@ -620,3 +621,44 @@ def test_a_stop_is_told_before_the_arm_was_ever_active(bench, mode, state, reaso
     bench.arm.mode = mode
     bench.run()
     assert (bench.state, bench.reason) == (state, reason)
+
+
+def fall_silent(bench):
+    """Let the safety module give no answer from now on."""
+    bench.arm.mode, bench.arm.safety_heard_ns = SafetyMode.UNKNOWN, bench.now_ns
+
+
+def test_a_silent_safety_module_makes_the_arm_hold_at_once_and_idle_later(bench):
+    bench.enter(ArmState.FLOAT)
+    fall_silent(bench)
+    bench.arm.safety_heard_ns -= 250 * MS
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "safety-silent")
+    assert bench.arm.idled == 0
+    bench.run(150 * MS // PERIOD_NS)
+    assert bench.arm.idled == 1
+    assert bench.cycle.status.verdict.ends_session
+
+
+def test_a_request_does_not_end_the_watch_on_a_silent_module(bench):
+    bench.enter(ArmState.HOLD)
+    fall_silent(bench)
+    bench.enter(ArmState.FLOAT)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "safety-silent")
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+
+
+def test_torques_for_a_module_that_is_silent_from_the_start_are_idled(bench):
+    bench.arm.safety_heard_ns, bench.arm.mode = 0, SafetyMode.UNKNOWN
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.HOLD)
+    assert (bench.state, bench.reason) == (ArmState.UNKNOWN, "safety-silent")
+
+
+def test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it(bench):
+    bench.enter(ArmState.HOLD)
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.FLOAT)
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "pendant-idle")

@@ -15,6 +15,7 @@ RECORDED_NAMES = {
     "estop",
     "pendant-idle",
     "can-silence",
+    "safety-silent",
     "not-a-number",
     "joint-limit",
     "overspeed",
