@@ -19,6 +19,21 @@ class SafetyMode(IntEnum):
     UNKNOWN = 7
 
 
+@dataclass(frozen=True, slots=True)
+class PositionJump:
+    """A position that no motion explains, and which is therefore not believed.
+
+    Attributes:
+        motor: its number, 1-7.
+        counts: from its last believed position [encoder counts].
+        speed: of the fastest joint that this motor turns, were it true [rad/s].
+    """
+
+    motor: int
+    counts: int
+    speed: float
+
+
 @dataclass(slots=True)
 class ArmReading:
     """Joint positions of one cycle.
@@ -33,6 +48,7 @@ class ArmReading:
         fresh: bit i set = the reply of motor i+1 arrived in this cycle.
         is_complete: all seven replies arrived.
         missing_cycles: incomplete cycles in a row, 0 = this one is complete.
+        jump: a position that was not believed in this cycle; None = all were.
     """
 
     host_ns: int
@@ -44,6 +60,7 @@ class ArmReading:
     fresh: int
     is_complete: bool
     missing_cycles: int
+    jump: PositionJump | None = None
 
 
 @dataclass(slots=True)

@@ -24,6 +24,7 @@ from acquisition.control_loop.states import (
     ArmState,
     ControlStatus,
 )
+from acquisition.control_loop.torque_limiter import bounded_torque
 from acquisition.devices import (
     Arm,
     ArmReading,
@@ -151,7 +152,8 @@ class Cycle:
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
         if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
-            sent = self._arm.send(tau, tau_gravity)
+            bounded = bounded_torque(tau, sent, self.limits.torque)
+            sent = self._arm.send(bounded, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
         is_new = self._take_wrench(tick.now_ns)
         self._speed = self._observer.observe(

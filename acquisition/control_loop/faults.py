@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from enum import Enum, StrEnum
 from typing import Any
 
+from acquisition.devices import PositionJump
+
 
 class Action(Enum):
     """What the arm has to do."""
@@ -29,6 +31,7 @@ class Fault(StrEnum):
     PENDANT_IDLE = "pendant-idle"
     CAN_SILENCE = "can-silence"
     SAFETY_SILENT = "safety-silent"
+    POSITION_JUMP = "position-jump"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
     OVERSPEED = "overspeed"
@@ -127,6 +130,7 @@ FaultDetail = (
     | CircuitCauses
     | ReplySilence
     | SafetySilence
+    | PositionJump
     | JointExcess
     | FootSpeedExcess
     | Joint7Slip
@@ -161,6 +165,9 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     ),
     Fault.SAFETY_SILENT: FaultSpec(
         (Action.HOLD, Action.IDLE), SafetySilence, ends_session=True
+    ),
+    Fault.POSITION_JUMP: FaultSpec(
+        (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),

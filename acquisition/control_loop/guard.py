@@ -184,9 +184,12 @@ def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     missing = seen.reading.missing_cycles
     if missing < limits.hold_after_missing:
         return OK
+    is_lasting = missing >= limits.idle_after_missing
+    jump = seen.reading.jump
+    if jump is not None:
+        return verdict_for(Fault.POSITION_JUMP, jump, is_lasting=is_lasting)
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
     detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
-    is_lasting = missing >= limits.idle_after_missing
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
 

@@ -40,6 +40,9 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "safety-torque": lambda: network.trip("torque"),
         "safety-heartbeat": lambda: network.trip("heartbeat"),
         "safety-voltage": lambda: network.set_bus_voltage(_LOW_VOLTAGE),
+        "position-jump": lambda: network.faults.corrupt(
+            position_reply_id(PUCK), 1, None
+        ),
         "safety-silent": lambda: network.silence(SAFETY_NODE),
         "safety-disobedient": network.disobey,
         "estop": lambda: network.pendant("estop"),
@@ -101,8 +104,10 @@ def _answer_too_late(faults: BusFaults) -> None:
     )
 
 
-_JOINT_5, _JOINT_7 = 4, 6
-_BLOW = 20.0  # rad/s; the safety module does not count the wrist, so the guard acts
+_JOINT_6, _JOINT_7 = 5, 6
+# A blow that the driver still believes [rad/s]; the safety module does not count the
+# wrist, so the guard acts.
+_BLOW = 12.0
 # The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
 # sudden twist would swing beyond that, so it grows.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
@@ -135,7 +140,7 @@ class BodyFaults:
         self._plant.disturbance[_JOINT_7] = 0.0
 
     def _hit(self) -> None:
-        self._plant.qd[_JOINT_5] = _BLOW
+        self._plant.qd[_JOINT_6] = _BLOW
 
     def _touch(self) -> None:
         self._plant.finger = _FINGER

@@ -29,6 +29,7 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # Pucks without power are silent first; asked in these many incomplete cycles at once,
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
+_ZEROED_WITHIN = 1000  # counts; the arm must stand while it is zeroed
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
 
@@ -139,6 +140,7 @@ class WamArm:
             fresh=fresh,
             is_complete=is_complete,
             missing_cycles=self._missing_cycles,
+            jump=motion.jump,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
@@ -246,7 +248,7 @@ class WamArm:
 
     def _check_taken(self, wanted: Sequence[int], found: Sequence[int]) -> None:
         worst = max(abs(w - f) for w, f in zip(wanted, found, strict=True))
-        if worst > self._settings.jump_counts:
+        if worst > _ZEROED_WITHIN:
             raise DeviceFaultError(
                 f"The pucks report {list(found)} counts, told were {list(wanted)}.",
                 hint="The arm must not move while it is zeroed. Zero it again.",

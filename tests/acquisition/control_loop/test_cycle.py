@@ -662,3 +662,30 @@ def test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it(bench):
     bench.arm.mode = SafetyMode.IDLE
     bench.enter(ArmState.FLOAT)
     assert (bench.state, bench.reason) == (ArmState.IDLE, "pendant-idle")
+
+
+def test_the_command_after_a_verdict_is_within_limits_too(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.law.torques = TORQUE | {ArmState.DAMP: 47.8}
+    bench.arm.qd = np.full(7, 1.6)
+    sent = [bench.run()["torque_command"][0] for _ in range(12)]
+    assert bench.state is ArmState.DAMP
+    assert sent[:3] == pytest.approx([4.0, 7.0, 10.0])
+    assert max(sent) == LIMITS.torque[0]
+
+
+def test_torques_grow_from_zero_after_the_brakes(bench):
+    bench.law.torques = dict.fromkeys(TORQUE, 9.0)
+    bench.enter(ArmState.FLOAT)
+    bench.run(5)
+    bench.enter(ArmState.IDLE)
+    assert not bench.arm.sent[-1].any()
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.FLOAT)
+    assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 7)
+
+
+def test_a_torque_that_was_held_back_is_flagged(bench):
+    bench.law.torques = dict.fromkeys(TORQUE, 9.0)
+    assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
+    assert not has(bench.run(3), Flag.TORQUE_CLIPPED)

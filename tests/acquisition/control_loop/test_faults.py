@@ -16,6 +16,7 @@ RECORDED_NAMES = {
     "pendant-idle",
     "can-silence",
     "safety-silent",
+    "position-jump",
     "not-a-number",
     "joint-limit",
     "overspeed",

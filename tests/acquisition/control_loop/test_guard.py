@@ -16,7 +16,7 @@ from acquisition.control_loop.faults import (
     SafetySilence,
 )
 from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
-from acquisition.devices import ArmReading, SafetyMode
+from acquisition.devices import ArmReading, PositionJump, SafetyMode
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -393,3 +393,18 @@ def test_a_new_begin_behind_confirmed_brakes_is_no_stop():
     state = check(LIMITS, ARMED, seen(is_commanded=False))[0]
     _, verdict = check(LIMITS, state, seen(safety=BRAKED))
     assert verdict is OK
+
+
+JUMP = PositionJump(motor=1, counts=990, speed=11.4)
+
+
+@pytest.mark.parametrize(
+    ("cycles", "action"),
+    [(4, Action.NONE), (5, Action.HOLD), (24, Action.HOLD), (25, Action.IDLE)],
+)
+def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, action):
+    verdict = judge(**missing(cycles), jump=JUMP)
+    assert verdict.action is action
+    if action is not Action.NONE:
+        assert (verdict.fault, verdict.detail) == (Fault.POSITION_JUMP, JUMP)
+        assert verdict.ends_session
