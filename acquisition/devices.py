@@ -101,6 +101,14 @@ class Arm(Protocol):
         """Ask for the joint positions and return them; waits 1.5 ms at most."""
         ...
 
+    def listen(self, now_ns: int) -> ArmReading:
+        """Ask for no position, so that the safety circuit misses its heartbeat.
+
+        The state of the circuit is asked for, and idle again. Returns an incomplete
+        reading; does not wait.
+        """
+        ...
+
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
         """Send joint torques [N m] and return them as sent: clipped, rounded.
 

@@ -136,7 +136,7 @@ class Cycle:
 
     def __call__(self, tick: Tick) -> None:
         """Run the cycle `tick`."""
-        reading = self._arm.read(tick.now_ns)
+        reading = self._read(tick.now_ns)
         self.replies_ns = reading.arm_ns
         status = self.status
         status.safety = self._arm.safety_mode()
@@ -161,6 +161,12 @@ class Cycle:
         )
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._on_sample(sample.payload())
+
+    def _read(self, now_ns: int) -> ArmReading:
+        """Ask for the positions; starve the heartbeat of an arm that did not idle."""
+        is_wanted = self._requested not in (None, _REQUEST_IDLE)
+        is_starved = self.status.state is _UNKNOWN and not is_wanted
+        return self._arm.listen(now_ns) if is_starved else self._arm.read(now_ns)
 
     def _take_wrench(self, now_ns: int) -> bool:
         """Drain the sensor; return whether the used sample is fresh.

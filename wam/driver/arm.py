@@ -117,9 +117,21 @@ class WamArm:
         Never raises for missing replies and waits until `give_up_ns` at most. Missing
         joints go on at their last velocity, and stand still after 50 ms of silence.
         """
+        self._traffic.exchange(now_ns)
+        return self._reading(now_ns)
+
+    def listen(self, now_ns: int) -> ArmReading:
+        """Ask for the module's mode at most, and for no position; does not wait.
+
+        The safety module brakes an arm whose positions nobody asks for.
+        """
+        self._traffic.listen(now_ns)
+        return self._reading(now_ns)
+
+    def _reading(self, now_ns: int) -> ArmReading:
+        """Return what has been received at `now_ns`; ask for what is due."""
         motion = self._motion or self._started()
         traffic = self._traffic
-        traffic.exchange(now_ns)
         fresh = motion.update(now_ns, traffic.received)
         arrived = MOTORS - traffic.received.count(None)
         self.counters.rejected += arrived - fresh.bit_count()

@@ -47,8 +47,17 @@ class Arm:
         self.warnings, self.faults = (), ()
         self.sent = []
         self.idled = 0
+        self.asked_ns = 0
 
     def read(self, now_ns):
+        self.asked_ns = now_ns
+        return self.reading(now_ns)
+
+    def listen(self, now_ns):
+        missing = replace(self.reading(now_ns), fresh=0, is_complete=False)
+        return replace(missing, missing_cycles=max(self.missing, 1))
+
+    def reading(self, now_ns):
         return ArmReading(
             host_ns=now_ns,
             arm_ns=now_ns + 700_000,
@@ -527,8 +536,9 @@ def test_an_unknown_arm_is_idle_when_the_module_confirms_later(bench, mode):
     bench.run(10)
     assert bench.state is ArmState.UNKNOWN
     bench.arm.mode = mode
-    record = bench.run()
+    bench.run()
     assert bench.state is ArmState.IDLE
+    record = bench.run()
     assert bench.arm.sent[-1].tolist() == [0.0] * 7
     assert not record["torque_command"].any()
 
@@ -689,3 +699,15 @@ def test_a_torque_that_was_held_back_is_flagged(bench):
     bench.law.torques = dict.fromkeys(TORQUE, 9.0)
     assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
     assert not has(bench.run(3), Flag.TORQUE_CLIPPED)
+
+
+def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.IDLE)
+    asked_ns = bench.arm.asked_ns
+    bench.run(100)
+    assert bench.arm.asked_ns == asked_ns
+    bench.enter(ArmState.HOLD)
+    assert bench.arm.asked_ns > asked_ns
+    assert bench.state is ArmState.HOLD

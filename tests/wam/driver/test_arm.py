@@ -539,3 +539,19 @@ def test_a_dead_bus_fails_the_start_as_a_link_error():
     rig.link.send = broken
     with pytest.raises(LinkError):
         WamArm(rig.link, rig.clock).start()
+
+
+def test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    rig.network.disobey()
+    for _ in range(40):
+        cycle(rig, arm, ZERO)
+    rig.sent.clear()
+    for _ in range(60):
+        reading = arm.listen(rig.clock.t_ns)
+        rig.rest(CYCLE_NS)
+    assert (reading.fresh, reading.is_complete) == (0, False)
+    assert GET_P not in frames(rig)
+    assert rig.network.safety_mode is SafetyMode.IDLE
+    assert arm.safety_mode() is SafetyMode.IDLE

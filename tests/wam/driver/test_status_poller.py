@@ -225,3 +225,16 @@ def test_a_mode_that_does_not_exist_is_no_answer(bench, monkeypatch):
     assert bench.arm.safety_mode() is before
     bench.run(50)
     assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
+
+
+def test_listening_takes_no_time(bench):
+    now_ns = bench.rig.clock.t_ns
+    bench.arm.listen(now_ns)
+    assert bench.rig.clock.t_ns == now_ns
+
+
+def test_positions_are_whole_again_after_listening(bench):
+    for _ in range(50):
+        bench.arm.listen(bench.rig.clock.t_ns)
+        bench.rig.rest(2_000_000)
+    assert bench.arm.read(bench.rig.clock.t_ns).is_complete
