@@ -121,17 +121,12 @@ class WamArm:
         return self._reading(now_ns)
 
     def listen(self, now_ns: int) -> ArmReading:
-        """Ask for the module's mode at most, and for no position; does not wait.
-
-        The safety module brakes an arm whose positions nobody asks for.
-        """
+        """Ask for no position, or the module would not brake; does not wait."""
         self._traffic.listen(now_ns)
         return self._reading(now_ns)
 
     def _reading(self, now_ns: int) -> ArmReading:
-        """Return what has been received at `now_ns`; ask for what is due."""
-        motion = self._motion or self._started()
-        traffic = self._traffic
+        motion, traffic = self._started(), self._traffic
         fresh = motion.update(now_ns, traffic.received)
         arrived = MOTORS - traffic.received.count(None)
         self.counters.rejected += arrived - fresh.bit_count()
