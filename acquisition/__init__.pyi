@@ -8,7 +8,14 @@ from .clock import (
     SystemClock,
     utc_offset_ns,
 )
-from .devices import ArmReading, SafetyMode, Vector, WrenchSample, WrenchSensor
+from .devices import (
+    ArmReading,
+    PositionJump,
+    SafetyMode,
+    Vector,
+    WrenchSample,
+    WrenchSensor,
+)
 from .errors import (
     DeviceFaultError,
     LinkError,
@@ -51,6 +58,7 @@ __all__ = [
     "Mass",
     "Near",
     "Number",
+    "PositionJump",
     "Positive",
     "PreflightError",
     "Readable",

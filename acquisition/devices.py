@@ -19,6 +19,21 @@ class SafetyMode(IntEnum):
     UNKNOWN = 7
 
 
+@dataclass(frozen=True, slots=True)
+class PositionJump:
+    """A position that no motion explains, and which is therefore not believed.
+
+    Attributes:
+        motor: its number, 1-7.
+        counts: from its last believed position [encoder counts].
+        speed: of the fastest joint that this motor turns, were it true [rad/s].
+    """
+
+    motor: int
+    counts: int
+    speed: float
+
+
 @dataclass(slots=True)
 class ArmReading:
     """Joint positions of one cycle.
@@ -33,6 +48,7 @@ class ArmReading:
         fresh: bit i set = the reply of motor i+1 arrived in this cycle.
         is_complete: all seven replies arrived.
         missing_cycles: incomplete cycles in a row, 0 = this one is complete.
+        jump: a position that was not believed in this cycle; None = all were.
     """
 
     host_ns: int
@@ -44,6 +60,7 @@ class ArmReading:
     fresh: int
     is_complete: bool
     missing_cycles: int
+    jump: PositionJump | None = None
 
 
 @dataclass(slots=True)
@@ -84,6 +101,14 @@ class Arm(Protocol):
         """Ask for the joint positions and return them; waits 1.5 ms at most."""
         ...
 
+    def listen(self, now_ns: int) -> ArmReading:
+        """Ask for no position, so that the safety circuit misses its heartbeat.
+
+        The state of the circuit is asked for, and idle again. Returns an incomplete
+        reading; does not wait.
+        """
+        ...
+
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
         """Send joint torques [N m] and return them as sent: clipped, rounded.
 
@@ -93,6 +118,11 @@ class Arm(Protocol):
 
     def safety_mode(self) -> SafetyMode:
         """Return the last known state of the safety circuit; does not wait."""
+        ...
+
+    @property
+    def safety_heard_ns(self) -> int:
+        """Return when the safety circuit last told its state [ns], 0 = never."""
         ...
 
     def safety_warnings(self) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from acquisition.control_loop.states import (
     ArmState,
     ControlStatus,
 )
+from acquisition.control_loop.torque_limiter import bounded_torque
 from acquisition.devices import (
     Arm,
     ArmReading,
@@ -49,8 +50,6 @@ CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _IDLE = ArmState.IDLE
 _UNKNOWN = ArmState.UNKNOWN
-_ACTIVE = SafetyMode.ACTIVE
-_E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
 _NONE = Action.NONE
 _REQUEST_IDLE = ArmEvent.REQUEST_IDLE
@@ -107,7 +106,6 @@ class Cycle:
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
         self._reported: GuardVerdict | None = None
-        self._was_active = False
         self.is_recording = False
         self.replies_ns = 0
         self.status = ControlStatus()
@@ -138,7 +136,7 @@ class Cycle:
 
     def __call__(self, tick: Tick) -> None:
         """Run the cycle `tick`."""
-        reading = self._arm.read(tick.now_ns)
+        reading = self._read(tick.now_ns)
         self.replies_ns = reading.arm_ns
         status = self.status
         status.safety = self._arm.safety_mode()
@@ -154,7 +152,8 @@ class Cycle:
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
         if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
-            sent = self._arm.send(tau, tau_gravity)
+            bounded = bounded_torque(tau, sent, self.limits.torque)
+            sent = self._arm.send(bounded, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
         is_new = self._take_wrench(tick.now_ns)
         self._speed = self._observer.observe(
@@ -162,6 +161,12 @@ class Cycle:
         )
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._on_sample(sample.payload())
+
+    def _read(self, now_ns: int) -> ArmReading:
+        """Ask for the positions; starve the heartbeat of an arm that did not idle."""
+        is_wanted = self._requested not in (None, _REQUEST_IDLE)
+        is_starved = self.status.state is _UNKNOWN and not is_wanted
+        return self._arm.listen(now_ns) if is_starved else self._arm.read(now_ns)
 
     def _take_wrench(self, now_ns: int) -> bool:
         """Drain the sensor; return whether the used sample is fresh.
@@ -221,7 +226,6 @@ class Cycle:
         if state is _IDLE:
             self._sample.torque_command[:] = 0.0
         self.status.state = state
-        self._was_active = self.status.safety is SafetyMode.ACTIVE
         self.law.enter(state, reading)
 
     def _torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -233,18 +237,16 @@ class Cycle:
         status = self.status
         if self._wrench_ns:
             status.ft_age_ns = tick.now_ns - self._wrench_ns
-        self._was_active |= status.safety is _ACTIVE
-        is_commanded = status.state not in _UNPOWERED
-        has_power = self._was_active or status.safety is _E_STOP
         seen = Observation(
             reading=reading,
             safety=status.safety,
+            safety_age_ns=tick.now_ns - self._arm.safety_heard_ns,
             foot_speed=self._speed,
             joint7_offset=self.law.joint7_offset(reading),
             ft_age_ns=status.ft_age_ns,
             tau=tau,
             is_recording=self.is_recording,
-            is_powered=is_commanded and has_power,
+            is_commanded=status.state not in _UNPOWERED,
             is_late=tick.is_late,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)

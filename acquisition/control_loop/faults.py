@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from enum import Enum, StrEnum
 from typing import Any
 
+from acquisition.devices import PositionJump
+
 
 class Action(Enum):
     """What the arm has to do."""
@@ -28,6 +30,8 @@ class Fault(StrEnum):
     E_STOP = "estop"
     PENDANT_IDLE = "pendant-idle"
     CAN_SILENCE = "can-silence"
+    SAFETY_SILENT = "safety-silent"
+    POSITION_JUMP = "position-jump"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
     OVERSPEED = "overspeed"
@@ -65,6 +69,13 @@ class ReplySilence:
 
     ms: float
     silent: int
+
+
+@dataclass(frozen=True, slots=True)
+class SafetySilence:
+    """Age of the safety module's last answer [ms]."""
+
+    ms: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +129,8 @@ FaultDetail = (
     NoDetail
     | CircuitCauses
     | ReplySilence
+    | SafetySilence
+    | PositionJump
     | JointExcess
     | FootSpeedExcess
     | Joint7Slip
@@ -149,6 +162,12 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.PENDANT_IDLE: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
     Fault.CAN_SILENCE: FaultSpec(
         (Action.HOLD, Action.IDLE), ReplySilence, ends_session=True
+    ),
+    Fault.SAFETY_SILENT: FaultSpec(
+        (Action.HOLD, Action.IDLE), SafetySilence, ends_session=True
+    ),
+    Fault.POSITION_JUMP: FaultSpec(
+        (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),

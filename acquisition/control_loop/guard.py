@@ -1,7 +1,7 @@
 """The guard: limits and the state of the arm in, a verdict out. Pure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from acquisition.control_loop.faults import (
     JointExcess,
     LateCycles,
     ReplySilence,
+    SafetySilence,
     verdict_for,
 )
 from acquisition.devices import ArmReading, SafetyMode, Vector
@@ -44,6 +45,8 @@ class GuardLimits:
         late_per_second: late cycles in a second that end in hold.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
+        idle_after_safety_ms: age of the safety module's last answer that ends in idle
+            [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
         armed_inside: a joint's position limit counts after it was this far inside
             [rad]: the home position lies on two stops.
     """
@@ -59,6 +62,7 @@ class GuardLimits:
     late_per_second: int
     hold_after_missing: int = 5
     idle_after_missing: int = 25
+    idle_after_safety_ms: float = 400.0
     armed_inside: float = 0.1
 
 
@@ -69,10 +73,14 @@ class GuardState:
     Attributes:
         armed: bit i set = the position limit of joint i+1 counts.
         late: times of the late cycles of the last second [ns].
+        may_drive: since torques are commanded the brakes were not confirmed once:
+            from then on a braked arm is a stop, and no longer the state before
+            activation.
     """
 
     armed: int = 0
     late: tuple[int, ...] = ()
+    may_drive: bool = False
 
 
 class Observation(NamedTuple):
@@ -80,24 +88,26 @@ class Observation(NamedTuple):
 
     Attributes:
         reading: joint positions and velocities.
-        safety: state of the safety circuit.
+        safety: state of the safety circuit, as last heard.
+        safety_age_ns: age of its last answer [ns].
         foot_speed: speed of the sole [m/s].
         joint7_offset: displacement of joint 7 from where it was locked [rad].
         ft_age_ns: age of the force sample [ns].
         tau: joint torques about to be sent [N m], shape (7,).
         is_recording: a trial is being recorded.
-        is_powered: the arm is meant to be powered (not idle).
+        is_commanded: the state of the arm commands torques (not idle).
         is_late: this cycle began after its deadline.
     """
 
     reading: ArmReading
     safety: SafetyMode
+    safety_age_ns: int
     foot_speed: float
     joint7_offset: float
     ft_age_ns: int
     tau: Vector
     is_recording: bool
-    is_powered: bool
+    is_commanded: bool
     is_late: bool
 
 
@@ -106,17 +116,21 @@ def check(
 ) -> tuple[GuardState, GuardVerdict]:
     """Return the next state and the most severe verdict of this cycle.
 
+    Torques that are commanded are judged unless the brakes are confirmed since before:
+    a safety circuit of unknown state may drive the arm. E-stop is always told.
+
     Among equally severe ones: what takes the arm away (safety circuit, silence), then
     motion, then what only ends the trial (sensor, cadence).
     """
     now = seen.reading.host_ns
     state = _remember(limits, state, seen, now)
-    if not seen.is_powered:
+    is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
+    if not (state.may_drive or is_stopped):
         return state, OK
     # Plain numbers: seven of them are compared faster than numpy looks at an array.
     q, qd, tau = seen.reading.q.tolist(), seen.reading.qd.tolist(), seen.tau.tolist()
     verdicts = (
-        _check_safety(seen),
+        _check_safety(limits, seen),
         _check_silence(limits, seen),
         _check_numbers(sum(q) + sum(qd) + sum(tau), seen),
         _check_position(limits, state, q),
@@ -146,12 +160,19 @@ def _remember(
     if seen.is_late or (late and late[0] < now - NS_PER_S):
         kept = tuple(t for t in late if t >= now - NS_PER_S)
         late = (*kept, now) if seen.is_late else kept
-    if armed == state.armed and late is state.late:
+    may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
+    is_same = armed == state.armed and late is state.late
+    if is_same and may_drive is state.may_drive:
         return state
-    return replace(state, armed=armed, late=late)
+    return GuardState(armed, late, may_drive)
 
 
-def _check_safety(seen: Observation) -> GuardVerdict:
+def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
+    if seen.safety is SafetyMode.UNKNOWN:
+        age_ms = seen.safety_age_ns / NS_PER_MS
+        is_lasting = age_ms >= limits.idle_after_safety_ms
+        detail = SafetySilence(age_ms)
+        return verdict_for(Fault.SAFETY_SILENT, detail, is_lasting=is_lasting)
     if seen.safety not in _BRAKED:
         return OK
     is_stopped = seen.safety is SafetyMode.E_STOP
@@ -163,9 +184,12 @@ def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     missing = seen.reading.missing_cycles
     if missing < limits.hold_after_missing:
         return OK
+    is_lasting = missing >= limits.idle_after_missing
+    jump = seen.reading.jump
+    if jump is not None:
+        return verdict_for(Fault.POSITION_JUMP, jump, is_lasting=is_lasting)
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
     detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
-    is_lasting = missing >= limits.idle_after_missing
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
 
 

@@ -94,7 +94,11 @@ def build_arm(
     rig: RigSettings, constants: ArmConstants, link: CanLink, clock: Clock
 ) -> WamArm:
     """Return the driver of the arm on `link`."""
-    settings = ArmSettings(j2mp=constants.j2mp, safety_limits=build_safety_limits(rig))
+    settings = ArmSettings(
+        j2mp=constants.j2mp,
+        safety_limits=build_safety_limits(rig),
+        speed_limits=tuple(rig.limits.speed),
+    )
     return WamArm(link, clock, settings)
 
 

@@ -114,6 +114,10 @@ class PuckNetwork:
         else:
             self._bank.silence(node, is_mute=is_mute)
 
+    def disobey(self, *, is_disobedient: bool = True) -> None:
+        """Let the safety module ignore hosts that lower its mode, or obey again."""
+        self._safety.is_disobedient = is_disobedient
+
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the arm's power bus have `voltage` [V], at the last `advance`."""
         self._bank.set_bus_voltage(voltage)

@@ -64,6 +64,7 @@ class FakeSafetyModule:
     Attributes:
         mode: the true mode.
         is_mute: its transmit wire is cut.
+        is_disobedient: it ignores a host that lowers its mode.
     """
 
     def __init__(
@@ -74,6 +75,7 @@ class FakeSafetyModule:
     ) -> None:
         self.mode = options.safety_mode
         self.is_mute = False
+        self.is_disobedient = False
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
@@ -200,7 +202,8 @@ class FakeSafetyModule:
 
     def _tell(self, name: str | None, value: int) -> None:
         if name == "MODE":
-            if 0 <= value < self.mode:  # a host can lower the mode only
+            # A host can lower the mode only.
+            if 0 <= value < self.mode and not self.is_disobedient:
                 self._enter(SafetyMode(value))
         elif name in ("DEF", "LOAD"):
             limit = names(Device.SAFETY, self._options.safety_vers).get(value)

@@ -6,7 +6,7 @@ from acquisition import PERIOD_NS
 from fakes.plant import ArmPlant
 from fakes.pucks import FRAME_NS, NOMINAL_VOLTAGE, BusFaults, PuckNetwork
 from fakes.sensor import SensorStream
-from wam.bus import MOTOR_NODES, SENSOR_NODE, position_reply_id
+from wam.bus import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
 FOREIGN_LOAD = 0.6  # of the bus, half of it before the arm's frames and half after
@@ -40,6 +40,11 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "safety-torque": lambda: network.trip("torque"),
         "safety-heartbeat": lambda: network.trip("heartbeat"),
         "safety-voltage": lambda: network.set_bus_voltage(_LOW_VOLTAGE),
+        "position-jump": lambda: network.faults.corrupt(
+            position_reply_id(PUCK), 1, None
+        ),
+        "safety-silent": lambda: network.silence(SAFETY_NODE),
+        "safety-disobedient": network.disobey,
         "estop": lambda: network.pendant("estop"),
         "pendant-idle": lambda: network.pendant("idle"),
     }
@@ -53,6 +58,8 @@ def clear_network_faults(network: PuckNetwork) -> None:
     """
     network.faults.clear_faults()
     network.reset_monitors()
+    network.silence(SAFETY_NODE, is_mute=False)
+    network.disobey(is_disobedient=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     for node in MOTOR_NODES:
         network.silence(node, is_mute=False)
@@ -97,8 +104,10 @@ def _answer_too_late(faults: BusFaults) -> None:
     )
 
 
-_JOINT_5, _JOINT_7 = 4, 6
-_BLOW = 20.0  # rad/s; the safety module does not count the wrist, so the guard acts
+_JOINT_6, _JOINT_7 = 5, 6
+# A blow that the driver still believes [rad/s]; the safety module does not count the
+# wrist, so the guard acts.
+_BLOW = 12.0
 # The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
 # sudden twist would swing beyond that, so it grows.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
@@ -131,7 +140,7 @@ class BodyFaults:
         self._plant.disturbance[_JOINT_7] = 0.0
 
     def _hit(self) -> None:
-        self._plant.qd[_JOINT_5] = _BLOW
+        self._plant.qd[_JOINT_6] = _BLOW
 
     def _touch(self) -> None:
         self._plant.finger = _FINGER

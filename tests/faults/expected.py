@@ -269,6 +269,25 @@ TABLE: dict[str, Row] = {
         preflight=_IN_STOP,
         idle=_UNPOWERED,
     ),
+    "position-jump": _ending(
+        "The position of motor 3 jumped by ",
+        replace(_SILENT, text="UNKNOWN - support it"),
+        "position-jump",
+        preflight=Cell(End.ABSENT, why="positions are judged by those before them"),
+        idle=_not_ready("Puck 3 has not answered for 100 ms."),
+    ),
+    "safety-silent": _ending(
+        "The safety module has not told its mode for ",
+        Arm(250, "driven", HOLD, "UNKNOWN - support it"),
+        "safety-silent",
+        preflight=_refused("The safety module does not answer"),
+        idle=Cell(
+            End.ENDED,
+            "The safety module has not told its mode for ",
+            why="found when torques are made ready",
+        ),
+    ),
+    "safety-disobedient": _row(OK),
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
     "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
     "ft-garbled": _sensor(20, _FEW, _NO_FRAME),
@@ -296,7 +315,7 @@ TABLE: dict[str, Row] = {
     "torque-limit": _limit("Joint 2 was asked for ", "torque-limit"),
     "foot-speed": _limit("The foot moved at ", "foot-speed"),
     "overspeed": _limit(
-        "Joint 5 ", "overspeed", replace(OK, why="the arm is braked, and stays so")
+        "Joint 6 ", "overspeed", replace(OK, why="the arm is braked, and stays so")
     ),
     "joint7-slip": _row(
         OK,

@@ -29,6 +29,7 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # Pucks without power are silent first; asked in these many incomplete cycles at once,
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
+_ZEROED_WITHIN = 1000  # counts; the arm must stand while it is zeroed
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
 
@@ -90,7 +91,7 @@ class WamArm:
         info = StartUp(self._properties, self._clock, self._settings).run()
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
         self._poller.set_firmware(info.safety_vers)
-        self._poller.note_mode(info.safety_mode)
+        self._poller.note_mode(info.safety_mode, self._clock.now_ns())
         self._poller.is_lowering = False
         self._poller.note_pendant(info.pendant)
         health = [puck.health for puck in info.pucks]
@@ -116,9 +117,16 @@ class WamArm:
         Never raises for missing replies and waits until `give_up_ns` at most. Missing
         joints go on at their last velocity, and stand still after 50 ms of silence.
         """
-        motion = self._motion or self._started()
-        traffic = self._traffic
-        traffic.exchange(now_ns)
+        self._traffic.exchange(now_ns)
+        return self._reading(now_ns)
+
+    def listen(self, now_ns: int) -> ArmReading:
+        """Ask for no position, or the module would not brake; does not wait."""
+        self._traffic.listen(now_ns)
+        return self._reading(now_ns)
+
+    def _reading(self, now_ns: int) -> ArmReading:
+        motion, traffic = self._started(), self._traffic
         fresh = motion.update(now_ns, traffic.received)
         arrived = MOTORS - traffic.received.count(None)
         self.counters.rejected += arrived - fresh.bit_count()
@@ -139,6 +147,7 @@ class WamArm:
             fresh=fresh,
             is_complete=is_complete,
             missing_cycles=self._missing_cycles,
+            jump=motion.jump,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
@@ -160,6 +169,11 @@ class WamArm:
     def safety_mode(self) -> SafetyMode:
         """Return the last known mode; UNKNOWN when the module stopped answering."""
         return self._poller.mode
+
+    @property
+    def safety_heard_ns(self) -> int:
+        """When the safety module last told its mode [monotonic ns], 0 = never."""
+        return self._poller.heard_ns
 
     def safety_warnings(self) -> tuple[str, ...]:
         """Return the monitors of the safety module that warn, as last heard."""
@@ -187,7 +201,8 @@ class WamArm:
         """
         if self._is_closed:
             return self._poller.mode in BRAKED
-        self._poller.note_mode(self._safety.lower_to_idle(self._settings.idle_ns))
+        mode = self._safety.lower_to_idle(self._settings.idle_ns)
+        self._poller.note_mode(mode, self._clock.now_ns())
         if self._poller.mode not in BRAKED:
             self._poller.is_lowering = True
             return False
@@ -240,7 +255,7 @@ class WamArm:
 
     def _check_taken(self, wanted: Sequence[int], found: Sequence[int]) -> None:
         worst = max(abs(w - f) for w, f in zip(wanted, found, strict=True))
-        if worst > self._settings.jump_counts:
+        if worst > _ZEROED_WITHIN:
             raise DeviceFaultError(
                 f"The pucks report {list(found)} counts, told were {list(wanted)}.",
                 hint="The arm must not move while it is zeroed. Zero it again.",

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import Vector
+from acquisition import PositionJump, Vector
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import MOTORS, Transmission
 
 _LONGEST_GUESS = 0.05  # s; beyond, a silent joint is taken to stand still
-_PAUSE = 0.1  # s without any reading; positions may then be anywhere
+_STILL = 4  # counts by which a motor at rest may seem to move
 
 
 class JointEstimator:
@@ -19,18 +19,28 @@ class JointEstimator:
     low-passed by `y += (x - y) wT / (1 + wT)` (backward Euler, as in libbarrett).
     The filter runs on motor rates: it is linear, so joints see the same.
 
+    A position is believed within what the joints' speed limits allow since the last
+    one that was, times `jump_margin`: sum_j |j2mp[i, j]| speed[j] counts/rad dt. Two
+    leaves a true excess of speed to be seen and judged, while one false position stays
+    below every speed limit in `qd` (the filter takes 0.26 of it per cycle). What is
+    not believed leaves its motor where it was believed last.
+
     Attributes:
         transmission: between the motors and the joints.
         counts: last accepted position of each motor [encoder counts].
         q: joint positions [rad], shape (7,); extrapolated where a reply is missing.
         qd: filtered joint velocities [rad/s], shape (7,).
         qd7_raw: unfiltered one-cycle difference of joint 7 [rad/s].
+        jump: the worst position that was not believed in the last update, or None.
     """
 
     def __init__(self, transmission: Transmission, settings: ArmSettings) -> None:
         self.transmission = transmission
         self._pole = settings.velocity_pole
-        self._jump = settings.jump_counts
+        limits = np.array(settings.speed_limits)
+        self._fastest: list[float] = (
+            settings.jump_margin * transmission.fastest_counts(limits)
+        ).tolist()
         self.begin(0, [0] * MOTORS)
 
     def begin(self, t_ns: int, counts: Sequence[int]) -> None:
@@ -39,6 +49,7 @@ class JointEstimator:
         self.q = self.transmission.joints(counts)
         self.qd: Vector = np.zeros(MOTORS)
         self.qd7_raw = 0.0
+        self.jump: PositionJump | None = None
         self._positions = [float(c) for c in counts]
         self._rates = [0.0] * MOTORS
         self._times_ns = [t_ns] * MOTORS
@@ -50,19 +61,21 @@ class JointEstimator:
         if step <= 0.0:
             step = 1e-9  # asked twice at one instant: no time, no velocity
         share = self._pole * step / (1.0 + self._pole * step)
-        is_resumed = step > _PAUSE
         fresh = 0
+        self.jump = None
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
-        known, jump = self.counts, self._jump
+        known = self.counts
         for i, counts in enumerate(received):
             elapsed = (t_ns - times_ns[i]) * 1e-9
             last, rate = known[i], rates[i]
-            ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
-            guess = last + rate * ahead
-            if counts is None or (
-                not -jump <= counts - guess <= jump and not is_resumed
-            ):
-                positions[i] = guess
+            if counts is None:
+                ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
+                positions[i] = last + rate * ahead
+                continue
+            farthest = self._fastest[i] * elapsed + _STILL
+            if not -farthest <= counts - last <= farthest:
+                positions[i] = last
+                self._note_jump(i, counts - last, elapsed)
                 continue
             if elapsed > 0.0:
                 rates[i] = rate + share * ((counts - last) / elapsed - rate)
@@ -72,6 +85,15 @@ class JointEstimator:
             fresh |= 1 << i
         self._advance(t_ns, step)
         return fresh
+
+    def _note_jump(self, index: int, counts: int, elapsed: float) -> None:
+        """Keep the jump that would be the fastest motion."""
+        column = self.transmission.joints(
+            [counts * (i == index) for i in range(MOTORS)]
+        )
+        speed = float(np.abs(column).max()) / max(elapsed, 1e-9)
+        if self.jump is None or speed > self.jump.speed:
+            self.jump = PositionJump(index + 1, counts, speed)
 
     def _advance(self, t_ns: int, step: float) -> None:
         q = self.transmission.joints(self._positions)

@@ -23,7 +23,8 @@ class ArmSettings:
         velocity_pole: corner of the velocity filter [rad/s].
         first_look_ns: from request to the first look at the bus [ns].
         give_up_ns: from request to the end of waiting for replies [ns].
-        jump_counts: a motor cannot move further in a cycle [counts].
+        speed_limits: of the guard, for each joint [rad/s].
+        jump_margin: a position is believed up to so many times the speed limits.
         safety_poll_cycles: cycles between questions for the safety mode, and between
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
@@ -37,7 +38,8 @@ class ArmSettings:
     velocity_pole: float = 180.0
     first_look_ns: int = 700_000
     give_up_ns: int = 1_500_000
-    jump_counts: int = 1000
+    speed_limits: tuple[float, ...] = (1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0)
+    jump_margin: float = 2.0
     safety_poll_cycles: int = 25
     health_poll_cycles: int = 50
     safety_limits: SafetyLimits = field(default_factory=SafetyLimits)

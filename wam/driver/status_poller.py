@@ -41,6 +41,7 @@ class StatusPoller:
 
     Attributes:
         mode: last known mode of the safety module.
+        heard_ns: when the module last told a mode [ns], 0 = never.
         warnings: monitors of the module that warn.
         faults: monitors of the module that report a fault.
         health: the newest answers of the pucks.
@@ -50,6 +51,7 @@ class StatusPoller:
 
     def __init__(self, link: Link, settings: ArmSettings) -> None:
         self.mode = SafetyMode.UNKNOWN
+        self.heard_ns = 0
         self.warnings: tuple[str, ...] = ()
         self.faults: tuple[str, ...] = ()
         self.health = HealthTable()
@@ -117,13 +119,17 @@ class StatusPoller:
         if node is not None:
             self.health.note(node, reply, self._now_ns)
         elif reply.number == _MODE:
-            self.note_mode(decode_mode(reply.value))
+            mode = decode_mode(reply.value)
+            if mode is not SafetyMode.UNKNOWN:  # nonsense leaves the question open
+                self.note_mode(mode, self._now_ns)
         elif reply.number == self._pen:
             self.note_pendant(decode_pendant(reply.value & 0xFFFFFFFF))
 
-    def note_mode(self, mode: SafetyMode) -> None:
-        """Take the mode as the module just said it."""
+    def note_mode(self, mode: SafetyMode, now_ns: int) -> None:
+        """Take the mode as the module said it by `now_ns`; UNKNOWN = it did not."""
         self.mode = mode
+        if mode is not SafetyMode.UNKNOWN:
+            self.heard_ns = now_ns
         self._unanswered = 0
         if mode in BRAKED:
             self.is_lowering = False

@@ -87,6 +87,10 @@ class Transmission:
         """Return motor positions [counts] of joint positions [rad], floored."""
         return [floor(c) for c in self.exact_counts(q).tolist()]
 
+    def fastest_counts(self, qd: Vector) -> Vector:
+        """Return count rates [1/s] that joints within ±`qd` [rad/s] cannot exceed."""
+        return np.abs(self._counts_of_joints).dot(qd)
+
     def exact_units(self, tau: Vector) -> Vector:
         """Return motor torques [puck units, not whole] of joint torques [N m]."""
         return self._units_of_tau.dot(tau)

@@ -39,6 +39,7 @@ class Arm:
 
     def __init__(self):
         self.mode = SafetyMode.ACTIVE
+        self.safety_heard_ns = START_NS
         self.is_confirmed = True
         self.q, self.qd = np.zeros(7), np.zeros(7)
         self.missing = 0
@@ -46,8 +47,17 @@ class Arm:
         self.warnings, self.faults = (), ()
         self.sent = []
         self.idled = 0
+        self.asked_ns = 0
 
     def read(self, now_ns):
+        self.asked_ns = now_ns
+        return self.reading(now_ns)
+
+    def listen(self, now_ns):
+        missing = replace(self.reading(now_ns), fresh=0, is_complete=False)
+        return replace(missing, missing_cycles=max(self.missing, 1))
+
+    def reading(self, now_ns):
         return ArmReading(
             host_ns=now_ns,
             arm_ns=now_ns + 700_000,
@@ -526,8 +536,9 @@ def test_an_unknown_arm_is_idle_when_the_module_confirms_later(bench, mode):
     bench.run(10)
     assert bench.state is ArmState.UNKNOWN
     bench.arm.mode = mode
-    record = bench.run()
+    bench.run()
     assert bench.state is ArmState.IDLE
+    record = bench.run()
     assert bench.arm.sent[-1].tolist() == [0.0] * 7
     assert not record["torque_command"].any()
 
@@ -620,3 +631,83 @@ def test_a_stop_is_told_before_the_arm_was_ever_active(bench, mode, state, reaso
     bench.arm.mode = mode
     bench.run()
     assert (bench.state, bench.reason) == (state, reason)
+
+
+def fall_silent(bench):
+    """Let the safety module give no answer from now on."""
+    bench.arm.mode, bench.arm.safety_heard_ns = SafetyMode.UNKNOWN, bench.now_ns
+
+
+def test_a_silent_safety_module_makes_the_arm_hold_at_once_and_idle_later(bench):
+    bench.enter(ArmState.FLOAT)
+    fall_silent(bench)
+    bench.arm.safety_heard_ns -= 250 * MS
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "safety-silent")
+    assert bench.arm.idled == 0
+    bench.run(150 * MS // PERIOD_NS)
+    assert bench.arm.idled == 1
+    assert bench.cycle.status.verdict.ends_session
+
+
+def test_a_request_does_not_end_the_watch_on_a_silent_module(bench):
+    bench.enter(ArmState.HOLD)
+    fall_silent(bench)
+    bench.enter(ArmState.FLOAT)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "safety-silent")
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.DAMP, "overspeed")
+
+
+def test_torques_for_a_module_that_is_silent_from_the_start_are_idled(bench):
+    bench.arm.safety_heard_ns, bench.arm.mode = 0, SafetyMode.UNKNOWN
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.HOLD)
+    assert (bench.state, bench.reason) == (ArmState.UNKNOWN, "safety-silent")
+
+
+def test_a_request_in_the_moment_of_the_pendants_idle_does_not_hide_it(bench):
+    bench.enter(ArmState.HOLD)
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.FLOAT)
+    assert (bench.state, bench.reason) == (ArmState.IDLE, "pendant-idle")
+
+
+def test_the_command_after_a_verdict_is_within_limits_too(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.law.torques = TORQUE | {ArmState.DAMP: 47.8}
+    bench.arm.qd = np.full(7, 1.6)
+    sent = [bench.run()["torque_command"][0] for _ in range(12)]
+    assert bench.state is ArmState.DAMP
+    assert sent[:3] == pytest.approx([4.0, 7.0, 10.0])
+    assert max(sent) == LIMITS.torque[0]
+
+
+def test_torques_grow_from_zero_after_the_brakes(bench):
+    bench.law.torques = dict.fromkeys(TORQUE, 9.0)
+    bench.enter(ArmState.FLOAT)
+    bench.run(5)
+    bench.enter(ArmState.IDLE)
+    assert not bench.arm.sent[-1].any()
+    bench.arm.mode = SafetyMode.IDLE
+    bench.enter(ArmState.FLOAT)
+    assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 7)
+
+
+def test_a_torque_that_was_held_back_is_flagged(bench):
+    bench.law.torques = dict.fromkeys(TORQUE, 9.0)
+    assert has(bench.enter(ArmState.FLOAT), Flag.TORQUE_CLIPPED)
+    assert not has(bench.run(3), Flag.TORQUE_CLIPPED)
+
+
+def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.is_confirmed = False
+    bench.enter(ArmState.IDLE)
+    asked_ns = bench.arm.asked_ns
+    bench.run(100)
+    assert bench.arm.asked_ns == asked_ns
+    bench.enter(ArmState.HOLD)
+    assert bench.arm.asked_ns > asked_ns
+    assert bench.state is ArmState.HOLD

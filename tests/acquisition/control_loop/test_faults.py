@@ -15,6 +15,8 @@ RECORDED_NAMES = {
     "estop",
     "pendant-idle",
     "can-silence",
+    "safety-silent",
+    "position-jump",
     "not-a-number",
     "joint-limit",
     "overspeed",

@@ -13,13 +13,14 @@ from acquisition.control_loop.faults import (
     JointExcess,
     LateCycles,
     ReplySilence,
+    SafetySilence,
 )
 from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
-from acquisition.devices import ArmReading, SafetyMode
+from acquisition.devices import ArmReading, PositionJump, SafetyMode
 
 MS = 1_000_000
 S = 1_000_000_000
-ARMED = GuardState(armed=0x7F)
+ARMED = GuardState(armed=0x7F, may_drive=True)
 LIMITS = GuardLimits(
     q_lower=np.array([-2.6, -2.0, -2.8, -0.9, -4.76, -1.6, -3.0]),
     q_upper=np.array([2.6, 2.0, 2.8, 3.1, 1.24, 1.6, 3.0]),
@@ -51,12 +52,13 @@ def reading(**changes):
 OBSERVED = {
     "reading": reading(),
     "safety": SafetyMode.ACTIVE,
+    "safety_age_ns": 0,
     "foot_speed": 0.0,
     "joint7_offset": 0.0,
     "ft_age_ns": 0,
     "tau": np.zeros(7),
     "is_recording": True,
-    "is_powered": True,
+    "is_commanded": True,
     "is_late": False,
 }
 QUIET = Observation(**OBSERVED)
@@ -94,8 +96,20 @@ LIMIT_TABLE = [
     (
         Fault.PENDANT_IDLE,
         Action.IDLE,
-        {"safety": SafetyMode.UNKNOWN},
+        {"safety": SafetyMode.ACTIVE},
         {"safety": SafetyMode.IDLE},
+    ),
+    (
+        Fault.SAFETY_SILENT,
+        Action.HOLD,
+        {"safety": SafetyMode.ACTIVE, "safety_age_ns": 900 * MS},
+        {"safety": SafetyMode.UNKNOWN, "safety_age_ns": 400 * MS - 1},
+    ),
+    (
+        Fault.SAFETY_SILENT,
+        Action.IDLE,
+        {"safety": SafetyMode.ACTIVE, "safety_age_ns": 900 * MS},
+        {"safety": SafetyMode.UNKNOWN, "safety_age_ns": 400 * MS},
     ),
     (Fault.CAN_SILENCE, Action.HOLD, missing(4), missing(5)),
     (Fault.CAN_SILENCE, Action.HOLD, missing(0), missing(24)),
@@ -219,7 +233,7 @@ def test_damping_is_worse_than_holding_and_better_than_idle():
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_an_arm_that_is_not_powered_is_left_alone(name):
-    assert judge(**FAULTS[name], is_powered=False).action is Action.NONE
+    assert judge(**FAULTS[name], is_commanded=False).action is Action.NONE
 
 
 @pytest.mark.parametrize("name", [Fault.JOINT7_SLIP, Fault.FT_STALE])
@@ -260,7 +274,7 @@ def test_an_armed_limit_stays_armed():
 
 
 def test_limits_are_armed_while_the_arm_is_idle():
-    state, _ = check(LIMITS, GuardState(), seen(is_powered=False))
+    state, _ = check(LIMITS, GuardState(), seen(is_commanded=False))
     assert state.armed == 0x7F
 
 
@@ -335,3 +349,62 @@ def test_severity_counts_what_is_taken_from_the_arm():
         Action.DAMP: 2,
         Action.IDLE: 3,
     }
+
+
+def test_the_age_of_the_modules_last_answer_is_told():
+    verdict = judge(safety=SafetyMode.UNKNOWN, safety_age_ns=250 * MS)
+    assert verdict.detail == SafetySilence(250.0)
+    assert verdict.ends_session
+
+
+@pytest.mark.parametrize("fault", [Fault.OVERSPEED, Fault.JOINT_LIMIT])
+def test_motion_is_judged_while_the_safety_circuit_is_unknown(fault):
+    changes = FAULTS[fault] | {"safety": SafetyMode.UNKNOWN}
+    assert judge(**changes).fault == fault
+
+
+def after(*modes, is_commanded=True, **last):
+    """Return the verdict on the last of `modes`, from the first command on."""
+    state, verdict = GuardState(), OK
+    for mode in modes:
+        changes = last if mode is modes[-1] else {}
+        observed = seen(safety=mode, is_commanded=is_commanded, **changes)
+        state, verdict = check(LIMITS, state, observed)
+    return verdict
+
+
+ACTIVE, BRAKED, UNKNOWN = SafetyMode.ACTIVE, SafetyMode.IDLE, SafetyMode.UNKNOWN
+
+
+def test_torques_made_ready_behind_confirmed_brakes_are_not_judged():
+    assert after(BRAKED, BRAKED, qd=at(1, 9.0)) is OK
+
+
+@pytest.mark.parametrize("before", [ACTIVE, UNKNOWN])
+def test_brakes_after_a_state_that_may_drive_are_a_stop(before):
+    assert after(BRAKED, before, BRAKED).fault is Fault.PENDANT_IDLE
+
+
+def test_an_unknown_circuit_is_judged_from_the_first_command_on():
+    assert after(UNKNOWN).fault is Fault.SAFETY_SILENT
+
+
+def test_a_new_begin_behind_confirmed_brakes_is_no_stop():
+    state = check(LIMITS, ARMED, seen(is_commanded=False))[0]
+    _, verdict = check(LIMITS, state, seen(safety=BRAKED))
+    assert verdict is OK
+
+
+JUMP = PositionJump(motor=1, counts=990, speed=11.4)
+
+
+@pytest.mark.parametrize(
+    ("cycles", "action"),
+    [(4, Action.NONE), (5, Action.HOLD), (24, Action.HOLD), (25, Action.IDLE)],
+)
+def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, action):
+    verdict = judge(**missing(cycles), jump=JUMP)
+    assert verdict.action is action
+    if action is not Action.NONE:
+        assert (verdict.fault, verdict.detail) == (Fault.POSITION_JUMP, JUMP)
+        assert verdict.ends_session

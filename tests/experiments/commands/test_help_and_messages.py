@@ -391,7 +391,7 @@ CASES = {
     # what ends a trial and not the session: the second attempt is not begun here
     "ft-stale": fault("ft-stale@T2+0.1s", words="T02 stopped at 0.1 s"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
-    "overspeed": fault("overspeed@T2+0.1s", words="Joint 5 "),
+    "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
     "foot-speed": acted(Prompt.RECORDING, _swing),
     "joint-limit": acted(Prompt.LIFT, _narrow, 4, words="Joint 6 at "),

@@ -305,3 +305,13 @@ def test_default_of_another_property_changes_nothing():
     host = Host()
     host.tell(32, ZERO)
     assert host.ask(ZERO) == 1
+
+
+def test_a_disobedient_module_stays_active_until_it_obeys_again():
+    host = Host()
+    host.network.disobey()
+    host.tell(8, SafetyMode.IDLE)
+    assert host.mode is SafetyMode.ACTIVE
+    host.network.disobey(is_disobedient=False)
+    host.tell(8, SafetyMode.IDLE)
+    assert host.mode is SafetyMode.IDLE

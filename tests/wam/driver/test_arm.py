@@ -287,8 +287,8 @@ def test_waiting_for_a_missing_reply_ends_at_the_deadline():
     assert rig.clock.t_ns - begin_ns == 1_500_000
 
 
-@pytest.mark.parametrize(("jump", "is_fresh"), [(900, True), (1100, False)])
-def test_a_jump_of_more_than_a_thousand_counts_is_rejected(jump, is_fresh):
+@pytest.mark.parametrize(("jump", "is_fresh"), [(195, True), (210, False)])
+def test_a_position_beyond_twice_the_speed_limits_is_not_believed(jump, is_fresh):
     rig, arm = started()
     cycle(rig, arm)
     rig.motors.position[2] += jump
@@ -539,3 +539,19 @@ def test_a_dead_bus_fails_the_start_as_a_link_error():
     rig.link.send = broken
     with pytest.raises(LinkError):
         WamArm(rig.link, rig.clock).start()
+
+
+def test_an_arm_that_is_only_listened_to_is_braked_by_its_own_module():
+    rig, arm = started()
+    rig.network.pendant("activate")
+    rig.network.disobey()
+    for _ in range(40):
+        cycle(rig, arm, ZERO)
+    rig.sent.clear()
+    for _ in range(60):
+        reading = arm.listen(rig.clock.t_ns)
+        rig.rest(CYCLE_NS)
+    assert (reading.fresh, reading.is_complete) == (0, False)
+    assert GET_P not in frames(rig)
+    assert rig.network.safety_mode is SafetyMode.IDLE
+    assert arm.safety_mode() is SafetyMode.IDLE

@@ -183,3 +183,17 @@ def test_a_puck_that_restarted_alone_takes_the_zero_away(bench):
     assert not again.start().is_zeroed
     # Awake by now, it looks like the others: the module has to remember.
     assert not WamArm(bench.rig.link, bench.rig.clock).start().is_zeroed
+
+
+def test_a_motor_that_is_not_believed_stands_where_it_was(bench):
+    for _ in range(60):
+        before = bench.cycle()
+    bench.faults.corrupt(position_reply_id(7), 1)
+    reading = bench.cycle()
+    assert reading.counts[6] == before.counts[6]
+    assert reading.q[6] == pytest.approx(before.q[6], abs=1e-12)
+    assert (reading.jump.motor, before.jump) == (7, None)
+    turn = 2 * np.pi / 4096 / 14.93  # rad per count
+    speed = abs(reading.jump.counts) * turn / (CYCLE_NS * 1e-9)
+    assert reading.jump.speed == pytest.approx(speed, rel=1e-6)
+    assert bench.cycle().jump is None

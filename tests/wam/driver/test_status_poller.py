@@ -196,3 +196,45 @@ def test_health_is_text_in_the_order_of_the_pucks():
         "pucks:bus_voltage": "48 47",
         "pucks:error": "0 3",
     }
+
+
+def test_it_is_known_when_the_module_was_heard_last(bench):
+    bench.run(30)
+    bench.rig.network.silence(10)
+    bench.run(1)
+    heard_ns = bench.arm.safety_heard_ns
+    bench.run(300)
+    assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
+    assert bench.arm.safety_heard_ns == heard_ns
+    assert 600_000_000 <= bench.rig.clock.t_ns - heard_ns <= 660_000_000
+
+
+def test_a_mode_that_does_not_exist_is_no_answer(bench, monkeypatch):
+    receive = bench.rig.link.receive
+
+    def garble():
+        return [
+            frame._replace(data=b"\x88\0\5\0\0\0") if frame.data[0] == 0x88 else frame
+            for frame in receive()
+        ]
+
+    bench.run(3)
+    before = bench.arm.safety_mode()
+    monkeypatch.setattr(bench.rig.link, "receive", garble)
+    bench.run(100)
+    assert bench.arm.safety_mode() is before
+    bench.run(50)
+    assert bench.arm.safety_mode() is SafetyMode.UNKNOWN
+
+
+def test_listening_takes_no_time(bench):
+    now_ns = bench.rig.clock.t_ns
+    bench.arm.listen(now_ns)
+    assert bench.rig.clock.t_ns == now_ns
+
+
+def test_positions_are_whole_again_after_listening(bench):
+    for _ in range(50):
+        bench.arm.listen(bench.rig.clock.t_ns)
+        bench.rig.rest(2_000_000)
+    assert bench.arm.read(bench.rig.clock.t_ns).is_complete

@@ -1,0 +1,44 @@
+import numpy as np
+import pytest
+
+from acquisition.control_loop.torque_limiter import bounded_torque
+
+LIMITS = (20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3)
+STEP = np.array(LIMITS) / 10
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_torque_ends_at_its_limit_ten_cycles_from_zero(sign):
+    tau = np.zeros(7)
+    for _ in range(9):
+        tau = bounded_torque(sign * np.full(7, 99.0), tau, LIMITS)
+    assert (np.abs(tau) < LIMITS).all()
+    for _ in range(2):
+        tau = bounded_torque(sign * np.full(7, 99.0), tau, LIMITS)
+    assert tau.tolist() == [sign * limit for limit in LIMITS]
+
+
+def test_a_small_change_passes_as_it_is():
+    last = np.array(LIMITS) / 2
+    wanted = last - 0.9 * STEP
+    assert bounded_torque(wanted, last, LIMITS).tolist() == wanted.tolist()
+
+
+def test_each_joint_is_held_back_alone():
+    wanted = np.zeros(7)
+    wanted[3] = 9.0
+    assert bounded_torque(wanted, np.zeros(7), LIMITS).tolist() == [
+        0,
+        0,
+        0,
+        1.5,
+        0,
+        0,
+        0,
+    ]
+
+
+def test_what_is_no_number_stays_so_and_is_refused_by_the_driver():
+    wanted = np.zeros(7)
+    wanted[2] = np.nan
+    assert np.isnan(bounded_torque(wanted, np.zeros(7), LIMITS)[2])
