@@ -48,7 +48,6 @@ CONTACT_FORCE = 0.5  # F_n above which the foot counts as touching [N]
 # Named once: to look a member of an Enum up takes longer than to compare it.
 _UNPOWERED = frozenset({ArmState.IDLE, ArmState.UNKNOWN})
 _IDLE = ArmState.IDLE
-_UNKNOWN = ArmState.UNKNOWN
 _ACTIVE = SafetyMode.ACTIVE
 _E_STOP = SafetyMode.E_STOP
 _BRAKED = frozenset({SafetyMode.IDLE, SafetyMode.E_STOP})
@@ -153,7 +152,7 @@ class Cycle:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
+        if reading.missing_cycles == 0 and status.state not in _UNPOWERED:
             sent = self._arm.send(tau, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
         is_new = self._take_wrench(tick.now_ns)

@@ -4,8 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition import PERIOD_NS, Clock, DeviceServer, SafetyMode, TractionError
-from acquisition.control_loop import Grant, choose_cores
+from acquisition import (
+    PERIOD_NS,
+    Clock,
+    DeviceServer,
+    LinkError,
+    PreflightError,
+    SafetyMode,
+    TractionError,
+)
+from acquisition.control_loop import ArmState, Grant, choose_cores
 from acquisition.ipc import (
     Child,
     LoopClient,
@@ -14,6 +22,7 @@ from acquisition.ipc import (
     make_proxy,
 )
 from acquisition.recording import RemoteRecorder
+from experiments.rig.arm_lock import ArmLock
 from experiments.rig.services import ArmService, SensorService
 from wam.driver import ArmInfo
 
@@ -43,9 +52,25 @@ class MultiProcessBackend:
     the one with the arm brakes it first.
     """
 
-    def __init__(self, jobs: WorkerConfigs, shared: SharedLayout, clock: Clock) -> None:
+    def __init__(
+        self,
+        jobs: WorkerConfigs,
+        shared: SharedLayout,
+        clock: Clock,
+        lock: ArmLock | None = None,
+    ) -> None:
+        """Start the processes; nothing is sent yet.
+
+        Args:
+            jobs: what they are told.
+            shared: the memory they share.
+            clock: the console's time.
+            lock: of the arm, given back by `close`; None = its bus is nobody else's.
+        """
         self._shared = shared
         self._clock = clock
+        self._lock = lock
+        self._is_claimed = False
         self._children: dict[str, Child] = {}
         self._reported: set[str] = set()
         loop_core, other_core = choose_cores()
@@ -86,7 +111,18 @@ class MultiProcessBackend:
         return self._children["recorder"].pid
 
     def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
+        """Find, wake and question the arm; raises as `WamArm.start`.
+
+        Raises:
+            PreflightError: also when another program has the arm; nothing is sent to
+                it then, not even at the end.
+        """
+        try:
+            self._arm.claim()
+        except (PreflightError, LinkError):
+            self._is_claimed = False
+            raise
+        self._is_claimed = True
         return self._arm.start_arm()
 
     def measure_exchange(self) -> list[int]:
@@ -138,7 +174,12 @@ class MultiProcessBackend:
         return {name: child.pid for name, child in self._children.items()}
 
     def idle(self) -> bool:
-        """Brake the arm; when its process has died, a new one does it."""
+        """Brake the arm; when its process has died, a new one does it.
+
+        An arm that `start_arm` has refused is left as it is.
+        """
+        if not self._is_claimed:
+            return False
         if not self._control.is_alive:
             return self._rescue()
         if self.loop_client.loop.is_running:
@@ -152,11 +193,12 @@ class MultiProcessBackend:
         return self._arm.safety_mode()
 
     def close(self) -> None:
-        """Brake the arm, let the processes end, the simulated rig last."""
+        """Brake the arm if it got torques and end all processes; safe to repeat."""
         if not self._children:
             return
         try:
-            self.idle()
+            if self._may_hold():
+                self.idle()
             if self._control.is_alive and self.loop_client.loop.is_running:
                 self.loop_client.leave()
         except TractionError:
@@ -166,6 +208,18 @@ class MultiProcessBackend:
                 child.stop()
             self._children.clear()
             self._shared.close()
+            if self._lock is not None:
+                self._lock.close()
+
+    def _may_hold(self) -> bool:
+        """Return whether the arm may have torques that its process does not end."""
+        if not self._is_claimed:
+            return False
+        loop_client = self.loop_client
+        if not self._control.is_alive:
+            return True
+        is_idle = loop_client.status.state is ArmState.IDLE
+        return loop_client.loop.is_running and not is_idle
 
     def _spawn_control(self) -> Child:
         target = "experiments.rig.workers:control"
