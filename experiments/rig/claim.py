@@ -3,12 +3,13 @@
 And at the end: an arm that never got a torque is left as it is.
 """
 
-from acquisition import Clock, LinkError, SafetyMode
+from acquisition import Clock, LinkTimeoutError, SafetyMode
 from experiments.messages import preflight_error
 from wam.bus import CanLink
 from wam.driver import WamArm
 
 LISTEN_NS = 50_000_000  # 25 cycles of another master at 500 Hz
+_QUESTIONS = 3  # a lost answer must not let the start-up write to an active arm
 _LOOK_NS = 5_000_000  # between two looks, so that no buffer of a socket overflows
 
 
@@ -34,19 +35,22 @@ def check_alone(link: CanLink, clock: Clock, bus: str) -> None:
 
 
 def check_inactive(arm: WamArm) -> None:
-    """Ask the safety module for its mode, and nothing else.
+    """Ask the safety module for its mode, three times at most, and nothing else.
 
     Silence is left to the start-up, which says more about it.
 
     Raises:
         PreflightError: the arm is active.
+        LinkError: the bus is down.
     """
-    try:
-        mode = arm.safety.mode()
-    except LinkError:
+    for _ in range(_QUESTIONS):
+        try:
+            mode = arm.safety.mode()
+        except LinkTimeoutError:
+            continue
+        if mode is SafetyMode.ACTIVE:
+            raise preflight_error("arm-active")
         return
-    if mode is SafetyMode.ACTIVE:
-        raise preflight_error("arm-active")
 
 
 def release(arm: WamArm, link: CanLink) -> None:

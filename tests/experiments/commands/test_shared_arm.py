@@ -10,6 +10,7 @@ import threading
 import pytest
 
 from acquisition.clock import SystemClock
+from acquisition.control_loop import RealtimeRequest, request
 from acquisition.devices import SafetyMode
 from experiments.rig.arm_lock import ArmLock
 from fakes.bus.client import SocketBus
@@ -29,6 +30,7 @@ COMMANDS = {
 }
 MODE_ASKED = (0x00A, b"\x08")
 TORQUES = (" fake0 401#", " fake0 402#")
+TRIES = 6
 SET_MODE = " fake0 00A#88"
 
 
@@ -50,20 +52,25 @@ def active_arm(tmp_path):
     network = PuckNetwork(motors, options, clock.now_ns())
     server = PuckServer(network, motors, SocketHub(tmp_path / "bus"), clock)
     server.frames = []
-    server.talk = None
+    server.has_master = False
+    other = SocketBus(str(tmp_path / "bus"))
     is_over = threading.Event()
 
     def serve():
+        request(RealtimeRequest(60, None))  # where it may: a busy machine stalls it
         while not is_over.is_set():
             server.step(lambda can_id, data: server.frames.append((can_id, data)))
-            if server.talk is not None:
-                server.talk()
+            while other.recv(0) is not None:
+                pass
+            if server.has_master:
+                other.send(message(0x404, b"\x30"))
 
     thread = threading.Thread(target=serve)
     thread.start()
     yield server
     is_over.set()
     thread.join()
+    other.shutdown()
     server.close()
 
 
@@ -84,6 +91,7 @@ def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path
     assert f"in use: process {os.getpid()}" in err
 
 
+@pytest.mark.wall_clock
 @pytest.mark.parametrize("command", COMMANDS)
 def test_an_active_arm_is_asked_for_its_mode_and_left_active(
     command, config, tmp_path, active_arm
@@ -94,25 +102,28 @@ def test_an_active_arm_is_asked_for_its_mode_and_left_active(
     assert active_arm.network.safety_mode is SafetyMode.ACTIVE
 
 
+@pytest.mark.wall_clock
 @pytest.mark.parametrize("command", COMMANDS)
 def test_another_master_is_heard_and_nothing_is_sent_to_its_arm(
     command, config, tmp_path, active_arm
 ):
-    with SocketBus(str(tmp_path / "bus")) as master:
-
-        def ask():
-            master.send(message(0x404, b"\x30"))
-            while master.recv(0) is not None:
-                pass
-
-        active_arm.talk = ask
-        err = refused(command, config, tmp_path)
-        active_arm.talk = None
-    assert "404" in err
+    active_arm.has_master = True
+    assert "404" in refused(command, config, tmp_path)
     assert {can_id for can_id, _ in active_arm.frames if not can_id & 0x3E0} == {0x404}
     assert active_arm.network.safety_mode is SafetyMode.ACTIVE
 
 
+def patiently(*arguments):
+    """Run a command again while the served arm, which is not in time, seems silent."""
+    for _ in range(TRIES):
+        done = traction(*arguments)
+        if done.code == 0:
+            break
+    assert done.code == 0, done.err
+    return done
+
+
+@pytest.mark.wall_clock
 def test_no_torque_and_no_mode_is_sent_while_the_arm_is_zeroed_checked_and_timed(
     config, tmp_path
 ):
@@ -130,13 +141,10 @@ def test_no_torque_and_no_mode_is_sent_while_the_arm_is_zeroed_checked_and_timed
     options = ("--config", config, "--data", tmp_path)
     try:
         assert served.stdout.readline().startswith("ready")
-        zeroed = traction("zero", "--yes", *options)
-        assert zeroed.code == 0, zeroed.err
-        checked = traction("check", "--loop-test", 0.5, *options)
-        assert checked.code == 0, checked.err
+        patiently("zero", "--yes", *options)
+        checked = patiently("check", "--loop-test", 0.5, *options)
         assert "No torque was sent" in checked.out
-        timed = traction("bench", "--seconds", 1, "--json", *options)
-        assert timed.code == 0, timed.err
+        timed = patiently("bench", "--seconds", 1, "--json", *options)
         assert not json.loads(timed.out)["is_powered"]
         served.send_signal(signal.SIGTERM)
         served.wait(30)
