@@ -20,6 +20,7 @@ from acquisition.ipc import (
     ProcessLostError,
     SharedLayout,
     make_proxy,
+    require_ordered_stores,
 )
 from acquisition.recording import RemoteRecorder
 from experiments.rig.arm_lock import ArmLock
@@ -66,7 +67,11 @@ class MultiProcessBackend:
             shared: the memory they share.
             clock: the console's time.
             lock: of the arm, given back by `close`; None = its bus is nobody else's.
+
+        Raises:
+            PreflightError: processes cannot share memory safely on this machine.
         """
+        require_ordered_stores()
         self._shared = shared
         self._clock = clock
         self._lock = lock

@@ -526,9 +526,10 @@ def test_an_unknown_arm_is_idle_when_the_module_confirms_later(bench, mode):
     bench.run(10)
     assert bench.state is ArmState.UNKNOWN
     bench.arm.mode = mode
+    sent = len(bench.arm.sent)
     record = bench.run()
     assert bench.state is ArmState.IDLE
-    assert bench.arm.sent[-1].tolist() == [0.0] * 7
+    assert len(bench.arm.sent) == sent
     assert not record["torque_command"].any()
 
 
