@@ -82,17 +82,7 @@ class MultiProcessBackend:
         self._jobs = jobs
         self.fake: Child | None = None
         if jobs.fake is not None:
-            self.fake = self._spawn(
-                "fake rig", "fakes.serving.rig_process:main", jobs.fake
-            )
-            served = make_proxy(DeviceServer, self.fake.call).devices()
-            jobs.control["can"] = {
-                "interface": served.interface,
-                "channel": served.channel,
-                "bitrate": served.bitrate,
-            }
-            if jobs.reader is not None:
-                jobs.reader["port"] = served.port
+            self.fake = self._spawn_fake(jobs.fake)
         jobs.control["core"] = loop_core
         self._control = self._spawn_control()
         self._arm = make_proxy(ArmService, self._control.call)
@@ -225,6 +215,19 @@ class MultiProcessBackend:
             return True
         is_idle = loop_client.status.state is ArmState.IDLE
         return loop_client.loop.is_running and not is_idle
+
+    def _spawn_fake(self, settings: dict[str, Any]) -> Child:
+        """Start the simulated rig and tell the others where its devices are."""
+        child = self._spawn("fake rig", "fakes.serving.rig_process:main", settings)
+        served = make_proxy(DeviceServer, child.call).devices()
+        self._jobs.control["can"] = {
+            "interface": served.interface,
+            "channel": served.channel,
+            "bitrate": served.bitrate,
+        }
+        if self._jobs.reader is not None:
+            self._jobs.reader["port"] = served.port
+        return child
 
     def _spawn_control(self) -> Child:
         target = "experiments.rig.workers:control"
