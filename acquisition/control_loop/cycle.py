@@ -151,7 +151,7 @@ class Cycle:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0 and status.state is not _UNKNOWN:
+        if reading.missing_cycles == 0 and status.state not in _UNPOWERED:
             bounded = bounded_torque(tau, sent, self.limits.torque)
             sent = self._arm.send(bounded, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.

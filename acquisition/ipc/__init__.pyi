@@ -10,7 +10,7 @@ from .layout import (
 )
 from .loop_client import LoopClient
 from .loop_server import LoopHooks, LoopServer, no_bell
-from .rings import give_back_heap
+from .rings import give_back_heap, require_ordered_stores
 from .rpc import RpcServer, bind, make_proxy
 from .shared_sensor import SharedSensor, publish
 
@@ -37,5 +37,6 @@ __all__ = [
     "name_process",
     "no_bell",
     "publish",
+    "require_ordered_stores",
     "unpack_wrenches",
 ]

@@ -2,17 +2,41 @@
 
 Each has one writer. The payload is written before the counter, so a reader never takes
 a record that is half written; what the writer has overwritten is counted as lost.
+
+That order of stores is kept between processors by x86 alone: on other machines, ARM
+among them, a counter may be seen before its record. Processes are refused there, see
+`require_ordered_stores`; a rig in one thread has no second processor to mind.
 """
 
 import ctypes
 import mmap
 import os
+import platform
 import struct
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from acquisition.errors import PreflightError
 from acquisition.sample import Record
+
+ORDERED_MACHINES = frozenset({"x86_64", "AMD64", "i386", "i686"})
+
+
+def require_ordered_stores() -> None:
+    """Refuse a machine whose processors may see stores in another order.
+
+    Raises:
+        PreflightError: it is no x86.
+    """
+    machine = platform.machine()
+    if machine not in ORDERED_MACHINES:
+        raise PreflightError(
+            f"This machine is {machine or 'unknown'}: processes that share memory need "
+            "an x86 (64 or 32 bit), which keeps the order of stores.",
+            hint="Use an x86 machine; simulations run here with --fake --fast.",
+            arm_state="not touched",
+        )
 
 
 class SharedMemory:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction bench --fake --seconds 60        the loop with simulated devices
-  traction bench --json                     the real rig, arm idle, for a program"""
+  traction bench --json                     the real rig, arm idle, no torque sent"""
 
 _LONGEST = 7200.0
 
@@ -62,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _print(report: BenchReport, seconds: float, console: Console) -> None:
     loop = report.loop
-    law = "control law on" if report.is_powered else "arm idle"
+    law = "control law on" if report.is_powered else "arm idle, no torque sent"
     console.say(
         f"{loop.cycles} cycles in {seconds:g} s, {loop.rate:.2f} Hz, {law}; "
         f"missed {loop.missed}"

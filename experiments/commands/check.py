@@ -1,4 +1,4 @@
-"""traction check: is the rig fit to run?"""
+"""traction check: is the rig fit to run? The arm stays idle, no torque is sent."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):
         run_preflight(rig, Path(args.data), console, args.loop_test)
-    console.say("Fit to run.")
+    console.say("Fit to run. No torque was sent.")
     return 0
 
 

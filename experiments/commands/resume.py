@@ -38,10 +38,15 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
     """Return the one unfinished session below `data`.
 
     Raises:
-        SessionError: there is none, or more than one.
+        SessionError: there is none, or more than one, or it is open elsewhere.
     """
     from acquisition import SessionError
-    from experiments.session import find_unfinished
+    from experiments.session import (
+        find_unfinished,
+        list_sessions,
+        locked_error,
+        owner_of,
+    )
 
     found = [
         session
@@ -49,6 +54,10 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
         if session.folder.is_simulated or not is_fake
     ]
     if not found:
+        for folder in list_sessions(data):
+            is_meant = folder.is_simulated or not is_fake
+            if is_meant and owner_of(folder) is not None:
+                raise locked_error(folder)
         raise SessionError(
             f"There is no unfinished session in {data / 'sessions'}.",
             hint="Start one: traction run TERRAIN",

@@ -38,7 +38,13 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from experiments.operator import Console
-    from experiments.session import DigestCache, count_board, next_steps, parse_where
+    from experiments.session import (
+        DigestCache,
+        board_notes,
+        count_board,
+        next_steps,
+        parse_where,
+    )
     from experiments.settings import load_settings
 
     settings = load_settings(args.config)
@@ -58,9 +64,16 @@ def run(args: argparse.Namespace) -> int:
             )
         ]
 
+    def notes(board: Sequence[MatrixRow]) -> list[str]:
+        return board_notes(args.data, settings.matrix, where, board)
+
     if args.follow:
-        return _follow(lambda: [*_plain(board := count()), *steps(board)], console)
+        return _follow(
+            lambda: [*_plain(board := count()), *notes(board), *steps(board)], console
+        )
     board = count()
+    for note in notes(board):  # not in the way of a program that reads the board
+        console.problem(note)
     if args.json:
         console.say(json.dumps([line.as_dict() for line in board], indent=1))
         return 0

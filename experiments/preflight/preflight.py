@@ -119,7 +119,7 @@ def _check_arm(rig: Rig, add: Add) -> None:
     try:
         info = rig.backend.start_arm()
     except TractionError as error:
-        add(BAD, "arm", str(error))
+        add(BAD, "arm", error.message)
         raise _not_reached(error, rig.settings.rig) from error
     versions = sorted({puck.vers for puck in info.pucks})
     woken = sum(puck.was_asleep for puck in info.pucks)
@@ -267,4 +267,5 @@ def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
 
 
 def _as_preflight(error: TractionError, arm_state: str) -> PreflightError:
+    arm_state = error.arm_state or arm_state
     return PreflightError(error.message, hint=error.hint, arm_state=arm_state)

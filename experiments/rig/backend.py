@@ -32,7 +32,10 @@ class RigBackend(Protocol):
         ...
 
     def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
+        """Find, wake and question the arm; raises as `WamArm.start`.
+
+        Where the bus is shared, another program's arm is refused first.
+        """
         ...
 
     def measure_exchange(self) -> list[int]:
@@ -72,7 +75,7 @@ class RigBackend(Protocol):
         ...
 
     def close(self) -> None:
-        """Brake the arm and end everything; safe to repeat."""
+        """Brake the arm if it got torques, and end everything; safe to repeat."""
         ...
 
 

@@ -131,7 +131,7 @@ def stepped(
             is_simulated=True,
         )
 
-    backend = InProcessBackend(shared, clock, arm, sensor, parts)
+    backend = InProcessBackend(shared, clock, (arm, link), sensor, parts)
     return clock, backend, LocalSimulation(simulation, PACES[facts["pace"]])
 
 

@@ -11,6 +11,8 @@ from acquisition.ipc import LoopClient, SharedLayout
 from acquisition.recording import Recorder
 from experiments.rig.backend import measure_exchange
 from experiments.rig.build import LoopConfig, build_loop_server
+from experiments.rig.claim import release
+from wam.bus import CanLink
 from wam.driver import ArmInfo, WamArm
 
 _GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
@@ -47,11 +49,11 @@ class InProcessBackend:
         self,
         shared: SharedLayout,
         clock: Clock,
-        arm: WamArm,
+        devices: tuple[WamArm, CanLink],
         open_sensor: Callable[[], WrenchSensor],
         parts: Callable[[WrenchSensor], LoopConfig],
     ) -> None:
-        self.arm = arm
+        self.arm, self._link = devices
         self._shared = shared
         self._clock = clock
         self._open_sensor = open_sensor
@@ -109,9 +111,9 @@ class InProcessBackend:
         return self.arm.safety_mode()
 
     def close(self) -> None:
-        """Brake the arm and give bus and port back; safe to repeat."""
+        """Brake the arm if it got torques, give bus and port back; safe to repeat."""
         self.recorder.abandon()
-        self.arm.close()
+        release(self.arm, self._link)
         if self._sensor is not None:
             self._sensor.close()
             self._sensor = None

@@ -4,16 +4,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from acquisition import PERIOD_NS, Clock, DeviceServer, SafetyMode, TractionError
-from acquisition.control_loop import Grant, choose_cores
+from acquisition import (
+    PERIOD_NS,
+    Clock,
+    DeviceServer,
+    LinkError,
+    PreflightError,
+    SafetyMode,
+    TractionError,
+)
+from acquisition.control_loop import ArmState, Grant, choose_cores
 from acquisition.ipc import (
     Child,
     LoopClient,
     ProcessLostError,
     SharedLayout,
     make_proxy,
+    require_ordered_stores,
 )
 from acquisition.recording import RemoteRecorder
+from experiments.rig.arm_lock import ArmLock
 from experiments.rig.services import ArmService, SensorService
 from wam.driver import ArmInfo
 
@@ -43,26 +53,36 @@ class MultiProcessBackend:
     the one with the arm brakes it first.
     """
 
-    def __init__(self, jobs: WorkerConfigs, shared: SharedLayout, clock: Clock) -> None:
+    def __init__(
+        self,
+        jobs: WorkerConfigs,
+        shared: SharedLayout,
+        clock: Clock,
+        lock: ArmLock | None = None,
+    ) -> None:
+        """Start the processes; nothing is sent yet.
+
+        Args:
+            jobs: what they are told.
+            shared: the memory they share.
+            clock: the console's time.
+            lock: of the arm, given back by `close`; None = its bus is nobody else's.
+
+        Raises:
+            PreflightError: processes cannot share memory safely on this machine.
+        """
+        require_ordered_stores()
         self._shared = shared
         self._clock = clock
+        self._lock = lock
+        self._is_claimed = False
         self._children: dict[str, Child] = {}
         self._reported: set[str] = set()
         loop_core, other_core = choose_cores()
         self._jobs = jobs
         self.fake: Child | None = None
         if jobs.fake is not None:
-            self.fake = self._spawn(
-                "fake rig", "fakes.serving.rig_process:main", jobs.fake
-            )
-            served = make_proxy(DeviceServer, self.fake.call).devices()
-            jobs.control["can"] = {
-                "interface": served.interface,
-                "channel": served.channel,
-                "bitrate": served.bitrate,
-            }
-            if jobs.reader is not None:
-                jobs.reader["port"] = served.port
+            self.fake = self._spawn_fake(jobs.fake)
         jobs.control["core"] = loop_core
         self._control = self._spawn_control()
         self._arm = make_proxy(ArmService, self._control.call)
@@ -86,7 +106,18 @@ class MultiProcessBackend:
         return self._children["recorder"].pid
 
     def start_arm(self) -> ArmInfo:
-        """Find, wake and question the arm; raises as `WamArm.start`."""
+        """Find, wake and question the arm; raises as `WamArm.start`.
+
+        Raises:
+            PreflightError: also when another program has the arm; nothing is sent to
+                it then, not even at the end.
+        """
+        try:
+            self._arm.claim()
+        except (PreflightError, LinkError):
+            self._is_claimed = False
+            raise
+        self._is_claimed = True
         return self._arm.start_arm()
 
     def measure_exchange(self) -> list[int]:
@@ -138,7 +169,12 @@ class MultiProcessBackend:
         return {name: child.pid for name, child in self._children.items()}
 
     def idle(self) -> bool:
-        """Brake the arm; when its process has died, a new one does it."""
+        """Brake the arm; when its process has died, a new one does it.
+
+        An arm that `start_arm` has refused is left as it is.
+        """
+        if not self._is_claimed:
+            return False
         if not self._control.is_alive:
             return self._rescue()
         if self.loop_client.loop.is_running:
@@ -152,11 +188,12 @@ class MultiProcessBackend:
         return self._arm.safety_mode()
 
     def close(self) -> None:
-        """Brake the arm, let the processes end, the simulated rig last."""
+        """Brake the arm if it got torques and end all processes; safe to repeat."""
         if not self._children:
             return
         try:
-            self.idle()
+            if self._may_hold():
+                self.idle()
             if self._control.is_alive and self.loop_client.loop.is_running:
                 self.loop_client.leave()
         except TractionError:
@@ -166,6 +203,31 @@ class MultiProcessBackend:
                 child.stop()
             self._children.clear()
             self._shared.close()
+            if self._lock is not None:
+                self._lock.close()
+
+    def _may_hold(self) -> bool:
+        """Return whether the arm may have torques that its process does not end."""
+        if not self._is_claimed:
+            return False
+        loop_client = self.loop_client
+        if not self._control.is_alive:
+            return True
+        is_idle = loop_client.status.state is ArmState.IDLE
+        return loop_client.loop.is_running and not is_idle
+
+    def _spawn_fake(self, settings: dict[str, Any]) -> Child:
+        """Start the simulated rig and tell the others where its devices are."""
+        child = self._spawn("fake rig", "fakes.serving.rig_process:main", settings)
+        served = make_proxy(DeviceServer, child.call).devices()
+        self._jobs.control["can"] = {
+            "interface": served.interface,
+            "channel": served.channel,
+            "bitrate": served.bitrate,
+        }
+        if self._jobs.reader is not None:
+            self._jobs.reader["port"] = served.port
+        return child
 
     def _spawn_control(self) -> Child:
         target = "experiments.rig.workers:control"

@@ -10,6 +10,7 @@ from typing import Any
 from acquisition import Clock, SimulationControl, SystemClock
 from acquisition.ipc import SharedLayout
 from experiments.arguments import FRICTION
+from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import (
     build_tool,
@@ -85,6 +86,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     Raises:
         SettingsError: a calibration cannot be used.
         LinkError: a process cannot open its bus or port.
+        PreflightError: another program has the arm.
     """
     # A simulated world does not know what was calibrated.
     world: SimulatedRig | None = None
@@ -107,9 +109,8 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     else:
         facts = world.facts() if world is not None else None
         clock = SystemClock()
-        backend = MultiProcessBackend(
-            _jobs(settings, row, gravity_text, facts), shared, clock
-        )
+        jobs = _jobs(settings, row, gravity_text, facts)
+        backend = _start_processes(jobs, settings, shared, clock)
         if backend.fake is not None:
             simulation = connect_simulation(backend.fake)
     payload = payload_of(tool)
@@ -127,6 +128,21 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         simulation=simulation,
         is_stepped=is_stepped,
     )
+
+
+def _start_processes(
+    jobs: WorkerConfigs, settings: Settings, shared: SharedLayout, clock: Clock
+) -> MultiProcessBackend:
+    """Return the backend in processes; a bus that others may open is locked first."""
+    if jobs.fake is not None:  # its bus is its own
+        return MultiProcessBackend(jobs, shared, clock)
+    can = settings.rig.can
+    lock = ArmLock(can.interface, can.channel)
+    try:
+        return MultiProcessBackend(jobs, shared, clock, lock)
+    except BaseException:
+        lock.close()
+        raise
 
 
 def _jobs(

@@ -11,6 +11,10 @@ from wam.driver import ArmInfo
 class ArmService(Protocol):
     """The process that drives the arm; it answers while its loop is not running."""
 
+    def claim(self) -> None:
+        """Open the bus and refuse an arm that is another program's; see `claim`."""
+        ...
+
     def start_arm(self) -> ArmInfo:
         """Discover, wake and query the arm; raises as `WamArm.start`."""
         ...

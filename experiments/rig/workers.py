@@ -32,6 +32,7 @@ from experiments.rig.build import (
     build_tool,
     open_bus_sensor,
 )
+from experiments.rig.claim import check_alone, check_inactive, release
 from experiments.rig.gravity import build_law_model
 from experiments.rig.services import ArmService, SensorService
 from experiments.settings import RigSettings, TerrainRow
@@ -86,7 +87,7 @@ class ControlWorker:
         self._grants = request(wish)
 
     def serve(self) -> None:
-        """Answer until the console hangs up; the arm is braked then."""
+        """Answer until the console hangs up; an arm that got torques is braked then."""
         server = RpcServer(bind(ArmService, self))
         try:
             while not self._is_orphaned:
@@ -97,8 +98,27 @@ class ControlWorker:
         except ChannelClosedError:
             pass
         finally:
-            if self._arm is not None:
-                self._arm.close()
+            self._release()
+
+    def claim(self) -> None:
+        """Open the bus and refuse an arm that is another program's.
+
+        Raises:
+            PreflightError: another master talks, or the arm is active.
+            LinkError: the bus cannot be opened, or is down.
+        """
+        arm = self._opened()
+        if arm.sent_ns:  # it is this program's already
+            return
+        assert self._link is not None
+        can = self._context.settings["can"]
+        try:
+            bus = f"{can['interface']}:{can['channel']}"
+            check_alone(self._link, self._clock, bus)
+            check_inactive(arm)
+        except TractionError:
+            self._release()
+            raise
 
     def start_arm(self) -> ArmInfo:
         """Discover, wake and query the arm; raises as `WamArm.start`."""
@@ -158,7 +178,7 @@ class ControlWorker:
         self._loop_server = build_loop_server(parts)
 
     def _run(self, loop_server: LoopServer) -> None:
-        """Run the loop; whatever ends it, the arm is braked."""
+        """Run the loop; whatever ends it, an arm that got torques is braked."""
         self._context.shared.memory.touch()
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
@@ -166,8 +186,16 @@ class ControlWorker:
                 loop_server.is_orphaned = self._is_orphaned
                 loop.step()
         finally:
-            self._opened().idle()
+            arm = self._opened()
+            if arm.sent_ns:  # any other arm is left as it is
+                arm.idle()
             loop_server.leave()
+
+    def _release(self) -> None:
+        """Brake the arm if it got torques from here, and give the bus back."""
+        if self._arm is not None and self._link is not None:
+            release(self._arm, self._link)
+        self._arm = self._link = None
 
     def _ring_bell(self) -> None:
         """Ring the bell of the console's terminal, if it has one."""

@@ -5,6 +5,7 @@ import traceback
 from acquisition import TractionError
 from acquisition.control_loop import ArmState
 from analysis.data import MINIMUM_TRAVEL_SHARE
+from experiments.arguments import data_option
 from experiments.messages import CATALOGUE, FaultContext, rest_text
 from experiments.operator import (
     REJECT_REASONS,
@@ -27,6 +28,10 @@ from experiments.trial import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
 _ENDED = "session ended at the review"
+_NO_VERDICT = (
+    "{trial} has no verdict yet: [k] keeps it, [r1]..[r5] rejects it; the session ends "
+    "then. [q] again ends it now: {trial} goes to rejected/, nothing is lost."
+)
 
 
 class SessionRunner:
@@ -156,6 +161,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     context.say(screen_keys(Prompt.REVIEW))
     context.fault_context = FaultContext(name.kept)
     is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
+    is_asked = not is_whole  # one that is not whole is rejected by [q] at once
     feet = context.watch_foot()
     while True:
         try:
@@ -171,7 +177,10 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
                 context.reject(name, _ENDED)
                 raise
             continue
-        if _apply_key(context, name, key or feet.key("k")):
+        if key_action(Prompt.REVIEW, key) is KeyAction.QUIT and not is_asked:
+            is_asked = context.is_last = True
+            context.say(_NO_VERDICT.format(trial=name.kept))
+        elif _apply_key(context, name, key or feet.key("k")):
             return
 
 
@@ -190,5 +199,16 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
         return True
     if action is KeyAction.QUIT or context.stop.count:
         context.reject(name, _ENDED)
+        context.say(_later(context, name))
         raise StopRequestedError
     return False
+
+
+def _later(context: RunContext, name: TrialName) -> str:
+    """Return where a trial without a verdict went, and how it is kept after all."""
+    session = context.metadata.folder
+    command = f"traction verdict {session.id} {name.rejected} keep REASON"
+    return (
+        f"{name.kept} was not judged: rejected/{name.rejected}.mcap. To keep it: "
+        f"{command}{data_option(session.path.parent.parent)}"
+    )

@@ -7,9 +7,10 @@ from .annotations import (
     parse_trial,
     trial_path,
 )
+from .board_notes import board_notes
 from .crash_recovery import recover_session
 from .journal import Journal, open_journal
-from .lock import LOCK_FILE, session_lock, sign
+from .lock import LOCK_FILE, locked_error, owner_of, session_lock, sign
 from .matrix_board import DigestCache, MatrixRow, count_board, next_steps, parse_where
 from .reducer import KEEP, refusal
 from .sidecar import TrialOutcome, sidecar_of
@@ -46,6 +47,7 @@ __all__ = [
     "UnfinishedSession",
     "add_note",
     "add_remark",
+    "board_notes",
     "change_verdict",
     "clean_text",
     "count_board",
@@ -54,9 +56,11 @@ __all__ = [
     "find_unfinished",
     "iso_utc",
     "list_sessions",
+    "locked_error",
     "looks_like_trial",
     "next_steps",
     "open_journal",
+    "owner_of",
     "parse_trial",
     "parse_where",
     "read_json",

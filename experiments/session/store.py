@@ -14,6 +14,7 @@ from typing import Any, BinaryIO, cast
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 
+JOURNAL_FILE = "events.jsonl"
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
     r"(?P<fake>\.fake)?$"
@@ -62,7 +63,7 @@ class SessionFolder:
             TrialFileError: the disk is full or gone.
         """
         line = (json.dumps(event, allow_nan=False) + "\n").encode()
-        path = self.path / "events.jsonl"
+        path = self.path / JOURNAL_FILE
         with _writing(path), path.open("a+b") as file:
             file.write(b"\n" + line if _is_torn(file) else line)
             file.flush()
@@ -70,7 +71,7 @@ class SessionFolder:
 
     def events(self) -> list[dict[str, Any]]:
         """Return the journal; a torn line is left out."""
-        path = self.path / "events.jsonl"
+        path = self.path / JOURNAL_FILE
         if not path.exists():
             return []
         lines = map(_as_object, path.read_bytes().splitlines())

@@ -77,7 +77,8 @@ class _Usage:
 def run_bench(rig: Rig, processes: dict[str, int], seconds: float) -> BenchReport:
     """Let the loop of `rig` run for `seconds` with the recorder on, and measure.
 
-    The arm of a real rig stays idle; a simulated one is held by the control law.
+    The arm of a real rig stays idle and gets no torque; a simulated one is held by the
+    control law.
 
     Raises:
         PreflightError: no cycle ran.

@@ -113,7 +113,7 @@ def test_check_finds_the_simulated_rig_fit(config, tmp_path):
     assert (done.code, done.err) == (0, "")
     assert done.out.splitlines()[0].endswith("SIMULATED")
     assert done.out.count(" ✔ ") + done.out.count(" ▲ code") == 9
-    assert done.out.endswith("Fit to run.\n")
+    assert done.out.endswith("Fit to run. No torque was sent.\n")
     assert list(tmp_path.iterdir()) == []
 
 

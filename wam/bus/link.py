@@ -90,11 +90,13 @@ class CanLink:
 
     Frames of hosts (FROM = 0, the own ones included), remote, extended and error
     frames are dropped. The safety module's broadcast of a change of mode has no known
-    content: it is counted in `mode_hints` and dropped.
+    content: it is counted in `mode_hints` and dropped. A bus does not return what was
+    sent through it, so a frame of a host that arrives is another master's.
 
     Attributes:
         mode_hints: broadcasts of the safety module so far.
         error_frames: error frames of the controller so far.
+        foreign_ids: identifiers of hosts' frames that have arrived so far.
     """
 
     def __init__(self, bus: CanBus, tap: Tap | None = None) -> None:
@@ -108,6 +110,7 @@ class CanLink:
         self._tap = tap
         self.mode_hints = 0
         self.error_frames = 0
+        self.foreign_ids: set[int] = set()
         self._bus = bus
         self._inbox: list[Frame] = []
         self._is_open = True
@@ -193,6 +196,8 @@ class CanLink:
                 self.mode_hints += 1
             elif can_id & SENDER_MASK:
                 self._inbox.append(frame)
+            else:
+                self.foreign_ids.add(can_id)
 
 
 def _cannot_open(

@@ -91,11 +91,24 @@ def test_a_rejected_trial_has_its_reason(tmp_path, digit):
     )
 
 
-def test_quit_at_the_review_rejects_the_trial_and_ends(tmp_path):
-    context = make_context(tmp_path, Keys("q"))
+def test_quit_at_the_review_asks_for_the_verdict_that_is_missing(tmp_path, capsys):
+    context = make_context(tmp_path, Keys("q", "k"))
+    ask_verdict(context, FIRST, reviewed(context))
+    assert "T01 has no verdict yet" in capsys.readouterr().out
+    assert context.journal.state.kept == (1,)
+    assert context.is_last
+
+
+def test_quit_twice_at_the_review_says_how_the_trial_is_kept_after_all(
+    tmp_path, capsys
+):
+    context = make_context(tmp_path, Keys("q", "q"))
     with pytest.raises(StopRequestedError):
         ask_verdict(context, FIRST, reviewed(context))
     assert names(context)[-1] == Event.TRIAL_REJECTED
+    said = capsys.readouterr().out
+    assert "rejected/T01a.mcap" in said
+    assert "traction verdict" in said
 
 
 def test_a_fault_during_the_review_leaves_the_verdict_to_the_operator(tmp_path, capsys):

@@ -1,0 +1,195 @@
+"""One program per arm and host: a lock that its owner's death opens.
+
+A file for each interface and channel lies in a folder that every user of the machine
+may write to. It is never removed, so that all who wait for it mean the same file, and
+nothing in it is believed but the lock of the kernel: its words only name the owner.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import shlex
+import stat
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import cast
+from urllib.parse import quote
+
+from acquisition import NS_PER_S, PreflightError, SystemClock
+from experiments.messages import preflight_error
+
+FOLDERS = (Path("/run/lock"), Path("/var/lock"), Path("/var/tmp"), Path("/tmp"))
+_SHARED = stat.S_ISVTX | stat.S_IWOTH  # everybody may write, nobody removes another's
+_FLAGS = os.O_NOFOLLOW | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
+_MODE = 0o666  # any user may be the next owner
+_LONGEST_NAME = 200
+_LONGEST_COMMAND = 120
+_MOST_BYTES = 1024
+_TRIES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class ArmOwner:
+    """Who has an arm, as its process has written it; "?" where it has not.
+
+    Attributes:
+        pid: number of the process.
+        command: its command line.
+        since: time of day [UTC] at which it took the arm.
+    """
+
+    pid: str = "?"
+    command: str = "another program"
+    since: str = "?"
+
+
+class ArmLock:
+    """The right to open the bus of an arm, held until `close` or the owner's death."""
+
+    def __init__(
+        self, interface: str, channel: str, folders: Sequence[Path] = FOLDERS
+    ) -> None:
+        """Take the lock; the bus must not be open yet.
+
+        Args:
+            interface: python-can's name of the adapter.
+            channel: the adapter's name, or the path of a served bus.
+            folders: where the lock's file may be; the first one all may write to is.
+
+        Raises:
+            PreflightError: another process has the arm, or the file cannot be used.
+        """
+        self.path = lock_folder(folders) / lock_name(interface, channel)
+        self._descriptor = _open_safely(self.path)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            owner = _read_owner(self._descriptor)
+            self.close()
+            raise preflight_error(
+                "arm-busy",
+                bus=f"{interface}:{channel}",
+                pid=owner.pid,
+                command=owner.command,
+                since=owner.since,
+            ) from None
+        except OSError as error:
+            self.close()
+            raise _unusable(self.path, error.strerror or str(error)) from error
+        _write_owner(self._descriptor)
+
+    def close(self) -> None:
+        """Let others have the arm; a second call does nothing."""
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor = -1
+
+
+def lock_folder(folders: Sequence[Path] = FOLDERS) -> Path:
+    """Return the first of `folders` that all users may write to, the same for all.
+
+    Raises:
+        PreflightError: there is none.
+    """
+    for folder in folders:
+        try:
+            mode = folder.stat().st_mode
+        except OSError:
+            continue
+        if stat.S_ISDIR(mode) and mode & _SHARED == _SHARED:
+            return folder
+    names = ", ".join(map(str, folders))
+    raise preflight_error(
+        "arm-lock", detail=f"No folder for locks is open to all users: {names}."
+    )
+
+
+def lock_name(interface: str, channel: str) -> str:
+    """Return the name of the lock's file; a path is one bus by whatever link."""
+    if interface == "traction-fake" or "/" in channel:
+        channel = os.path.realpath(channel)
+    name = quote(f"{interface}:{channel}", safe="")
+    if len(name) > _LONGEST_NAME:
+        name = hashlib.sha256(name.encode()).hexdigest()
+    return f"traction-{name}.lock"
+
+
+def _open_safely(path: Path) -> int:
+    """Return a descriptor of the lock's file, made if it is not there.
+
+    What is there may have been put there by any user: only a plain file with one name
+    is taken, no link is followed, and nothing is waited for.
+    """
+    try:
+        descriptor = _open_or_make(path)
+    except OSError as error:
+        raise _unusable(path, error.strerror or str(error)) from error
+    facts = os.fstat(descriptor)
+    if not stat.S_ISREG(facts.st_mode) or facts.st_nlink != 1:
+        os.close(descriptor)
+        raise _unusable(path, "it is not a plain file")
+    return descriptor
+
+
+def _open_or_make(path: Path) -> int:
+    for _ in range(_TRIES):
+        try:
+            return os.open(path, os.O_RDWR | _FLAGS)
+        except FileNotFoundError:
+            pass
+        except PermissionError:
+            return os.open(path, os.O_RDONLY | _FLAGS)  # enough for the lock
+        try:
+            made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, _MODE)
+        except FileExistsError:
+            continue  # somebody was faster
+        os.fchmod(made, _MODE)  # whatever the umask is
+        return made
+    raise OSError("it comes and goes")
+
+
+def _write_owner(descriptor: int) -> None:
+    """Say who has the arm; another user's file may not let us, and is locked anyway."""
+    now = datetime.fromtimestamp(SystemClock().utc_ns() // NS_PER_S, UTC)
+    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
+    facts = {
+        "pid": os.getpid(),
+        "command": command[:_LONGEST_COMMAND],
+        "since": f"{now:%Y-%m-%d %H:%M:%S} UTC",
+    }
+    try:
+        os.ftruncate(descriptor, 0)
+        os.pwrite(descriptor, json.dumps(facts).encode(), 0)
+    except OSError:
+        return
+
+
+def _read_owner(descriptor: int) -> ArmOwner:
+    """Return what the owner has written, without anything that is not printable."""
+    try:
+        facts: object = json.loads(os.pread(descriptor, _MOST_BYTES, 0))
+    except (OSError, ValueError, RecursionError):
+        return ArmOwner()
+    if not isinstance(facts, dict):
+        return ArmOwner()
+    said = cast("dict[str, object]", facts)
+    names = {"pid", "command", "since"}
+    return ArmOwner(
+        **{name: _printable(str(said[name])) for name in names & said.keys()}
+    )
+
+
+def _printable(text: str) -> str:
+    return "".join(c for c in text if c.isprintable())[:_LONGEST_COMMAND]
+
+
+def _unusable(path: Path, why: str) -> PreflightError:
+    return preflight_error(
+        "arm-lock", detail=f"{path} cannot be the arm's lock: {why}."
+    )

@@ -1,0 +1,22 @@
+"""Shared memory is for machines that keep the order of stores."""
+
+import platform
+
+import pytest
+
+from acquisition.errors import PreflightError
+from acquisition.ipc.rings import require_ordered_stores
+
+
+@pytest.mark.parametrize("machine", ["x86_64", "AMD64", "i386", "i686"])
+def test_an_x86_keeps_the_order(machine, monkeypatch):
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    require_ordered_stores()
+
+
+@pytest.mark.parametrize("machine", ["aarch64", "arm64", "riscv64", "ppc64le", ""])
+def test_any_other_machine_is_refused_by_name(machine, monkeypatch):
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    with pytest.raises(PreflightError, match=machine or "unknown") as refused:
+        require_ordered_stores()
+    assert "--fake --fast" in refused.value.hint

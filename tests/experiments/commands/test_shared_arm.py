@@ -1,0 +1,164 @@
+"""Commands that meet an arm on a bus that other programs can open too."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from acquisition.clock import SystemClock
+from acquisition.control_loop import RealtimeRequest, request
+from acquisition.devices import SafetyMode
+from experiments.rig.arm_lock import ArmLock
+from fakes.bus.client import SocketBus
+from fakes.bus.hub import SocketHub
+from fakes.pucks.network import PuckNetwork
+from fakes.pucks.options import NetworkOptions
+from fakes.serving.puck_server import PuckServer
+from tests.experiments.program import traction, write_config
+from tests.fakes.buses import COUNTS
+from tests.fakes.stepped import Motors
+from tests.wam.bus.test_link import message
+
+COMMANDS = {
+    "check": ("check",),
+    "bench": ("bench", "--seconds", 1),
+    "zero": ("zero", "--yes"),
+}
+MODE_ASKED = (0x00A, b"\x08")
+TORQUES = (" fake0 401#", " fake0 402#")
+TRIES = 6
+SET_MODE = " fake0 00A#88"
+
+
+@pytest.fixture
+def config(tmp_path):
+    """Return settings of a real rig whose bus is served at `tmp_path`/bus."""
+    path = write_config(tmp_path, rig=('"socketcan" ', '"traction-fake" '))
+    text = path.read_text().replace('"can0"', f'"{tmp_path}/bus"')
+    path.write_text(text.replace('"/dev/ttyUSB0"', f'"{tmp_path}/sensor"'))
+    return path
+
+
+@pytest.fixture
+def active_arm(tmp_path):
+    """Return a served arm that is active and needs no heartbeat, with its frames."""
+    clock = SystemClock()
+    options = NetworkOptions(safety_mode=SafetyMode.ACTIVE, heartbeat_ns=10**15)
+    motors = Motors(COUNTS)
+    network = PuckNetwork(motors, options, clock.now_ns())
+    server = PuckServer(network, motors, SocketHub(tmp_path / "bus"), clock)
+    server.frames = []
+    server.has_master = False
+    other = SocketBus(str(tmp_path / "bus"))
+    is_over = threading.Event()
+
+    def serve():
+        request(RealtimeRequest(60, None))  # where it may: a busy machine stalls it
+        while not is_over.is_set():
+            server.step(lambda can_id, data: server.frames.append((can_id, data)))
+            while other.recv(0) is not None:
+                pass
+            if server.has_master:
+                other.send(message(0x404, b"\x30"))
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    yield server
+    is_over.set()
+    thread.join()
+    other.shutdown()
+    server.close()
+
+
+def refused(command, config, tmp_path):
+    done = traction(*COMMANDS[command], "--config", config, "--data", tmp_path)
+    assert done.code == 3, done.err
+    return done.err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path):
+    lock = ArmLock("traction-fake", str(tmp_path / "bus"))
+    try:
+        err = refused(command, config, tmp_path)
+    finally:
+        lock.close()
+        lock.path.unlink()
+    assert f"in use: process {os.getpid()}" in err
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_active_arm_is_asked_for_its_mode_and_left_active(
+    command, config, tmp_path, active_arm
+):
+    assert "ACTIVE" in refused(command, config, tmp_path)
+    own = [frame for frame in active_arm.frames if frame[0] < 0x400]
+    assert set(own) == {MODE_ASKED}
+    assert active_arm.network.safety_mode is SafetyMode.ACTIVE
+
+
+@pytest.mark.wall_clock
+@pytest.mark.parametrize("command", COMMANDS)
+def test_another_master_is_heard_and_nothing_is_sent_to_its_arm(
+    command, config, tmp_path, active_arm
+):
+    active_arm.has_master = True
+    assert "404" in refused(command, config, tmp_path)
+    assert {can_id for can_id, _ in active_arm.frames if not can_id & 0x3E0} == {0x404}
+    assert active_arm.network.safety_mode is SafetyMode.ACTIVE
+
+
+def patiently(*arguments):
+    """Run a command again while the served arm, which is not in time, seems silent."""
+    for _ in range(TRIES):
+        done = traction(*arguments)
+        if done.code == 0:
+            break
+    assert done.code == 0, done.err
+    return done
+
+
+@pytest.mark.wall_clock
+def test_no_torque_and_no_mode_is_sent_while_the_arm_is_zeroed_checked_and_timed(
+    config, tmp_path
+):
+    log = tmp_path / "bus.log"
+    served = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "experiments", "fake", "--idle-first"),
+            *("--can", f"traction-fake:{tmp_path}/bus", "--serial"),
+            *(str(tmp_path / "sensor"), "--can-log", str(log)),
+        ],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    options = ("--config", config, "--data", tmp_path)
+    try:
+        assert served.stdout.readline().startswith("ready")
+        patiently("zero", "--yes", *options)
+        checked = patiently("check", "--loop-test", 0.5, *options)
+        assert "No torque was sent" in checked.out
+        timed = patiently("bench", "--seconds", 1, "--json", *options)
+        assert not json.loads(timed.out)["is_powered"]
+        served.send_signal(signal.SIGTERM)
+        served.wait(30)
+    finally:
+        served.kill()
+        served.communicate()
+    text = log.read_text()
+    assert text.count(" fake0 404#") > 500
+    assert not [frame for frame in (*TORQUES, SET_MODE) if frame in text]
+
+
+def test_a_simulated_check_sends_no_torque(config, tmp_path):
+    log = tmp_path / "bus.log"
+    options = ("--config", config, "--data", tmp_path)
+    done = traction("check", "--fake", "--fast", "--can-log", log, *options)
+    assert done.code == 0, done.err
+    assert not [torque for torque in TORQUES if torque in log.read_text()]

@@ -1,0 +1,62 @@
+"""An empty board says why it is empty; a session that is open elsewhere says so."""
+
+import json
+import shutil
+
+import pytest
+
+from experiments.session.lock import session_lock
+from experiments.session.store import create_session
+from tests.experiments.program import only_session, traction
+
+
+@pytest.fixture
+def data(recorded, tmp_path):
+    """Return a copy of a data folder with one session."""
+    shutil.copytree(recorded.data, tmp_path / "data")
+    return tmp_path / "data"
+
+
+def status(config, data, *options):
+    done = traction("status", "--config", config, "--data", data, *options)
+    assert done.code == 0
+    return done
+
+
+def test_a_whole_board_has_no_remarks(config, data):
+    assert status(config, data).err == ""
+
+
+def test_a_data_folder_that_does_not_exist_is_named(config, tmp_path):
+    done = status(config, tmp_path / "typo")
+    assert f"no data folder {tmp_path / 'typo'}" in done.err
+
+
+def test_a_data_folder_without_sessions_is_said_to_have_none(config, tmp_path):
+    assert "no sessions" in status(config, tmp_path).err
+
+
+def test_a_renamed_session_is_said_to_be_left_out(config, data):
+    folder = only_session(data)
+    renamed = folder.rename(folder.with_name("my best session"))
+    assert str(renamed) in status(config, data).err
+
+
+def test_a_session_of_an_unknown_terrain_is_said_to_be_left_out(config, data):
+    folder = only_session(data)
+    folder.rename(folder.with_name(folder.name.replace("TF", "MOON")))
+    assert "MOON is no terrain of the matrix" in status(config, data).err
+
+
+def test_a_condition_that_matches_nothing_is_said(config, data):
+    done = status(config, data, "--where", "stones=huge,kind=live", "--json")
+    assert "Nothing matches --where stones=huge,kind=live" in done.err
+    assert json.loads(done.out) == []
+
+
+def test_resume_says_that_the_session_is_open_elsewhere(tmp_path):
+    folder = create_session(tmp_path, "TF", is_simulated=True, utc_ns=0)
+    with session_lock(folder):
+        done = traction("resume", "--data", tmp_path)
+    assert done.code == 2
+    assert f"{folder.id} is open in process" in done.err

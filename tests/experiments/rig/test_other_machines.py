@@ -1,0 +1,23 @@
+"""What a machine that is no x86 can do."""
+
+import platform
+
+import pytest
+
+from tests.experiments.program import traction
+
+
+@pytest.fixture(autouse=True)
+def on_arm(monkeypatch):
+    monkeypatch.setattr(platform, "machine", lambda: "aarch64")
+
+
+def test_processes_are_not_started(config, tmp_path):
+    done = traction("check", "--fake", "--config", config, "--data", tmp_path)
+    assert done.code == 3
+    assert "aarch64" in done.err
+
+
+def test_a_simulation_in_one_thread_runs(config, tmp_path):
+    options = ("--fake", "--fast", "--config", config, "--data", tmp_path)
+    assert traction("check", *options).code == 0
