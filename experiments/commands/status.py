@@ -17,6 +17,7 @@ EXAMPLES = """\
 
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
+_NOT_AS_KEPT = 6  # exit code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,8 +38,14 @@ def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
     import json
 
-    from experiments.operator import Console
-    from experiments.session import DigestCache, count_board, next_steps, parse_where
+    from experiments.operator import BAD, Console
+    from experiments.session import (
+        DigestCache,
+        compare_board,
+        count_board,
+        next_steps,
+        parse_where,
+    )
     from experiments.settings import load_settings
 
     settings = load_settings(args.config)
@@ -61,13 +68,16 @@ def run(args: argparse.Namespace) -> int:
     if args.follow:
         return _follow(lambda: [*_plain(board := count()), *steps(board)], console)
     board = count()
+    deviations = compare_board(args.data, where, digest)
     if args.json:
         console.say(json.dumps([line.as_dict() for line in board], indent=1))
-        return 0
-    console.table(_HEADER, [_row(line) for line in board])
-    for step in steps(board):
-        console.say(step)
-    return 0
+    else:
+        console.table(_HEADER, [_row(line) for line in board])
+        for step in steps(board):
+            console.say(step)
+    for deviation in deviations:
+        console.problem(f"{BAD} {deviation.text()}.")
+    return _NOT_AS_KEPT if deviations else 0
 
 
 def _row(line: MatrixRow) -> tuple[str, ...]:

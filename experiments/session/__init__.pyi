@@ -9,9 +9,24 @@ from .annotations import (
 )
 from .crash_recovery import recover_session
 from .journal import Journal, open_journal
+from .kept_files import (
+    Deviation,
+    KeptDataError,
+    check_kept,
+    compare_kept,
+    compare_trial,
+    kept_data_error,
+)
 from .lock import LOCK_FILE, session_lock, sign
-from .matrix_board import DigestCache, MatrixRow, count_board, next_steps, parse_where
-from .reducer import KEEP, refusal
+from .matrix_board import (
+    DigestCache,
+    MatrixRow,
+    compare_board,
+    count_board,
+    next_steps,
+    parse_where,
+)
+from .reducer import KEEP, refusal, replay
 from .sidecar import TrialOutcome, sidecar_of
 from .states import Event, SessionPhase, table_lines
 from .store import (
@@ -35,9 +50,11 @@ __all__ = [
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
+    "Deviation",
     "DigestCache",
     "Event",
     "Journal",
+    "KeptDataError",
     "MatrixRow",
     "SessionFolder",
     "SessionPhase",
@@ -47,12 +64,17 @@ __all__ = [
     "add_note",
     "add_remark",
     "change_verdict",
+    "check_kept",
     "clean_text",
+    "compare_board",
+    "compare_kept",
+    "compare_trial",
     "count_board",
     "create_session",
     "find_session",
     "find_unfinished",
     "iso_utc",
+    "kept_data_error",
     "list_sessions",
     "looks_like_trial",
     "next_steps",
@@ -62,6 +84,7 @@ __all__ = [
     "read_json",
     "recover_session",
     "refusal",
+    "replay",
     "session_lock",
     "session_utc_ns",
     "sha256_of",

@@ -9,6 +9,7 @@ from acquisition import SessionError, SystemClock
 from experiments.operator import WARNING
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import Journal, open_journal
+from experiments.session.kept_files import recorded_facts
 from experiments.session.lock import session_lock
 from experiments.session.reducer import KEEP, refusal
 from experiments.session.states import Event
@@ -185,7 +186,9 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
     path = journal.folder.rejected / f"{name.rejected}.mcap"
     if is_kept:
         path = journal.folder.trials / f"{name.kept}.mcap"
-    if not path.is_file() or sha256_of(path) != sidecar.get("sha256"):
+    wanted = recorded_facts(journal.folder.events(), name).get("sha256")
+    digest = sha256_of(path) if path.is_file() else ""
+    if not digest or {digest} != {sidecar.get("sha256"), wanted or digest}:
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",
             hint="It cannot count. Nothing was changed.",

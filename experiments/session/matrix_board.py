@@ -9,6 +9,7 @@ from pathlib import Path
 
 from acquisition import SettingsError
 from experiments.arguments import data_option
+from experiments.session.kept_files import Deviation, compare_kept
 from experiments.session.lock import owner_of
 from experiments.session.store import SessionFolder, list_sessions, read_json, sha256_of
 from experiments.session.unfinished import find_unfinished
@@ -95,6 +96,20 @@ def count_board(
             if own or (is_wanted and not {"session", "operator"} & set(where)):
                 lines.append(_line(row, own, digest, is_simulated=is_simulated))
     return lines
+
+
+def compare_board(
+    data: Path, where: Mapping[str, str], digest: _Digest = sha256_of
+) -> list[Deviation]:
+    """Return what is missing or changed of the kept trials on the board.
+
+    Args:
+        data: the data folder.
+        where: only sessions with these values, as in `count_board`.
+        digest: what computes the checksum of a file.
+    """
+    sessions = [s for s in list_sessions(data) if _matches(_of_session(s), where)]
+    return [d for session in sessions for d in compare_kept(session, digest)]
 
 
 def parse_where(text: str) -> dict[str, str]:

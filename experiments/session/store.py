@@ -79,17 +79,28 @@ class SessionFolder:
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
         """Return the kept trial files, in order, whose checksum is right.
 
+        It is right where sidecar and journal state it; older journals state none.
+
         Args:
             digest: what computes the checksum of a file; None = `sha256_of`.
         """
         digest = digest or sha256_of
+        recorded = {
+            (event.get("trial"), event.get("attempt")): event["sha256"]
+            for event in self.events()
+            if isinstance(event.get("sha256"), str) and _is_pair(event)
+        }
         kept: list[Path] = []
         for sidecar in sorted(self.trials.glob("T*.json")):
             if not _TRIAL_FILE.match(sidecar.name):
                 continue
             facts = read_json(sidecar)
             path = sidecar.with_suffix(".mcap")
-            is_sound = path.is_file() and digest(path) == facts.get("sha256")
+            stated, attempt = facts.get("sha256"), facts.get("attempt")
+            number = int(sidecar.stem[1:3])
+            key = (number, attempt if type(attempt) is int else 0)
+            is_recorded = recorded.get(key, stated) == stated
+            is_sound = is_recorded and path.is_file() and digest(path) == stated
             if facts.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
@@ -105,6 +116,10 @@ def read_json(path: Path) -> dict[str, Any]:
         return _as_object(path.read_bytes()) or {}
     except OSError:
         return {}
+
+
+def _is_pair(event: Mapping[str, object]) -> bool:
+    return type(event.get("trial")) is int and type(event.get("attempt")) is int
 
 
 def _as_object(text: bytes) -> dict[str, Any] | None:
