@@ -8,6 +8,13 @@ from .annotations import (
     trial_path,
 )
 from .crash_recovery import recover_session
+from .data_files import (
+    read_json,
+    sha256_of,
+    write_json,
+    write_new_text,
+    write_text,
+)
 from .journal import Journal, open_journal
 from .kept_files import (
     Deviation,
@@ -35,12 +42,7 @@ from .store import (
     find_session,
     iso_utc,
     list_sessions,
-    read_json,
     session_utc_ns,
-    sha256_of,
-    write_json,
-    write_new_text,
-    write_text,
 )
 from .trial_files import add_remark
 from .trial_name import TrialName

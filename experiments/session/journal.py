@@ -3,8 +3,9 @@
 from dataclasses import dataclass, field
 
 from acquisition import Clock, SessionError
+from experiments.session.data_files import read_json, write_json
 from experiments.session.reducer import KEEP, SessionState, apply, refusal, replay
-from experiments.session.store import SessionFolder, iso_utc, read_json, write_json
+from experiments.session.store import SessionFolder, iso_utc
 from experiments.session.trial_files import decision_of, find_sidecar, move_trial_files
 
 

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from acquisition import SessionError
+from acquisition import SessionError, TrialFileError
+from acquisition.trial_file import is_there
+from experiments.session.data_files import read_json, sha256_of
+from experiments.session.journal_lines import damaged_lines
 from experiments.session.reducer import KEEP, replay
-from experiments.session.store import SessionFolder, read_json, sha256_of
+from experiments.session.store import SessionFolder
 from experiments.session.trial_files import decision_of, find_sidecar
 from experiments.session.trial_name import TrialName
 
@@ -52,11 +55,31 @@ def compare_kept(
         folder: the session.
         digest: what computes the checksum of a file.
     """
+    try:
+        return [Deviation(folder.id, *pair) for pair in _compare(folder, digest)]
+    except TrialFileError as error:
+        return [unreadable(folder, error)]
+
+
+def _compare(
+    folder: SessionFolder, digest: Callable[[Path], str]
+) -> list[tuple[str, str]]:
+    """Return (file, problem) of every deviation.
+
+    Raises:
+        TrialFileError: a file or folder that all depends on cannot be read.
+    """
     events = folder.events()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
-    found: list[tuple[str, str]] = []
+    found = [
+        ("events.jsonl", f"has a wrong checksum in line {number}")
+        for number in damaged_lines(folder.journal_text())
+    ]
     for name in kept:
-        found += _check_trial(folder, name, recorded_facts(events, name), digest)
+        try:
+            found += _check_trial(folder, name, recorded_facts(events, name), digest)
+        except TrialFileError as error:
+            found.append((_below(folder, error), error.reason))
     judged = {d.name for d in map(decision_of, events) if d is not None}
     for path in sorted(folder.trials.glob("T??.json")):
         facts = read_json(path)
@@ -64,7 +87,18 @@ def compare_kept(
         is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
         if events and facts.get("verdict") == KEEP and not is_judged:
             found.append((f"trials/{path.name}", "is kept, the journal knows nothing"))
-    return [Deviation(folder.id, file, problem) for file, problem in found]
+    return found
+
+
+def _below(folder: SessionFolder, error: TrialFileError) -> str:
+    """Return the file of an error, below the folder of the session."""
+    is_below = error.path.is_relative_to(folder.path)
+    return str(error.path.relative_to(folder.path) if is_below else error.path)
+
+
+def unreadable(folder: SessionFolder, error: TrialFileError) -> Deviation:
+    """Return a file that leads out of the session as a deviation."""
+    return Deviation(folder.id, _below(folder, error), error.reason)
 
 
 def compare_trial(folder: SessionFolder, path: Path) -> list[Deviation]:
@@ -115,7 +149,7 @@ def _check_trial(
     """Return (file, problem) for each file of a kept trial that is not sound."""
     sidecar = find_sidecar(folder, name)
     path = folder.trials / f"{name.kept}.mcap"
-    if not path.is_file() and (folder.rejected / f"{name.rejected}.json").is_file():
+    if not is_there(path) and is_there(folder.rejected / f"{name.rejected}.json"):
         path = folder.rejected / f"{name.rejected}.mcap"  # follows at the next opening
     stated, found = sidecar.get("sha256"), list[tuple[str, str]]()
     wanted = event.get("sha256", stated)
@@ -123,7 +157,7 @@ def _check_trial(
         found.append((f"trials/{name.kept}.json", "is missing or unreadable"))
     elif stated != wanted:
         found.append((f"trials/{name.kept}.json", "states another checksum"))
-    if not path.is_file():
+    if not is_there(path):
         found.append((f"trials/{path.name}", "is missing"))
     elif wanted and digest(path) != wanted:
         size, before = path.stat().st_size, event.get("size", sidecar.get("size"))

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from mcap.writer import Writer
 
-from experiments.session.store import create_session, write_json
+from experiments.session.data_files import write_json
+from experiments.session.store import create_session
 from tests.experiments.program import (
     digest,
     journal,
