@@ -217,12 +217,12 @@ def _table(headers: Sequence[str], columns: _Columns) -> str:
 
 def _csv(rows: Sequence[Sequence[str]]) -> str:
     text = io.StringIO()
-    plain = [[_plain_cell(cell) for cell in row] for row in rows]
+    plain = [[plain_cell(cell) for cell in row] for row in rows]
     csv.writer(text, lineterminator="\n").writerows(plain)
     return text.getvalue()
 
 
-def _plain_cell(cell: str) -> str:
+def plain_cell(cell: str) -> str:
     """Return a text that no spreadsheet takes for a formula; numbers stay."""
     try:
         float(cell)
