@@ -82,9 +82,19 @@ def add_reopening(parser: ArgumentParser) -> None:
         metavar="FILE|auto",
         help="answers to the reviews, only if simulated",
     )
+    add_allow_missing(parser)
     add_fault(parser)
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
+    )
+
+
+def add_allow_missing(parser: ArgumentParser) -> None:
+    """Declare that kept trials which are missing or changed stop nothing."""
+    parser.add_argument(
+        "--allow-missing",
+        action="store_true",
+        help="go on without kept trials that are missing or changed",
     )
 
 

@@ -86,7 +86,10 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),
     # A late confirmation. While the arm is powered the guard judges the circuit.
-    ArmEvent.CIRCUIT_BRAKED: _only(ArmState.IDLE, ArmState.UNKNOWN),
+    # It brakes anew: only then does zero torque replace what the pucks still have.
+    ArmEvent.CIRCUIT_BRAKED: {
+        state: _BRAKE if state is ArmState.UNKNOWN else _STAY for state in ArmState
+    },
 }
 TRANSITIONS: Mapping[tuple[ArmState, ArmEvent], Transition] = {
     (state, event): _ROWS[event][state] for state in ArmState for event in ArmEvent

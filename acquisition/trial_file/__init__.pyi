@@ -1,4 +1,12 @@
 from .chunks import read_file
+from .data_files import (
+    check_folders,
+    is_there,
+    open_data,
+    open_folder,
+    read_data,
+)
+from .publishing import sync_directory
 from .reader import TrialReader
 from .recover import Recovery, recover_file, recovered_path
 from .salvage import recorded_seconds
@@ -21,10 +29,16 @@ __all__ = [
     "TrialReader",
     "TrialWriter",
     "VerifiedFile",
+    "check_folders",
+    "is_there",
+    "open_data",
+    "open_folder",
     "publish",
+    "read_data",
     "read_file",
     "recorded_seconds",
     "recover_file",
     "recovered_path",
+    "sync_directory",
     "verify_file",
 ]

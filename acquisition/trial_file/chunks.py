@@ -13,9 +13,9 @@ import zstandard
 from mcap.exceptions import McapError
 
 from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import read_data
 
 RECORD_LIMIT = 16 * 2**20  # bytes of one record, and of one chunk unpacked
-FILE_LIMIT = 2 * 2**30  # bytes of one file
 _UNPACKED_FLOOR = 64 * 2**20
 _UNPACKED_RATIO = 100  # an arm at rest packs twenty times, zeros a thousand times
 _RECORD = struct.Struct("<BQ")  # opcode, length
@@ -57,12 +57,7 @@ def read_file(path: Path) -> bytes:
         TrialFileError: it cannot be read, is no regular file, or is beyond all size.
     """
     with as_trial_file_error(path):
-        if path.exists() and not path.is_file():
-            raise TrialFileError(path, "is no file")
-        size = path.stat().st_size
-        if size > FILE_LIMIT:
-            raise TrialFileError(path, f"has {size} bytes, over {FILE_LIMIT}")
-        return path.read_bytes()
+        return read_data(path)
 
 
 def unpacked_limit(file_bytes: int) -> int:

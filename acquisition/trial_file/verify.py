@@ -1,6 +1,7 @@
 """Read a finished file back and hold it against what the writer counted."""
 
 import hashlib
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from acquisition.clock import PERIOD_NS
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.chunks import as_trial_file_error
+from acquisition.trial_file.data_files import open_data
 from acquisition.trial_file.reader import TopicRows, TrialReader
 from acquisition.trial_file.writer import WriterCounts
 
@@ -61,7 +63,7 @@ def verify_file(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
         raise TrialFileError(path, "holds other messages than were written")
     with as_trial_file_error(path):
         cycles, duration, worst = _check_cycles(reader)
-        with path.open("rb") as file:
+        with os.fdopen(open_data(path), "rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     return VerifiedFile(
         digest, reader.size, cycles, duration, worst, reader.is_complete

@@ -7,8 +7,9 @@ is unpickled, and whatever does not fit becomes one SettingsError that names the
 import csv
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from analysis.data.terrain_kinds import STONE_SIZES
 
 COLUMNS = ("t", "v_t", "F_n", "F_t")
 DEFAULT_TERRAIN = "table"
-LARGEST_FILE = 1 << 29  # bytes, also of an npz once unpacked
+LARGEST_FILE = 64_000_000  # bytes, also of an npz once unpacked
 MOST_TRIALS = 2000
 
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
@@ -204,7 +205,12 @@ def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
         with path.open(encoding="utf-8-sig", newline="") as file:
             header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
             places = _places(path, header, form.columns)
-            rows = [line for line in file if line.strip()]
+            rows = (line for line in file if line.strip())
+            first = next(rows, None)
+            if first is None:
+                hint = "Check that it was copied whole."
+                raise _refusal(path, "a header but no rows", hint)
+            table = _numbers(path, chain([first], rows), places)
     except UnicodeDecodeError as error:
         raise _refusal(
             path, "neither a text table nor an npz", "Give CSV files in UTF-8."
@@ -213,9 +219,7 @@ def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
         raise _refusal(
             path, f"its header cannot be read ({error})", "Give a CSV table."
         ) from error
-    if not rows:
-        raise _refusal(path, "a header but no rows", "Check that it was copied whole.")
-    return form.series(form.terrain, path.name, _numbers(path, rows, places))
+    return form.series(form.terrain, path.name, table)
 
 
 def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[int]:
@@ -230,11 +234,13 @@ def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[i
     return [header.index(columns[name]) for name in COLUMNS]
 
 
-def _numbers(path: Path, rows: list[str], places: list[int]) -> Array:
+def _numbers(path: Path, rows: Iterable[str], places: list[int]) -> Array:
     try:
         return np.loadtxt(
             rows, delimiter=",", usecols=places, ndmin=2, comments=None, quotechar='"'
         )
+    except UnicodeDecodeError:
+        raise
     except (ValueError, IndexError) as error:
         raise _refusal(
             path,

@@ -39,10 +39,12 @@ class TractionEstimate:
     Attributes:
         mean: traction [N].
         sd: its standard deviation [N], noise included.
+        is_extrapolated: the point lies outside the table: the values are of its edge.
     """
 
     mean: float
     sd: float
+    is_extrapolated: bool = False
 
     def quantile(self, share: float) -> float:
         """Return the traction [N] that is not reached with probability `share`."""
@@ -86,12 +88,20 @@ class KnownTerrain:
             model: name of a model; "" = the default.
 
         Raises:
-            SettingsError: there is no such model.
+            SettingsError: there is no such model, or a value is no finite number.
         """
-        return TractionEstimate(*self._table(model).at(F_n, v_t))
+        _check_finite(F_n=F_n, v_t=v_t)
+        table = self._table(model)
+        return TractionEstimate(*table.at(F_n, v_t), not table.covers(F_n, v_t))
 
     def predict_many(self, F_n: Array, v_t: Array, model: str = "") -> Prediction:
-        """Return the same for many points, shape (n,)."""
+        """Return the same for many points, shape (n,).
+
+        Raises:
+            SettingsError: there is no such model, or a value is no finite number.
+        """
+        if not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
+            raise SettingsError("F_n and v_t have to be finite numbers.")
         return self._table(model).over(np.asarray(F_n), np.asarray(v_t))
 
     def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> float:
@@ -99,8 +109,13 @@ class KnownTerrain:
 
         What a walking controller asks before it puts its weight on: at a load F_n [N],
         is the traction that the step needs available? Velocities below the slowest one
-        that was measured count as that.
+        that was measured count as that; whether the load lies
+        outside the table is said by `predict(...).is_extrapolated`.
+
+        Raises:
+            SettingsError: a value is no finite number.
         """
+        _check_finite(required=required, F_n=F_n, v_t=v_t)
         mean, sd = self._table("").at(F_n, v_t)
         return 0.5 * math.erfc((mean - required) / (math.sqrt(2.0) * max(sd, 1e-9)))
 
@@ -112,6 +127,17 @@ class KnownTerrain:
                 hint=f"Models: {', '.join(self.tables)}.",
             )
         return table
+
+
+def _check_finite(**values: float) -> None:
+    """Refuse a value that no table can be asked for.
+
+    Raises:
+        SettingsError: one is no finite number.
+    """
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise SettingsError(f"{name} = {value} is no finite number.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,6 +31,11 @@ class Table:
         j, b = _place(self.v_t, v_t)
         return _blend(self.mean, i, a, j, b), _blend(self.sd, i, a, j, b)
 
+    def covers(self, F_n: float, v_t: float) -> bool:
+        """Return whether a point lies between the ends of both axes."""
+        is_load = self.F_n[0] <= F_n <= self.F_n[-1]
+        return is_load and self.v_t[0] <= v_t <= self.v_t[-1]
+
     def over(self, F_n: Array, v_t: Array) -> Prediction:
         """Return mean and standard deviation [N] at many points, shape (n,)."""
         i, a = _places(self.F_n, F_n)

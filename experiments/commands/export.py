@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import add_seed
+from experiments.arguments import add_allow_missing, add_seed
 
 EXAMPLES = """\
   traction export S012 --to tables          kept trials of a session
@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--terrain-db", type=Path, metavar="FILE", help="the terrain database, JSON"
     )
+    add_allow_missing(parser)
     add_seed(parser)
 
 
@@ -33,6 +34,7 @@ def run(args: argparse.Namespace) -> int:
         choose_sessions,
         export_sessions,
         export_terrains,
+        tell_missing,
     )
     from experiments.settings import load_settings
 
@@ -44,6 +46,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     every = args.to is None and not args.sessions
     sessions = choose_sessions(args.data, args.sessions, every=every)
+    tell_missing(sessions, console, allow_missing=args.allow_missing)
     if args.to is not None:
         export_sessions(sessions, args.to, console)
         return 0

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import add_allow_missing
+
 if TYPE_CHECKING:
     from experiments.operator import Console
     from wam.bus import BusSummary, DecodedLine
@@ -32,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a bus log of --can-log, or of candump -L",
     )
+    add_allow_missing(parser)
     parser.add_argument("--summary", action="store_true", help="only the sums")
 
 
@@ -67,10 +70,19 @@ def _show_trial(args: argparse.Namespace) -> int:
     from acquisition import SystemClock
     from experiments.operator import Console
     from experiments.report import play
-    from experiments.session import find_session, trial_path
+    from experiments.session import (
+        compare_trial,
+        find_session,
+        kept_data_error,
+        trial_path,
+    )
 
     console = Console(color=not args.no_color)
-    path = trial_path(find_session(args.data, args.session), args.trial)
+    folder = find_session(args.data, args.session)
+    path = trial_path(folder, args.trial)
+    deviations = compare_trial(folder, path)
+    if deviations and not args.allow_missing:
+        raise kept_data_error(deviations)
     play(path, args.speed, SystemClock(), console)
     return 0
 

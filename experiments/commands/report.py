@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import add_seed
+from experiments.arguments import add_allow_missing, add_seed
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -30,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "window=LOW:HIGH, frame=sole, kernel=as_printed, "
         "static_friction=proportional; more than once for several",
     )
+    add_allow_missing(parser)
     add_seed(parser)
 
 
@@ -37,7 +38,12 @@ def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     from analysis.report import parse_choice
     from experiments.operator import Console
-    from experiments.report import ReportRequest, choose_sessions, report_sessions
+    from experiments.report import (
+        ReportRequest,
+        choose_sessions,
+        report_sessions,
+        tell_missing,
+    )
     from experiments.settings import load_settings
 
     choices = [parse_choice(text) for text in args.what_if]
@@ -45,7 +51,8 @@ def run(args: argparse.Namespace) -> int:
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
-    wanted = ReportRequest(order, args.seed, args.scheduler, choices)
+    missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
+    wanted = ReportRequest(order, args.seed, args.scheduler, choices, missing)
     page = report_sessions(sessions, data, wanted, console)
     console.say(str(page))
     return 0

@@ -17,6 +17,7 @@ EXAMPLES = """\
 
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
+_NOT_AS_KEPT = 6  # exit code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,10 +38,11 @@ def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
     import json
 
-    from experiments.operator import Console
+    from experiments.operator import BAD, Console
     from experiments.session import (
         DigestCache,
         board_notes,
+        compare_board,
         count_board,
         next_steps,
         parse_where,
@@ -72,15 +74,18 @@ def run(args: argparse.Namespace) -> int:
             lambda: [*_plain(board := count()), *notes(board), *steps(board)], console
         )
     board = count()
+    deviations = compare_board(args.data, where, digest)
     for note in notes(board):  # not in the way of a program that reads the board
         console.problem(note)
     if args.json:
         console.say(json.dumps([line.as_dict() for line in board], indent=1))
-        return 0
-    console.table(_HEADER, [_row(line) for line in board])
-    for step in steps(board):
-        console.say(step)
-    return 0
+    else:
+        console.table(_HEADER, [_row(line) for line in board])
+        for step in steps(board):
+            console.say(step)
+    for deviation in deviations:
+        console.problem(f"{BAD} {deviation.text()}.")
+    return _NOT_AS_KEPT if deviations else 0
 
 
 def _row(line: MatrixRow) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from .sessions import (
     choose_sessions,
     export_terrains,
     report_sessions,
+    tell_missing,
 )
 from .truth_errors import compare_with_truth
 
@@ -20,4 +21,5 @@ __all__ = [
     "fitting",
     "play",
     "report_sessions",
+    "tell_missing",
 ]

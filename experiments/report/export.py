@@ -16,6 +16,7 @@ from experiments.session import SessionFolder, sha256_of, write_new_text
 
 DICTIONARY, INDEX, SUMS = "data_dictionary.csv", "trials.csv", "SHA256SUMS"
 _FORMAT = "%.12g"  # beyond the resolution of every instrument here
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a formula begins
 _JOINTS = tuple(str(joint) for joint in range(1, 8))
 _AXES = ("x", "y", "z")
 _WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
@@ -216,8 +217,18 @@ def _table(headers: Sequence[str], columns: _Columns) -> str:
 
 def _csv(rows: Sequence[Sequence[str]]) -> str:
     text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
+    plain = [[plain_cell(cell) for cell in row] for row in rows]
+    csv.writer(text, lineterminator="\n").writerows(plain)
     return text.getvalue()
+
+
+def plain_cell(cell: str) -> str:
+    """Return a text that no spreadsheet takes for a formula; numbers stay."""
+    try:
+        float(cell)
+    except ValueError:
+        return "'" + cell if cell.startswith(_FORMULA) else cell
+    return cell
 
 
 def _make_empty(folder: Path) -> None:

@@ -26,15 +26,17 @@ from analysis.study import (
 )
 from analysis.terrains import database_of, identify_study
 from experiments.messages import CATALOGUE
-from experiments.operator import Console
+from experiments.operator import WARNING, Console
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables
 from experiments.report.truth_errors import truth_tables
 from experiments.session import (
     SessionFolder,
+    check_kept,
     find_session,
     iso_utc,
     list_sessions,
+    replay,
     write_new_text,
 )
 
@@ -51,12 +53,14 @@ class ReportRequest:
         seed: seed of the points of the Gaussian processes.
         scheduler: address of a Dask scheduler to fit on; None for this machine.
         choices: what the study is repeated under.
+        missing: kept trials that are missing or changed, in words.
     """
 
     terrains: Sequence[str]
     seed: int
     scheduler: str | None = None
     choices: Sequence[StudyVariant] = ()
+    missing: Sequence[str] = ()
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -78,7 +82,7 @@ def choose_sessions(
             hint="For example: traction report S012",
         )
     if every:
-        sessions = [s for s in list_sessions(data) if s.kept_trials()]
+        sessions = [s for s in list_sessions(data) if s.kept_trials() or _keeps(s)]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
     if not sessions:
@@ -93,6 +97,26 @@ def choose_sessions(
             message.what.format_map(values), hint=message.do.format_map(values)
         )
     return sessions
+
+
+def _keeps(session: SessionFolder) -> bool:
+    """Return whether the journal keeps a trial, whatever became of its files."""
+    return bool(replay(session.events()).kept)
+
+
+def tell_missing(
+    sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
+) -> list[str]:
+    """Name the kept trials that are missing or changed, and return what was said.
+
+    Raises:
+        KeptDataError: there are some, and `allow_missing` is false.
+    """
+    deviations = check_kept(sessions, allow_missing=allow_missing)
+    texts = [f"Not what was kept: {deviation.text()}." for deviation in deviations]
+    for text in texts:
+        console.problem(f"{WARNING} {text}")
+    return texts
 
 
 def _load_trials(
@@ -250,7 +274,7 @@ def report_sessions(
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
-        warnings=analysed.problems,
+        warnings=[*order.missing, *analysed.problems],
         rig=summarise_rig([trial for group in trials.values() for trial in group]),
     )
     return write_report(study, out, context)

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from acquisition import SessionError, SettingsError, SystemClock
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
-from experiments.operator import Console, choose_operator
+from experiments.operator import WARNING, Console, choose_operator
 from experiments.rig import FakeOptions
 from experiments.run.session import OpenMode, SessionRequest, run_session
 from experiments.session import (
@@ -19,6 +19,7 @@ from experiments.session import (
     Journal,
     SessionFolder,
     SessionPhase,
+    check_kept,
     open_journal,
     recover_session,
     refusal,
@@ -41,6 +42,7 @@ class ResumeRequest:
         is_fast: on stepped time, whatever it was before.
         is_fake: a simulated session is meant.
         is_forced: record under other conditions, too.
+        allow_missing: go on without kept trials that are missing or changed.
         operator: name; empty = the one of the session.
         script: of an operator; None = the keyboard.
         can_log: file that the bus is logged to.
@@ -53,6 +55,7 @@ class ResumeRequest:
     is_fast: bool = False
     is_fake: bool = False
     is_forced: bool = False
+    allow_missing: bool = False
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
@@ -68,6 +71,7 @@ def resume_request(args: argparse.Namespace) -> ResumeRequest:
         is_fast=args.fast,
         is_fake=args.fake,
         is_forced=args.force,
+        allow_missing=args.allow_missing,
         operator=args.operator,
         script=args.operator_script,
         can_log=args.can_log,
@@ -84,6 +88,7 @@ def resume_session(folder: SessionFolder, request: ResumeRequest) -> int:
     _check_kind(folder, request)
     with session_lock(folder):
         journal = _recovered(folder, request.console)
+        _check_kept(folder, request)
         if journal.state.phase is SessionPhase.CRASHED and journal.state.is_complete:
             journal.append(Event.ENDED, reason="complete")
             request.console.say(CATALOGUE["complete"].text({"session": folder.id}))
@@ -102,6 +107,7 @@ def redo(
     _check_kind(folder, request)
     with session_lock(folder):
         journal = _recovered(folder, request.console)
+        _check_kept(folder, request)
         return _reopen(
             journal, request, Event.REDO, {"trial": number, "reason": reason}
         )
@@ -129,6 +135,16 @@ def _recovered(folder: SessionFolder, console: Console) -> Journal:
         details = {"session": folder.id, "redone": f" {redone}"}
         console.say(CATALOGUE["put-away"].text(details))
     return journal
+
+
+def _check_kept(folder: SessionFolder, request: ResumeRequest) -> None:
+    """Refuse to go on beside kept trials that are gone, unless that is allowed.
+
+    Raises:
+        KeptDataError: kept trials are missing or changed.
+    """
+    for deviation in check_kept([folder], allow_missing=request.allow_missing):
+        request.console.problem(f"{WARNING} {deviation.text()}.")
 
 
 def _check_kind(folder: SessionFolder, request: ResumeRequest) -> None:

@@ -9,10 +9,32 @@ from .annotations import (
 )
 from .board_notes import board_notes
 from .crash_recovery import recover_session
+from .data_files import (
+    read_json,
+    sha256_of,
+    write_json,
+    write_new_text,
+    write_text,
+)
 from .journal import Journal, open_journal
+from .kept_files import (
+    Deviation,
+    KeptDataError,
+    check_kept,
+    compare_kept,
+    compare_trial,
+    kept_data_error,
+)
 from .lock import LOCK_FILE, locked_error, owner_of, session_lock, sign
-from .matrix_board import DigestCache, MatrixRow, count_board, next_steps, parse_where
-from .reducer import KEEP, refusal
+from .matrix_board import (
+    DigestCache,
+    MatrixRow,
+    compare_board,
+    count_board,
+    next_steps,
+    parse_where,
+)
+from .reducer import KEEP, refusal, replay
 from .sidecar import TrialOutcome, sidecar_of
 from .states import Event, SessionPhase, table_lines
 from .store import (
@@ -21,12 +43,7 @@ from .store import (
     find_session,
     iso_utc,
     list_sessions,
-    read_json,
     session_utc_ns,
-    sha256_of,
-    write_json,
-    write_new_text,
-    write_text,
 )
 from .trial_files import add_remark
 from .trial_name import TrialName
@@ -36,9 +53,11 @@ __all__ = [
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
+    "Deviation",
     "DigestCache",
     "Event",
     "Journal",
+    "KeptDataError",
     "MatrixRow",
     "SessionFolder",
     "SessionPhase",
@@ -49,12 +68,17 @@ __all__ = [
     "add_remark",
     "board_notes",
     "change_verdict",
+    "check_kept",
     "clean_text",
+    "compare_board",
+    "compare_kept",
+    "compare_trial",
     "count_board",
     "create_session",
     "find_session",
     "find_unfinished",
     "iso_utc",
+    "kept_data_error",
     "list_sessions",
     "locked_error",
     "looks_like_trial",
@@ -66,6 +90,7 @@ __all__ = [
     "read_json",
     "recover_session",
     "refusal",
+    "replay",
     "session_lock",
     "session_utc_ns",
     "sha256_of",

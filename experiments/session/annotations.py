@@ -6,13 +6,16 @@ import re
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock
+from acquisition.trial_file import is_there
 from experiments.operator import WARNING
 from experiments.session.crash_recovery import recover_session
+from experiments.session.data_files import sha256_of
 from experiments.session.journal import Journal, open_journal
+from experiments.session.kept_files import recorded_facts
 from experiments.session.lock import session_lock
 from experiments.session.reducer import KEEP, refusal
 from experiments.session.states import Event
-from experiments.session.store import SessionFolder, sha256_of
+from experiments.session.store import SessionFolder
 from experiments.session.trial_files import add_remark, find_sidecar
 from experiments.session.trial_name import TrialName
 
@@ -134,7 +137,7 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
     path = folder.trials / f"{name.kept}.mcap"
     if attempt:
         path = folder.rejected / f"{name.rejected}.mcap"
-    if not path.is_file():
+    if not is_there(path):
         files = [*folder.trials.glob("T*.mcap"), *folder.rejected.glob("T*.mcap")]
         known = sorted(p.stem for p in files if "." not in p.stem)
         raise SessionError(
@@ -185,7 +188,9 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
     path = journal.folder.rejected / f"{name.rejected}.mcap"
     if is_kept:
         path = journal.folder.trials / f"{name.kept}.mcap"
-    if not path.is_file() or sha256_of(path) != sidecar.get("sha256"):
+    wanted = recorded_facts(journal.folder.events(), name).get("sha256")
+    digest = sha256_of(path) if is_there(path) else ""
+    if not digest or {digest} != {sidecar.get("sha256"), wanted or digest}:
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",
             hint="It cannot count. Nothing was changed.",

@@ -5,14 +5,16 @@ from pathlib import Path
 from acquisition import TrialFileError
 from acquisition.trial_file import (
     VerifiedFile,
+    is_there,
     recover_file,
     recovered_path,
     verify_file,
 )
+from experiments.session.data_files import move_file, read_json, remove_file, write_json
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialOutcome, sidecar_of
 from experiments.session.states import OPEN, Event, SessionPhase
-from experiments.session.store import SessionFolder, move_file, read_json, write_json
+from experiments.session.store import SessionFolder
 from experiments.session.trial_files import (
     find_sidecar,
     last_decisions,
@@ -62,10 +64,10 @@ def _gather(folder: SessionFolder, name: TrialName) -> None:
         return
     path = folder.trials / f"{name.kept}.mcap"
     partial = path.with_name(path.name + ".partial")
-    if partial.exists() and not path.exists():
+    if is_there(partial) and not is_there(path):
         _recover(partial, path)
     for source, kind in ((partial, ".partial"), (_truth(partial), ".truth.partial")):
-        if source.exists():
+        if is_there(source):
             move_file(source, folder.rejected / f"{name.rejected}{kind}")
     write_json(sidecar, sidecar_of(name, _verified(path), TrialOutcome("crash")))
 
@@ -96,9 +98,9 @@ def _sweep(folder: SessionFolder) -> None:
     """Take away what a kill in the middle of a replacement has left."""
     for place in (folder.path, folder.trials, folder.rejected):
         for path in place.glob("*.json.tmp"):
-            path.unlink()
+            remove_file(path)
     for path in folder.trials.glob("*.mcap.partial"):
         finished = path.with_suffix("")
         for other in (path, recovered_path(path)):
-            if other.exists() and finished.exists() and finished.samefile(other):
-                other.unlink()
+            if is_there(other) and is_there(finished) and finished.samefile(other):
+                remove_file(other)

@@ -3,9 +3,10 @@
 from dataclasses import dataclass, field
 
 from acquisition import Clock, SessionError
-from experiments.session.reducer import SessionState, apply, refusal, replay
-from experiments.session.store import SessionFolder, iso_utc, read_json, write_json
-from experiments.session.trial_files import decision_of, move_trial_files
+from experiments.session.data_files import read_json, write_json
+from experiments.session.reducer import KEEP, SessionState, apply, refusal, replay
+from experiments.session.store import SessionFolder, iso_utc
+from experiments.session.trial_files import decision_of, find_sidecar, move_trial_files
 
 
 @dataclass(slots=True)
@@ -25,7 +26,8 @@ class Journal:
     def append(self, event: str, **details: object) -> None:
         """Append an event of now, apply it, and replace session.json.
 
-        Files of a trial move when the event is a verdict on it.
+        Files of a trial move when the event is a verdict on it; one that keeps it has
+        the checksum and size of its file.
 
         Raises:
             SessionError: the event cannot happen in this state.
@@ -36,9 +38,12 @@ class Journal:
         reason = refusal(self.state, entry)
         if reason:
             raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
+        verdict = decision_of(entry)
+        if verdict is not None and verdict.verdict == KEEP:
+            sidecar = find_sidecar(self.folder, verdict.name)
+            entry |= {key: sidecar[key] for key in ("sha256", "size") if key in sidecar}
         self.folder.append_event(entry)
         self.state = apply(self.state, entry)
-        verdict = decision_of(entry)
         if verdict is not None:
             move_trial_files(self.folder, verdict)
         self._write_summary(details)

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock
+from acquisition.trial_file import check_folders, is_there, open_data
 from experiments.messages import CATALOGUE
-from experiments.session.store import SessionFolder, iso_utc, read_json
+from experiments.session.data_files import read_json
+from experiments.session.store import SessionFolder, iso_utc
 
 LOCK_FILE = ".lock"
 _TRIES = 5  # somebody who only looks holds the lock for a moment
@@ -36,9 +38,11 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
 
     Raises:
         SessionError: a living process has it open, or the folder cannot be written.
+        TrialFileError: the lock or a folder of the session lies elsewhere.
     """
     try:
-        descriptor = os.open(folder.path / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
+        check_folders(folder.path)
+        descriptor = open_data(folder.path / LOCK_FILE, os.O_RDWR | os.O_CREAT)
     except OSError as error:
         raise SessionError(
             f"{folder.path} cannot be written ({error.strerror}).",
@@ -56,9 +60,9 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
 def owner_of(folder: SessionFolder) -> LockOwner | None:
     """Return the living process that has the session open, None for none."""
     path = folder.path / LOCK_FILE
-    if not path.is_file():
+    if not is_there(path):
         return None
-    descriptor = os.open(path, os.O_RDONLY)
+    descriptor = open_data(path)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from acquisition import SettingsError
+from acquisition import SettingsError, TrialFileError
 from experiments.arguments import data_option
+from experiments.session.data_files import read_json, sha256_of
+from experiments.session.kept_files import Deviation, compare_kept, unreadable
 from experiments.session.lock import owner_of
-from experiments.session.store import SessionFolder, list_sessions, read_json, sha256_of
+from experiments.session.store import SessionFolder, list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings import MatrixSettings, TerrainRow
 
@@ -80,7 +82,9 @@ def count_board(
         digest: what computes the checksum of a file.
     """
     where = where or {}
-    sessions = [s for s in list_sessions(data) if _matches(_of_session(s), where)]
+    sessions = [
+        s for s in _readable(list_sessions(data)) if _matches(_of_session(s), where)
+    ]
     lines: list[MatrixRow] = []
     for row in matrix.terrains:
         if not _matches(_of_row(row), where):
@@ -95,6 +99,42 @@ def count_board(
             if own or (is_wanted and not {"session", "operator"} & set(where)):
                 lines.append(_line(row, own, digest, is_simulated=is_simulated))
     return lines
+
+
+def compare_board(
+    data: Path, where: Mapping[str, str], digest: _Digest = sha256_of
+) -> list[Deviation]:
+    """Return what is missing or changed of the kept trials on the board.
+
+    Args:
+        data: the data folder.
+        where: only sessions with these values, as in `count_board`.
+        digest: what computes the checksum of a file.
+    """
+    every = list_sessions(data)
+    readable = _readable(every)
+    sessions = [
+        s for s in every if s not in readable or _matches(_of_session(s), where)
+    ]
+    found = [d for session in sessions for d in compare_kept(session, digest)]
+    return list(dict.fromkeys(found + [d for s in every for d in _hostile(s)]))
+
+
+def _hostile(session: SessionFolder) -> list[Deviation]:
+    """Return what of a session cannot be looked at because it leads out of it."""
+    try:
+        session.kept_trials(lambda _: "")
+        session.rejected_sidecars()
+        owner_of(session)
+        read_json(session.path / "session.json")
+    except TrialFileError as error:
+        return [unreadable(session, error)]
+    return []
+
+
+def _readable(sessions: Sequence[SessionFolder]) -> list[SessionFolder]:
+    """Return the sessions that hold nothing which leads out of them."""
+    return [session for session in sessions if not _hostile(session)]
 
 
 def parse_where(text: str) -> dict[str, str]:
@@ -118,7 +158,8 @@ def parse_where(text: str) -> dict[str, str]:
 def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> list[str]:
     """Return what others have open, what is to be resumed, which terrain comes next."""
     steps: list[str] = []
-    sessions = [s for s in list_sessions(data) if s.is_simulated is is_simulated]
+    sessions = _readable(list_sessions(data))
+    sessions = [s for s in sessions if s.is_simulated is is_simulated]
     for session in sessions:
         owner = owner_of(session)
         if owner is not None and owner.pid != os.getpid():

@@ -1,8 +1,6 @@
 """Folders and files of sessions: numbered, written atomically, never overwritten."""
 
 import fcntl
-import hashlib
-import json
 import os
 import re
 from collections.abc import Callable, Generator, Mapping
@@ -10,9 +8,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, BinaryIO
 
-from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
+from acquisition import SessionError, SettingsError, SystemClock
+from acquisition.trial_file import (
+    check_folders,
+    is_there,
+    open_data,
+    read_data,
+    sync_directory,
+)
+from experiments.session.data_files import read_json, sha256_of, writing
+from experiments.session.journal_lines import journal_line, parse_line
 
 JOURNAL_FILE = "events.jsonl"
 _FOLDER = re.compile(
@@ -62,35 +69,64 @@ class SessionFolder:
         Raises:
             TrialFileError: the disk is full or gone.
         """
-        line = (json.dumps(event, allow_nan=False) + "\n").encode()
+        line = journal_line(event)
         path = self.path / JOURNAL_FILE
-        with _writing(path), path.open("a+b") as file:
-            file.write(b"\n" + line if _is_torn(file) else line)
-            file.flush()
-            os.fsync(file.fileno())
+        with writing(path):
+            descriptor = open_data(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
+            with os.fdopen(descriptor, "r+b") as file:
+                is_new = not file.seek(0, os.SEEK_END)
+                file.write(b"\n" + line if _is_torn(file) else line)
+                file.flush()
+                os.fsync(descriptor)
+            if is_new:
+                sync_directory(self.path)
+
+    def journal_text(self) -> bytes:
+        """Return the journal as it is on the disk, empty where there is none.
+
+        Raises:
+            TrialFileError: it, or a folder of the session, is none of its own.
+        """
+        check_folders(self.path)
+        try:
+            return read_data(self.path / JOURNAL_FILE)
+        except OSError:
+            return b""
 
     def events(self) -> list[dict[str, Any]]:
-        """Return the journal; a torn line is left out."""
-        path = self.path / JOURNAL_FILE
-        if not path.exists():
-            return []
-        lines = map(_as_object, path.read_bytes().splitlines())
+        """Return the journal; torn lines and those of a wrong checksum are left out.
+
+        Raises:
+            TrialFileError: as `journal_text`.
+        """
+        lines = map(parse_line, self.journal_text().splitlines())
         return [event for event in lines if event is not None]
 
     def kept_trials(self, digest: Callable[[Path], str] | None = None) -> list[Path]:
         """Return the kept trial files, in order, whose checksum is right.
 
+        It is right where sidecar and journal state it; older journals state none.
+
         Args:
             digest: what computes the checksum of a file; None = `sha256_of`.
         """
         digest = digest or sha256_of
+        recorded = {
+            (event.get("trial"), event.get("attempt")): event["sha256"]
+            for event in self.events()
+            if isinstance(event.get("sha256"), str) and _is_pair(event)
+        }
         kept: list[Path] = []
         for sidecar in sorted(self.trials.glob("T*.json")):
             if not _TRIAL_FILE.match(sidecar.name):
                 continue
             facts = read_json(sidecar)
             path = sidecar.with_suffix(".mcap")
-            is_sound = path.is_file() and digest(path) == facts.get("sha256")
+            stated, attempt = facts.get("sha256"), facts.get("attempt")
+            number = int(sidecar.stem[1:3])
+            key = (number, attempt if type(attempt) is int else 0)
+            is_recorded = recorded.get(key, stated) == stated
+            is_sound = is_recorded and is_there(path) and digest(path) == stated
             if facts.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
@@ -100,88 +136,8 @@ class SessionFolder:
         return [read_json(path) for path in sorted(self.rejected.glob("T*.json"))]
 
 
-def read_json(path: Path) -> dict[str, Any]:
-    """Return a JSON object, an empty one where the file is damaged."""
-    try:
-        return _as_object(path.read_bytes()) or {}
-    except OSError:
-        return {}
-
-
-def _as_object(text: bytes) -> dict[str, Any] | None:
-    try:
-        value: object = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return cast("dict[str, Any]", value) if isinstance(value, dict) else None
-
-
-def write_json(path: Path, value: Mapping[str, object]) -> None:
-    """Replace `path` atomically: temporary file, fsync, rename.
-
-    Raises:
-        TrialFileError: the disk is full or gone.
-    """
-    write_text(path, json.dumps(value, indent=1, allow_nan=False))
-
-
-def write_text(path: Path, text: str) -> None:
-    """Replace `path` by `text`, as `write_json` does.
-
-    Raises:
-        TrialFileError: the disk is full or gone.
-    """
-    temporary = path.with_name(path.name + ".tmp")
-    with _writing(path):
-        with temporary.open("wb") as file:
-            file.write(text.encode())
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-
-
-def write_new_text(path: Path, text: str) -> None:
-    """Write `text` into a new file at `path`; never replaces one.
-
-    Raises:
-        TrialFileError: it exists, or the disk is full or gone.
-    """
-    with _writing(path), path.open("xb") as file:
-        file.write(text.encode())
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def move_file(source: Path, target: Path) -> None:
-    """Give `source` the name `target` in another folder; never replaces a file.
-
-    A move that a kill has cut short, so that the file has both names, is finished.
-
-    Raises:
-        TrialFileError: `target` exists, or the disk is full or gone.
-    """
-    with _writing(target):
-        if not (target.exists() and target.samefile(source)):
-            target.hardlink_to(source)
-        source.unlink()
-
-
-@contextmanager
-def _writing(path: Path) -> Generator[None, None, None]:
-    try:
-        yield
-    except OSError as error:
-        raise TrialFileError(
-            path,
-            f"cannot be written ({error.strerror})",
-            hint="Is the disk full? Nothing that was kept is lost.",
-        ) from error
-
-
-def sha256_of(path: Path) -> str:
-    """Return the hex digest of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def _is_pair(event: Mapping[str, object]) -> bool:
+    return type(event.get("trial")) is int and type(event.get("attempt")) is int
 
 
 def list_sessions(data: Path) -> list[SessionFolder]:
@@ -232,6 +188,8 @@ def create_session(
             path.mkdir()
         for name in ("trials", "rejected", "faults"):
             (path / name).mkdir()
+        sync_directory(path)
+        sync_directory(sessions)
     except OSError as error:
         raise SettingsError(
             f"{data} cannot be written ({error.strerror}).",
@@ -257,9 +215,12 @@ def _session_at(path: Path) -> SessionFolder | None:
 
 @contextmanager
 def _locked(path: Path) -> Generator[None, None, None]:
-    with path.open("ab") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
+    descriptor = open_data(path, os.O_RDWR | os.O_CREAT)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
         yield
+    finally:
+        os.close(descriptor)
 
 
 def session_utc_ns() -> int:

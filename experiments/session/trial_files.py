@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+from acquisition.trial_file import is_there
+from experiments.session.data_files import move_file, read_json, remove_file, write_json
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.states import Event
-from experiments.session.store import SessionFolder, move_file, read_json, write_json
+from experiments.session.store import SessionFolder
 from experiments.session.trial_name import TrialName
 
 _SUFFIXES = (".mcap", ".truth.mcap")
@@ -88,13 +90,13 @@ def move_trial_files(folder: SessionFolder, decision: Verdict) -> None:
     if holds_source:
         for suffix in _SUFFIXES:
             path = source.with_suffix(suffix)
-            if path.exists():
+            if is_there(path):
                 move_file(path, target.with_suffix(suffix))
     changed = _with_verdict(sidecar, decision)
-    if not target.exists() or read_json(target) != changed:
+    if not is_there(target) or read_json(target) != changed:
         write_json(target, changed)
     if holds_source:
-        source.unlink(missing_ok=True)
+        remove_file(source)
 
 
 def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> str:
@@ -111,9 +113,15 @@ def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> s
         path = folder.rejected / f"{name.rejected}.json"
     sidecar = find_sidecar(folder, name)
     remark = {"text": text, "who": who, "when": folder.events()[-1]["utc"]}
-    notes: list[object] = [*(sidecar.get("notes") or []), remark]
+    notes = [*_list(sidecar, "notes"), remark]
     write_json(path, {**sidecar, "notes": notes})
     return path.stem
+
+
+def _list(facts: _Facts, key: str) -> list[object]:
+    """Return the list at `key`, an empty one where there is anything else."""
+    value = facts.get(key)
+    return list(cast("list[object]", value)) if isinstance(value, list) else []
 
 
 def _is_of(sidecar: Path, name: TrialName) -> bool:
@@ -129,7 +137,7 @@ def _with_verdict(sidecar: _Facts, decision: Verdict) -> dict[str, object]:
         "when": decision.when,
     }
     before = {key: sidecar.get(key, "") for key in given}
-    history: list[object] = list(sidecar.get("history") or [])
+    history = _list(sidecar, "history")
     if before["verdict"] and before != given:
         history.append(before)
     named = {"trial": decision.name.kept, "attempt": decision.name.attempt}

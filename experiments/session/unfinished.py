@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import TrialFileError
-from acquisition.trial_file import read_file, recorded_seconds
+from acquisition.trial_file import is_there, read_file, recorded_seconds
 from experiments.messages import CATALOGUE
 from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay
@@ -73,7 +73,7 @@ def find_unfinished(data: Path) -> list[UnfinishedSession]:
     found: list[UnfinishedSession] = []
     with suppress(OSError):
         for folder in list_sessions(data):
-            with suppress(OSError):
+            with suppress(OSError, TrialFileError):
                 unfinished = inspect_session(folder)
                 found += [unfinished] if unfinished is not None else []
     return found
@@ -92,9 +92,9 @@ def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
 
 
 def _seconds(partial: Path) -> float | None:
-    if not partial.is_file():
-        return None
     try:
+        if not is_there(partial):
+            return None
         return recorded_seconds(read_file(partial))
     except TrialFileError:
         return None

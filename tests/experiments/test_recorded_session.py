@@ -40,6 +40,17 @@ def test_a_session_of_version_0_1_is_counted(recorded):
     assert [(row["terrain"], row["kept"]) for row in rows if row["kept"]] == [("TF", 2)]
 
 
+def test_a_session_of_version_0_1_is_held_against_its_sidecars(recorded):
+    data, config = recorded
+    arguments = ("verify", "--all", "--data", data, "--config", config)
+    assert traction(*arguments).code == 0
+    path = only_session(data) / "trials" / "T01.mcap"
+    path.unlink()
+    done = traction(*arguments)
+    assert done.code == 6
+    assert path.name in done.err
+
+
 def test_a_session_of_version_0_1_is_reported(recorded):
     data, config = recorded
     done = traction("report", "S001", "--data", data, "--config", config)

@@ -535,7 +535,7 @@ def test_an_unknown_arm_is_idle_when_the_module_confirms_later(bench, mode):
     bench.arm.mode = SafetyMode.UNKNOWN
     bench.run(10)
     assert bench.state is ArmState.UNKNOWN
-    bench.arm.mode = mode
+    bench.arm.mode, bench.arm.is_confirmed = mode, True
     sent = len(bench.arm.sent)
     bench.run()
     assert bench.state is ArmState.IDLE
@@ -689,8 +689,8 @@ def test_torques_grow_from_zero_after_the_brakes(bench):
     bench.law.torques = dict.fromkeys(TORQUE, 9.0)
     bench.enter(ArmState.FLOAT)
     bench.run(5)
-    bench.enter(ArmState.IDLE)
-    assert not bench.arm.sent[-1].any()
+    record = bench.enter(ArmState.IDLE)
+    assert not record["torque_command"].any()
     bench.arm.mode = SafetyMode.IDLE
     bench.enter(ArmState.FLOAT)
     assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 7)

@@ -10,9 +10,10 @@ import pytest
 
 from acquisition.trial_file.verify import verify_file
 from experiments.session.crash_recovery import recover_session
+from experiments.session.data_files import read_json, sha256_of, write_json
 from experiments.session.journal import Journal, open_journal
 from experiments.session.states import Event, SessionPhase
-from experiments.session.store import create_session, read_json, sha256_of, write_json
+from experiments.session.store import create_session
 from tests.acquisition.trials import make_cycles, write_trial
 
 STEPS = ("hardlink_to", "unlink", "replace")

@@ -1,0 +1,156 @@
+"""Reading and replacing the small files of a session; every name reaches the disk."""
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, cast
+
+from acquisition import TrialFileError
+from acquisition.trial_file import open_data, open_folder, read_data
+
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return a JSON object, an empty one where the file is missing or damaged.
+
+    Raises:
+        TrialFileError: it is no regular file of this session, or too large.
+    """
+    try:
+        return parse_object(read_data(path)) or {}
+    except OSError:
+        return {}
+
+
+def parse_object(text: bytes) -> dict[str, Any] | None:
+    """Return the JSON object in `text`, None where there is none or a NaN."""
+    try:
+        value: object = json.loads(text, parse_constant=_finite, parse_float=_finite)
+    except (ValueError, RecursionError):
+        return None
+    return cast("dict[str, Any]", value) if isinstance(value, dict) else None
+
+
+def write_json(path: Path, value: Mapping[str, object]) -> None:
+    """Replace `path` atomically: temporary file, fsync, rename.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    write_text(path, json.dumps(value, indent=1, allow_nan=False))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Replace `path` by `text`, as `write_json` does.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    temporary = path.name + ".tmp"
+    with writing(path), open_folder(path.parent) as folder:
+        with suppress(FileNotFoundError):
+            os.unlink(temporary, dir_fd=folder)
+        _write_new(folder, temporary, text)
+        os.replace(temporary, path.name, src_dir_fd=folder, dst_dir_fd=folder)
+        os.fsync(folder)
+
+
+def write_new_text(path: Path, text: str) -> None:
+    """Write `text` into a new file at `path`; never replaces one.
+
+    Raises:
+        TrialFileError: it exists, or the disk is full or gone.
+    """
+    with writing(path), open_folder(path.parent) as folder:
+        _write_new(folder, path.name, text)
+        os.fsync(folder)
+
+
+def move_file(source: Path, target: Path) -> None:
+    """Give `source` the name `target` in another folder; never replaces a file.
+
+    A move that a kill has cut short, so that the file has both names, is finished.
+
+    Raises:
+        TrialFileError: `target` exists, the disk is full or gone, or one of them is no
+            regular file of the session.
+    """
+    with (
+        writing(target),
+        open_folder(source.parent) as old,
+        open_folder(target.parent) as new,
+    ):
+        os.close(open_data(source))
+        if not _is_same(target, source):
+            os.link(
+                source.name,
+                target.name,
+                src_dir_fd=old,
+                dst_dir_fd=new,
+                follow_symlinks=False,
+            )
+            os.fsync(new)
+        os.unlink(source.name, dir_fd=old)
+        os.fsync(old)
+
+
+def remove_file(path: Path) -> None:
+    """Take the name `path` away, down to the disk; nothing where there is none.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    with writing(path), open_folder(path.parent) as folder:
+        with suppress(FileNotFoundError):
+            os.unlink(path.name, dir_fd=folder)
+        os.fsync(folder)
+
+
+@contextmanager
+def writing(path: Path) -> Generator[None, None, None]:
+    """Turn what a full disk raises into a TrialFileError."""
+    try:
+        yield
+    except OSError as error:
+        raise TrialFileError(
+            path,
+            f"cannot be written ({error.strerror})",
+            hint="Is the disk full? Nothing that was kept is lost.",
+        ) from error
+
+
+def sha256_of(path: Path) -> str:
+    """Return the hex digest of a file.
+
+    Raises:
+        TrialFileError: it is no regular file of the session, or too large.
+    """
+    with os.fdopen(open_data(path), "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _is_same(target: Path, source: Path) -> bool:
+    try:
+        return os.path.samestat(target.lstat(), source.lstat())
+    except OSError:
+        return False
+
+
+def _write_new(folder: int, name: str, text: str) -> None:
+    descriptor = os.open(name, _NEW | os.O_CLOEXEC, 0o644, dir_fd=folder)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(text.encode())
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text:.20} is no finite number")
+    return number

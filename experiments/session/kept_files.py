@@ -1,0 +1,171 @@
+"""The kept trials as the journal has them, held against the files on the disk."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition import SessionError, TrialFileError
+from acquisition.trial_file import is_there
+from experiments.session.data_files import read_json, sha256_of
+from experiments.session.journal_lines import damaged_lines
+from experiments.session.reducer import KEEP, replay
+from experiments.session.store import SessionFolder
+from experiments.session.trial_files import decision_of, find_sidecar
+from experiments.session.trial_name import TrialName
+
+_NAMED = 6  # deviations in one message
+_Facts = Mapping[str, Any]
+
+
+class KeptDataError(SessionError):
+    """Kept trials are missing, or are not what the journal says."""
+
+    exit_code = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """One file of a session that is not what the journal says.
+
+    Attributes:
+        session: id of the session.
+        file: below the folder of the session.
+        problem: what is wrong, in words.
+    """
+
+    session: str
+    file: str
+    problem: str
+
+    def text(self) -> str:
+        """Return it in one line."""
+        return f"{self.session} {self.file} {self.problem}"
+
+
+def compare_kept(
+    folder: SessionFolder, digest: Callable[[Path], str] = sha256_of
+) -> list[Deviation]:
+    """Return every kept trial that is missing or changed, in the order of trials.
+
+    A journal of an older version names no checksums: that of the sidecar counts then.
+    A trial whose files have yet to follow the journal is no deviation.
+
+    Args:
+        folder: the session.
+        digest: what computes the checksum of a file.
+    """
+    try:
+        return [Deviation(folder.id, *pair) for pair in _compare(folder, digest)]
+    except TrialFileError as error:
+        return [unreadable(folder, error)]
+
+
+def _compare(
+    folder: SessionFolder, digest: Callable[[Path], str]
+) -> list[tuple[str, str]]:
+    """Return (file, problem) of every deviation.
+
+    Raises:
+        TrialFileError: a file or folder that all depends on cannot be read.
+    """
+    events = folder.events()
+    kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
+    found = [
+        ("events.jsonl", f"has a wrong checksum in line {number}")
+        for number in damaged_lines(folder.journal_text())
+    ]
+    for name in kept:
+        try:
+            found += _check_trial(folder, name, recorded_facts(events, name), digest)
+        except TrialFileError as error:
+            found.append((_below(folder, error), error.reason))
+    judged = {d.name for d in map(decision_of, events) if d is not None}
+    for path in sorted(folder.trials.glob("T??.json")):
+        facts = read_json(path)
+        stem, attempt = path.stem, facts.get("attempt")
+        is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
+        if events and facts.get("verdict") == KEEP and not is_judged:
+            found.append((f"trials/{path.name}", "is kept, the journal knows nothing"))
+    return found
+
+
+def _below(folder: SessionFolder, error: TrialFileError) -> str:
+    """Return the file of an error, below the folder of the session."""
+    is_below = error.path.is_relative_to(folder.path)
+    return str(error.path.relative_to(folder.path) if is_below else error.path)
+
+
+def unreadable(folder: SessionFolder, error: TrialFileError) -> Deviation:
+    """Return a file that leads out of the session as a deviation."""
+    return Deviation(folder.id, _below(folder, error), error.reason)
+
+
+def compare_trial(folder: SessionFolder, path: Path) -> list[Deviation]:
+    """Return what `compare_kept` says of the file of one trial."""
+    return [d for d in compare_kept(folder) if Path(d.file).stem == path.stem]
+
+
+def check_kept(
+    sessions: Sequence[SessionFolder], *, allow_missing: bool
+) -> list[Deviation]:
+    """Return the deviations of all `sessions`; without permission there are none.
+
+    Raises:
+        KeptDataError: there are some, and `allow_missing` is false.
+    """
+    deviations = [d for session in sessions for d in compare_kept(session)]
+    if deviations and not allow_missing:
+        raise kept_data_error(deviations)
+    return deviations
+
+
+def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
+    """Return the refusal of data that are not what the journal says."""
+    named = "; ".join(d.text() for d in deviations[:_NAMED])
+    more = f"; and {len(deviations) - _NAMED} more" if deviations[_NAMED:] else ""
+    return KeptDataError(
+        f"Not what was kept: {named}{more}.",
+        hint="Copy the files back, or go on without them: --allow-missing.",
+    )
+
+
+def recorded_facts(events: Sequence[_Facts], name: TrialName) -> _Facts:
+    """Return the event that kept the attempt last."""
+    facts: _Facts = {}
+    for event in events:
+        decision = decision_of(event)
+        if decision is not None and decision.name == name and decision.verdict == KEEP:
+            facts = event
+    return facts
+
+
+def _check_trial(
+    folder: SessionFolder,
+    name: TrialName,
+    event: _Facts,
+    digest: Callable[[Path], str],
+) -> list[tuple[str, str]]:
+    """Return (file, problem) for each file of a kept trial that is not sound."""
+    sidecar = find_sidecar(folder, name)
+    path = folder.trials / f"{name.kept}.mcap"
+    if not is_there(path) and is_there(folder.rejected / f"{name.rejected}.json"):
+        path = folder.rejected / f"{name.rejected}.mcap"  # follows at the next opening
+    stated, found = sidecar.get("sha256"), list[tuple[str, str]]()
+    wanted = event.get("sha256", stated)
+    if not sidecar:
+        found.append((f"trials/{name.kept}.json", "is missing or unreadable"))
+    elif stated != wanted:
+        found.append((f"trials/{name.kept}.json", "states another checksum"))
+    if not is_there(path):
+        found.append((f"trials/{path.name}", "is missing"))
+    elif wanted and digest(path) != wanted:
+        size, before = path.stat().st_size, event.get("size", sidecar.get("size"))
+        found.append((f"trials/{path.name}", _changed(size, before)))
+    return found
+
+
+def _changed(size: int, before: object) -> str:
+    if type(before) is not int or size == before:
+        return "is changed: its checksum is wrong"
+    return f"is changed: {size} bytes, {before} were kept"

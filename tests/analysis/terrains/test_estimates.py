@@ -1,0 +1,30 @@
+import math
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.terrains.database import KnownTerrain
+from analysis.terrains.table import Table
+
+ROWS = ((1.0, 2.0), (3.0, 4.0))
+TABLE = Table((1.0, 5.0), (0.01, 0.2), ROWS, ROWS)
+TERRAIN = KnownTerrain("S0", "small", 1, 9, 0.0, {}, {"m": TABLE}, {}, "m")
+
+
+@pytest.mark.parametrize("point", [(math.nan, 0.1), (2.0, math.inf)])
+def test_a_value_that_is_no_finite_number_is_refused(point):
+    with pytest.raises(SettingsError, match="finite"):
+        TERRAIN.predict(*point)
+    with pytest.raises(SettingsError, match="finite"):
+        TERRAIN.slip_risk(1.0, *point)
+    with pytest.raises(SettingsError, match="finite"):
+        TERRAIN.predict_many(np.array(point[:1]), np.array(point[1:]))
+
+
+@pytest.mark.parametrize(
+    ("point", "is_outside"),
+    [((2.0, 0.1), False), ((5.0, 0.2), False), ((6.0, 0.1), True), ((2.0, 0.3), True)],
+)
+def test_an_estimate_says_whether_it_lies_outside_the_table(point, is_outside):
+    assert TERRAIN.predict(*point).is_extrapolated is is_outside

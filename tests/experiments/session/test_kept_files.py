@@ -1,0 +1,132 @@
+import json
+import shutil
+
+import pytest
+
+from experiments.session.kept_files import compare_kept
+from experiments.session.store import find_session
+from tests.experiments.program import digest, journal, only_session, sidecar, traction
+
+
+@pytest.fixture
+def data(recorded, tmp_path):
+    """Return a data folder with two kept trials that may be spoiled."""
+    shutil.copytree(recorded.data, tmp_path / "data")
+    return tmp_path / "data"
+
+
+@pytest.fixture
+def spoiled(data):
+    """Return the same with a sidecar deleted and another trial cut."""
+    trials = only_session(data) / "trials"
+    (trials / "T01.json").unlink()
+    cut(trials / "T02.mcap")
+    return data
+
+
+def cut(path):
+    path.chmod(0o644)
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def files(data):
+    return {d.file for d in compare_kept(find_session(data, "S001"))}
+
+
+def test_the_journal_has_checksum_and_size_of_every_kept_trial(recorded):
+    kept = [e for e in journal(recorded.folder) if e["event"] == "trial-kept"]
+    trials = recorded.folder / "trials"
+    facts = [sidecar(trials / f"T0{event['trial']}.mcap") for event in kept]
+    wanted = [(fact["sha256"], fact["size"]) for fact in facts]
+    assert [(event["sha256"], event["size"]) for event in kept] == wanted
+
+
+def test_a_trial_that_is_kept_later_has_its_checksum_in_the_journal(data):
+    for verdict in ("reject", "keep"):
+        done = traction("verdict", "S001", "T01a", verdict, "why", "--data", data)
+        assert done.code == 0, done.err
+    *_, event = journal(only_session(data))
+    trial = only_session(data) / "trials" / "T01.mcap"
+    assert event["sha256"] == sidecar(trial)["sha256"]
+
+
+def test_a_sound_session_has_no_deviations(data):
+    assert files(data) == set()
+
+
+def test_missing_and_changed_files_are_named(spoiled):
+    assert files(spoiled) == {"trials/T01.json", "trials/T02.mcap"}
+
+
+def test_a_trial_changed_together_with_its_sidecar_is_found(data):
+    path = only_session(data) / "trials" / "T01.mcap"
+    cut(path)
+    facts = sidecar(path) | {"sha256": digest(path)}
+    path.with_suffix(".json").write_text(json.dumps(facts))
+    assert files(data) == {"trials/T01.json", "trials/T01.mcap"}
+
+
+def test_a_sidecar_that_the_journal_does_not_know_is_named(data):
+    trials = only_session(data) / "trials"
+    for suffix in (".mcap", ".json"):
+        shutil.copy(trials / f"T01{suffix}", trials / f"T09{suffix}")
+    assert files(data) == {"trials/T09.json"}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("status",),
+        ("status", "--json"),
+        ("report", "S001"),
+        ("report", "--all"),
+        ("export", "S001", "--to", "{}/tables"),
+        ("export", "--terrain-db", "{}/terrains.json"),
+        ("redo", "S001", "T01"),
+        ("replay", "S001", "T02"),
+        ("verify", "S001"),
+        ("verify", "--all"),
+    ],
+    ids=" ".join,
+)
+def test_a_command_names_what_is_missing_and_ends_with_6(spoiled, config, arguments):
+    arguments = [a.format(spoiled.parent) for a in arguments]
+    done = traction(*arguments, "--data", spoiled, "--config", config)
+    assert done.code == 6
+    assert "trials/T02.mcap" in done.err
+    assert not (spoiled.parent / "tables").exists()
+
+
+def test_verify_lists_deviations_as_json(spoiled):
+    done = traction("verify", "--all", "--json", "--data", spoiled)
+    assert done.code == 6
+    found = {(row["session"], row["file"]) for row in json.loads(done.out)}
+    assert found == {("S001", "trials/T01.json"), ("S001", "trials/T02.mcap")}
+
+
+def test_verify_accepts_a_sound_session(data):
+    assert traction("verify", "S001", "--data", data).code == 0
+
+
+def test_verify_wants_sessions_or_all(data):
+    assert traction("verify", "--data", data).code == 2
+
+
+def test_what_is_left_is_exported_if_that_is_allowed(data, config):
+    (only_session(data) / "trials" / "T01.json").unlink()
+    to = data.parent / "tables"
+    arguments = ("export", "S001", "--to", to, "--allow-missing")
+    done = traction(*arguments, "--data", data, "--config", config)
+    assert done.code == 0
+    assert "T01.json" in done.err
+    assert [path.name for path in to.glob("*/T0?.csv")] == ["T02.csv"]
+
+
+@pytest.mark.slow
+def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):
+    (only_session(data) / "trials" / "T01.json").unlink()
+    arguments = ("report", "S001", "--allow-missing")
+    done = traction(*arguments, "--data", data, "--config", config)
+    assert done.code == 0, done.err
+    page = (only_session(data) / "report" / "index.html").read_text()
+    assert "T01.json" in page.partition("<h2")[0]
