@@ -12,9 +12,12 @@ from acquisition.devices import Vector
 # A torque changes in one cycle by this share of its limit at most: from zero to the
 # limit takes 20 ms. In simulated sessions the largest change of a driven arm is 0.041
 # of it (1.8 N m at joint 2, when a trial begins to float), that of the locked joint 7
-# 0.018. The start of torques, a step of 26 N m at joint 2, is spread over 12 ms behind
-# the brakes; the pendant cannot activate the arm so soon after.
-TORQUE_STEP = 0.1
+# 0.018. The start of torques, a step of 26 N m at joint 2, is spread over 12 ms
+# behind the brakes; the pendant cannot activate the arm so soon after. Joint 7 is
+# light and its lock stiff: held back as much, the lock throws the joint that it is to
+# hold (17 rad/s after a twist of 1.2 N m); at 0.3 it does not, and one false position
+# makes 0.8 rad/s.
+TORQUE_STEP = np.array([0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.3])
 
 
 def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector:

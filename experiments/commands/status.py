@@ -58,21 +58,20 @@ def run(args: argparse.Namespace) -> int:
 
     def steps(board: Sequence[MatrixRow]) -> list[str]:
         kinds = {line.is_simulated for line in board if line.sessions} or {False}
-        return [
-            step
-            for is_simulated in sorted(kinds)
-            for step in next_steps(
-                args.data, settings.matrix, is_simulated=is_simulated
-            )
-        ]
+        lists = (
+            next_steps(args.data, settings.matrix, is_simulated=kind)
+            for kind in sorted(kinds)
+        )
+        return [step for steps in lists for step in steps]
 
     def notes(board: Sequence[MatrixRow]) -> list[str]:
         return board_notes(args.data, settings.matrix, where, board)
 
+    def lines() -> list[str]:
+        return [*_plain(board := count()), *notes(board), *steps(board)]
+
     if args.follow:
-        return _follow(
-            lambda: [*_plain(board := count()), *notes(board), *steps(board)], console
-        )
+        return _follow(lines, console)
     board = count()
     deviations = compare_board(args.data, where, digest)
     for note in notes(board):  # not in the way of a program that reads the board
@@ -80,12 +79,16 @@ def run(args: argparse.Namespace) -> int:
     if args.json:
         console.say(json.dumps([line.as_dict() for line in board], indent=1))
     else:
-        console.table(_HEADER, [_row(line) for line in board])
-        for step in steps(board):
-            console.say(step)
+        _print(board, steps(board), console)
     for deviation in deviations:
         console.problem(f"{BAD} {deviation.text()}.")
     return _NOT_AS_KEPT if deviations else 0
+
+
+def _print(board: Sequence[MatrixRow], steps: Sequence[str], console: Console) -> None:
+    console.table(_HEADER, [_row(line) for line in board])
+    for step in steps:
+        console.say(step)
 
 
 def _row(line: MatrixRow) -> tuple[str, ...]:

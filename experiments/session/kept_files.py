@@ -7,8 +7,7 @@ from typing import Any
 
 from acquisition import SessionError, TrialFileError
 from acquisition.trial_file import is_there
-from experiments.session.data_files import read_json, sha256_of
-from experiments.session.journal_lines import damaged_lines
+from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.store import SessionFolder
 from experiments.session.trial_files import decision_of, find_sidecar

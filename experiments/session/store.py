@@ -18,8 +18,13 @@ from acquisition.trial_file import (
     read_data,
     sync_directory,
 )
-from experiments.session.data_files import read_json, sha256_of, writing
-from experiments.session.journal_lines import journal_line, parse_line
+from experiments.session.data_files import (
+    journal_line,
+    parse_line,
+    read_json,
+    sha256_of,
+    writing,
+)
 
 JOURNAL_FILE = "events.jsonl"
 _FOLDER = re.compile(

@@ -693,7 +693,7 @@ def test_torques_grow_from_zero_after_the_brakes(bench):
     assert not record["torque_command"].any()
     bench.arm.mode = SafetyMode.IDLE
     bench.enter(ArmState.FLOAT)
-    assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 7)
+    assert bench.arm.sent[-1].tolist() == pytest.approx([3.0] * 6 + [9.0])
 
 
 def test_a_torque_that_was_held_back_is_flagged(bench):

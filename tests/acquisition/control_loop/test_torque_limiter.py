@@ -4,7 +4,7 @@ import pytest
 from acquisition.control_loop.torque_limiter import bounded_torque
 
 LIMITS = (20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3)
-STEP = np.array(LIMITS) / 10
+STEP = np.array(LIMITS) * ([0.1] * 6 + [0.3])
 
 
 @pytest.mark.parametrize("sign", [1, -1])
@@ -12,7 +12,7 @@ def test_a_torque_ends_at_its_limit_ten_cycles_from_zero(sign):
     tau = np.zeros(7)
     for _ in range(9):
         tau = bounded_torque(sign * np.full(7, 99.0), tau, LIMITS)
-    assert (np.abs(tau) < LIMITS).all()
+    assert (np.abs(tau)[:6] < LIMITS[:6]).all()
     for _ in range(2):
         tau = bounded_torque(sign * np.full(7, 99.0), tau, LIMITS)
     assert tau.tolist() == [sign * limit for limit in LIMITS]

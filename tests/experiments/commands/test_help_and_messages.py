@@ -326,6 +326,7 @@ def _complete(scene):
     path = scene.folder / "events.jsonl"
     lines = path.read_text().splitlines()
     start = json.loads(lines[0])
+    del start["crc"]  # a line without a checksum is one of an older version
     lines[0] = json.dumps({**start, "trials": 1})
     path.write_text("\n".join(lines[:-1]) + "\n")
     return resume(scene)
@@ -406,6 +407,8 @@ CASES = {
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
     # what takes the arm away; in a trial: test_bus_faults
     "can-silence": struck("can-silence"),
+    "safety-silent": struck("safety-silent"),
+    "position-jump": struck("position-jump"),
     "puck-silent": struck("puck-silent", words="Puck 3 has not"),
     "bus-off": struck("bus-off"),
     "estop": fault("estop@T2+0.1s", 4, E_STOP, "Stop pressed at 0.1"),
@@ -480,8 +483,12 @@ def files_of_first(scene):
     return {path.name: (digest(path), path.stat().st_mtime_ns) for path in paths}
 
 
+# Two programs on one arm: test_shared_arm, tests/experiments/rig/test_arm_lock.
+SHARED_ARM = {"arm-busy", "arm-lock", "arm-active", "other-master"}
+
+
 def test_every_row_of_the_catalogue_has_a_case():
-    assert set(CASES) == set(CATALOGUE)
+    assert set(CASES) | SHARED_ARM == set(CATALOGUE)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -59,7 +59,7 @@ def disturbed(tmp_path_factory, config):
     def press(asked, rig):
         if asked.prompt is Prompt.REVIEW and asked.trial == 1 and not pushed:
             pushed.append(True)
-            rig.plant.qd[4] = 20.0
+            rig.plant.qd[5] = 12.0
             return ""
         if asked.prompt is Prompt.REVIEW and asked.trial == 2:
             rig.network.pendant("estop")
