@@ -113,6 +113,8 @@ def test_one_false_position_is_no_blow(motor, state):
         assert bench.lie is None
     sent = np.array(bench.torques)
     assert (np.abs(sent) <= TORQUE + ROUNDING).all()
-    assert (np.abs(np.diff(sent, axis=0)) <= TORQUE_STEP * TORQUE + ROUNDING).all()
+    assert (
+        np.abs(np.diff(sent, axis=0)) <= np.array(TORQUE_STEP) * TORQUE + ROUNDING
+    ).all()
     assert max(bench.speeds) < SPEED_BOUND[motor]
     bench.arm.close()
