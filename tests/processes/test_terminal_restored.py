@@ -12,7 +12,7 @@ import termios
 
 import pytest
 
-from tests.experiments.program import write_config
+from tests.processes.watching import patient_config
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(90)]
 PATIENCE, LOOK = 20.0, 0.3  # s without a word, in all and at a time
@@ -75,9 +75,7 @@ class Person:
 
 @pytest.fixture
 def person(tmp_path):
-    # A test machine may be busy elsewhere; that is not what is looked at here.
-    change = ("late_per_second = 10 ", "late_per_second = 500 ")
-    config = write_config(tmp_path, rig=change)
+    config = patient_config(tmp_path)
     options = ("--fake", "--trials", 1, "--config", config, "--data", tmp_path / "data")
     found = Person("run", "TF", *options)
     yield found

@@ -18,6 +18,7 @@ from acquisition.ipc.commands import StatusSlot
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import SharedMemory
 from fakes.bus.client import SocketBus
+from tests.experiments.program import write_config
 
 ROOT = Path(__file__).parents[2]
 CLOCK = SystemClock()
@@ -150,12 +151,23 @@ class Session:
         raise AssertionError("the board was not found")
 
 
+def patient_config(folder):
+    """Write a configuration whose loop bears a busy machine; return its rig.toml.
+
+    Late cycles are not what is looked at here; their limit has tests in stepped time.
+    """
+    change = ("late_per_second = 10 ", "late_per_second = 500 ")
+    return write_config(folder, rig=change)
+
+
 @contextmanager
 def session(data, *options):
     """Start a session; whatever is left of it at the end is ended."""
     data.mkdir(parents=True, exist_ok=True)
+    config = patient_config(data)
     command = [sys.executable, "-c", START, "run", "S0", "--fake", "--trials", "1"]
-    command += ["--operator-script", "auto", "--data", str(data), *options]
+    command += ["--operator-script", "auto", "--config", str(config)]
+    command += ["--data", str(data), *options]
     with (data / "out.txt").open("w") as out:
         process = subprocess.Popen(
             command, cwd=ROOT, stdout=out, stderr=out, stdin=subprocess.DEVNULL
