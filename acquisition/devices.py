@@ -160,7 +160,7 @@ class WrenchSensor(Protocol):
         """Return model, serial number, firmware and rate for the recording."""
         ...
 
-    def stream_facts(self) -> dict[str, str]:
+    def stream_metadata(self) -> dict[str, str]:
         """Return what became of its samples since it was opened, as text."""
         ...
 

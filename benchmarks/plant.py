@@ -89,8 +89,8 @@ def main() -> int:
     if args.json:
         is_met = parts[0].median_us <= GOAL_US
         rows = [asdict(part) for part in parts]
-        facts = {"cycles": args.cycles, "goal_us": GOAL_US, "is_met": is_met}
-        print(json.dumps({**facts, "parts": rows}, indent=2))
+        fields = {"cycles": args.cycles, "goal_us": GOAL_US, "is_met": is_met}
+        print(json.dumps({**fields, "parts": rows}, indent=2))
     else:
         _print_table(parts, args.cycles)
     return 0

@@ -106,11 +106,11 @@ def _report_bug() -> int:
     return _tell("command-bug", {"error": repr(sys.exc_info()[1]), "log": log.name})
 
 
-def _tell(name: str, facts: Mapping[str, object]) -> int:
+def _tell(name: str, details: Mapping[str, object]) -> int:
     """Print a message of the catalogue and return its exit code."""
     from experiments.messages import CATALOGUE
 
-    print(CATALOGUE[name].text(facts), file=sys.stderr)  # noqa: T201
+    print(CATALOGUE[name].text(details), file=sys.stderr)  # noqa: T201
     return CATALOGUE[name].exit_code
 
 

@@ -30,10 +30,10 @@ class Message:
     arm: str = ""
     example: str = ""
 
-    def text(self, facts: Mapping[str, object], saved: str = "") -> str:
+    def text(self, fields: Mapping[str, object], saved: str = "") -> str:
         """Return the message in one line."""
         arm = f"ARM: {self.arm}." if self.arm else ""
-        parts = (self.what.format_map(facts), arm, self.do.format_map(facts), saved)
+        parts = (self.what.format_map(fields), arm, self.do.format_map(fields), saved)
         return " ".join(part for part in parts if part)
 
     def sample(self) -> tuple[str, str]:
@@ -55,12 +55,12 @@ def _left_open(text: str) -> str:
 CATALOGUE: Mapping[str, Message] = _load()
 
 
-def preflight_error(name: str, **facts: object) -> PreflightError:
+def preflight_error(name: str, **fields: object) -> PreflightError:
     """Return the refusal of a rig that is called `name` in the catalogue."""
     message = CATALOGUE[name]
     return PreflightError(
-        message.what.format_map(facts),
-        hint=message.do.format_map(facts),
+        message.what.format_map(fields),
+        hint=message.do.format_map(fields),
         arm_state=message.arm,
     )
 

@@ -12,7 +12,7 @@ PACKAGES = ("traction", "numpy", "pin", "python-can", "pyserial", "mcap", "scipy
 def collect() -> dict[str, str]:
     """Return software version, commit, dirty state, packages and kernel as strings."""
     commit, diff = _git()
-    facts = {
+    versions = {
         "software": f"traction {_version('traction')}",
         "commit": commit,
         "dirty": "true" if diff else "false",
@@ -20,8 +20,8 @@ def collect() -> dict[str, str]:
         "kernel": f"{platform.system()} {platform.release()}",
         "machine": platform.machine(),
     }
-    facts.update({f"package:{name}": _version(name) for name in PACKAGES})
-    return facts
+    versions.update({f"package:{name}": _version(name) for name in PACKAGES})
+    return versions
 
 
 def diff_patch() -> str:

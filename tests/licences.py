@@ -28,17 +28,17 @@ def pins(text: str) -> dict[str, str]:
 
 def licence_of(package: str) -> str:
     """Return what the metadata of an installed package say, or which file does."""
-    facts = metadata.metadata(package)
-    expression = facts.get("License-Expression", "")
+    fields = metadata.metadata(package)
+    expression = fields.get("License-Expression", "")
     classified = [
         line.rpartition(" :: ")[2]
-        for line in facts.get_all("Classifier") or []
+        for line in fields.get_all("Classifier") or []
         if line.startswith("License ::") and not line.endswith("OSI Approved")
     ]
-    words = (facts.get("License") or "").strip()
+    words = (fields.get("License") or "").strip()
     first = words.splitlines()[0].strip() if words else ""
     short = first if 0 < len(first) <= _LONGEST else ""
-    files = ", ".join(facts.get_all("License-File") or [])
+    files = ", ".join(fields.get_all("License-File") or [])
     in_file = f"in its file {files}" if files else "not declared"
     return expression or ", ".join(classified) or short or in_file
 

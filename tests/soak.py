@@ -107,8 +107,8 @@ class Soak:
         state = replay(find_session(self.data, folder.name).events())
         kept = [f"T{number:02d}" for number in sorted(state.kept)]
         assert kept == kept_and_sound(folder), (kept, folder)
-        facts = json.loads((folder / "session.json").read_text())
-        assert sorted(facts["kept"]) == kept, (kept, facts)
+        fields = json.loads((folder / "session.json").read_text())
+        assert sorted(fields["kept"]) == kept, (kept, fields)
         rejected = {path.stem for path in (folder / "rejected").glob("T???.json")}
         assert len(rejected) == state.rejected, (rejected, state.rejected)
         self.counts["checks of files"] += 1

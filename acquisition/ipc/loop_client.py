@@ -128,6 +128,6 @@ class LoopClient:
         """Return a reader of the loop's timings from now on."""
         return self._shared.timings.reader()
 
-    def device_facts(self) -> dict[str, str]:
+    def device_metadata(self) -> dict[str, str]:
         """Return what the devices said last about themselves."""
         return json.loads(self._shared.health.read() or b"{}")

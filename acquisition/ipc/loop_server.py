@@ -37,7 +37,7 @@ _CONSOLE, _CONTROL, _RECORDER = (
     ProcessRole.RECORDER,
 )
 
-Facts = Callable[[], Mapping[str, str]]
+MetadataSource = Callable[[], Mapping[str, str]]
 
 
 def no_bell() -> None:
@@ -50,12 +50,12 @@ class LoopHooks:
 
     Attributes:
         now_ns: tells the monotonic time [ns].
-        facts: what the devices say about themselves; asked once a second.
+        metadata: what the devices say about themselves; asked once a second.
         ring: rings a bell for a person.
     """
 
     now_ns: Callable[[], int]
-    facts: Facts
+    metadata: MetadataSource
     ring: Callable[[], None] = no_bell
 
 
@@ -91,7 +91,7 @@ class LoopServer:
         self._cycle(tick)
         self._cycles += 1
         if self._cycles % _FACTS_EVERY == 1:
-            self._publish_facts()
+            self._publish_metadata()
         self._publish(tick)
 
     def leave(self) -> None:
@@ -105,7 +105,7 @@ class LoopServer:
             cycle.request(ArmState(command.argument))
         elif kind is CommandKind.WATCH_TRIAL:
             cycle.is_recording = bool(command.argument)
-            self._publish_facts()
+            self._publish_metadata()
         elif kind is CommandKind.SET_BIAS:
             cycle.set_bias(command.values[:6])
         elif kind is CommandKind.MOVE:
@@ -115,8 +115,8 @@ class LoopServer:
             self.is_over = True
         self._status.obeyed = command.number
 
-    def _publish_facts(self) -> None:
-        self._shared.health.write(json.dumps(dict(self._hooks.facts())).encode())
+    def _publish_metadata(self) -> None:
+        self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())
 
     def _watch(self, now_ns: int) -> None:
         """Stop the arm when those who look after it have gone."""

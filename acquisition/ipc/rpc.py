@@ -242,7 +242,7 @@ def _decode_array(scalar: type[np.generic], value: object) -> NDArray[Any]:
 
 
 def _encode_error(error: TractionError) -> dict[str, str]:
-    facts = {
+    fields = {
         "type": type(error).__name__,
         "message": error.message,
         "hint": error.hint,
@@ -250,21 +250,23 @@ def _encode_error(error: TractionError) -> dict[str, str]:
         "saved": error.saved,
     }
     if isinstance(error, TrialFileError):
-        facts["path"], facts["reason"] = str(error.path), error.reason
-    return facts
+        fields["path"], fields["reason"] = str(error.path), error.reason
+    return fields
 
 
-def _decode_error(facts: Mapping[str, str]) -> TractionError:
-    if facts["type"] == TrialFileError.__name__:
-        return TrialFileError(Path(facts["path"]), facts["reason"], hint=facts["hint"])
-    kind = getattr(errors, facts["type"], DeviceFaultError)
-    if facts["type"] == RemoteCallError.__name__:
+def _decode_error(fields: Mapping[str, str]) -> TractionError:
+    if fields["type"] == TrialFileError.__name__:
+        return TrialFileError(
+            Path(fields["path"]), fields["reason"], hint=fields["hint"]
+        )
+    kind = getattr(errors, fields["type"], DeviceFaultError)
+    if fields["type"] == RemoteCallError.__name__:
         kind = RemoteCallError
     elif not issubclass(kind, TractionError):
         kind = DeviceFaultError
     return kind(
-        facts["message"],
-        hint=facts["hint"],
-        arm_state=facts["arm_state"],
-        saved=facts["saved"],
+        fields["message"],
+        hint=fields["hint"],
+        arm_state=fields["arm_state"],
+        saved=fields["saved"],
     )

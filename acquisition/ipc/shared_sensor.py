@@ -25,7 +25,7 @@ class SharedSensor:
         """Return nothing: the process that has the port knows."""
         return {}
 
-    def stream_facts(self) -> dict[str, str]:
+    def stream_metadata(self) -> dict[str, str]:
         """Return nothing: the process that has the port knows."""
         return {}
 

@@ -105,32 +105,32 @@ def _read_summary(data: memoryview, start: int, end: int, path: Path) -> Summary
         raise TrialFileError(path, f"has profile {header.profile[:20]!r}, not ros2")
     summary = Summary()
     while start < end:
-        found = record_at(data[:end], start)
-        if found is None:
+        raw = record_at(data[:end], start)
+        if raw is None:
             raise TrialFileError(path, "has a damaged summary")
-        _add_record(summary, found)
-        start = found.end
+        _add_record(summary, raw)
+        start = raw.end
     if summary.statistics is None:
         raise TrialFileError(path, "has no summary: was it closed properly?")
     return summary
 
 
-def _add_record(summary: Summary, found: RawRecord) -> None:
-    match found.opcode:
+def _add_record(summary: Summary, raw: RawRecord) -> None:
+    match raw.opcode:
         case Opcode.CHUNK_INDEX:
-            summary.chunk_indexes.append(_chunk_index(found.body))
+            summary.chunk_indexes.append(_chunk_index(raw.body))
         case Opcode.STATISTICS:
-            summary.statistics = Statistics.read(_stream(found.body))
+            summary.statistics = Statistics.read(_stream(raw.body))
         case Opcode.SCHEMA:
-            schema = Schema.read(_stream(found.body))
+            schema = Schema.read(_stream(raw.body))
             summary.schemas[schema.id] = schema
         case Opcode.CHANNEL:
-            channel = Channel.read(_stream(found.body))
+            channel = Channel.read(_stream(raw.body))
             summary.channels[channel.id] = channel
         case Opcode.METADATA_INDEX:
-            summary.metadata_indexes.append(MetadataIndex.read(_stream(found.body)))
+            summary.metadata_indexes.append(MetadataIndex.read(_stream(raw.body)))
         case Opcode.ATTACHMENT_INDEX:
-            summary.attachment_indexes.append(AttachmentIndex.read(_stream(found.body)))
+            summary.attachment_indexes.append(AttachmentIndex.read(_stream(raw.body)))
         case _:
             pass
 
@@ -176,9 +176,9 @@ def _check_chunks(summary: Summary, end: int, size: int, path: Path) -> None:
 def _check_named(summary: Summary, size: int, path: Path) -> None:
     """Refuse more metadata and attachments than can lie beside each other."""
     indexes = (summary.metadata_indexes, summary.attachment_indexes)
-    if max(len(found) for found in indexes) > MAX_NAMED:
+    if max(len(raw) for raw in indexes) > MAX_NAMED:
         raise TrialFileError(path, f"states over {MAX_NAMED} attachments")
-    if sum(index.length for found in indexes for index in found) > size:
+    if sum(index.length for raw in indexes for index in raw) > size:
         raise TrialFileError(path, "states attachments larger than itself")
 
 
@@ -197,7 +197,7 @@ def _attachment(data: memoryview, index: AttachmentIndex, path: Path) -> Attachm
 
 
 def _record(data: memoryview, offset: int, opcode: Opcode, path: Path) -> memoryview:
-    found = record_at(data, offset)
-    if found is None or found.opcode != opcode:
+    raw = record_at(data, offset)
+    if raw is None or raw.opcode != opcode:
         raise TrialFileError(path, f"has no {opcode.name.lower()} at byte {offset}")
-    return found.body
+    return raw.body

@@ -120,10 +120,10 @@ def is_there(path: Path) -> bool:
     """
     try:
         with open_folder(path.parent) as folder:
-            found = _stat(path.name, folder)
+            status = _stat(path.name, folder)
     except OSError:
         return False
-    _check_kind(path, found)
+    _check_kind(path, status)
     return True
 
 
@@ -131,23 +131,23 @@ def _stat(name: str, folder: int) -> os.stat_result:
     return os.stat(name, dir_fd=folder, follow_symlinks=False)
 
 
-def _check_kind(path: Path, found: os.stat_result, *, is_folder: bool = False) -> None:
-    if is_folder and stat.S_ISDIR(found.st_mode):
+def _check_kind(path: Path, status: os.stat_result, *, is_folder: bool = False) -> None:
+    if is_folder and stat.S_ISDIR(status.st_mode):
         return
     for is_kind, what in _KINDS:
-        if is_kind(found.st_mode):
+        if is_kind(status.st_mode):
             raise TrialFileError(path, what, hint=_HINT)
     if is_folder:
         raise TrialFileError(path, "is no folder", hint=_HINT)
 
 
 def _check_open(descriptor: int, path: Path) -> None:
-    found = os.fstat(descriptor)
-    _check_kind(path, found)
-    if found.st_nlink > 1 and _names(path, found) < found.st_nlink:
+    status = os.fstat(descriptor)
+    _check_kind(path, status)
+    if status.st_nlink > 1 and _names(path, status) < status.st_nlink:
         raise TrialFileError(path, "has another name elsewhere", hint=_HINT)
-    if found.st_size > size_limit(path):
-        raise _too_large(path, found.st_size)
+    if status.st_size > size_limit(path):
+        raise _too_large(path, status.st_size)
 
 
 def _names(path: Path, wanted: os.stat_result) -> int:

@@ -152,8 +152,8 @@ class TrialReader:
     def _unpacked(self, index: ChunkIndex) -> bytes:
         body = self._contents.record(index.chunk_start_offset, Opcode.CHUNK)
         chunk = parse_chunk(body, self.path)
-        found = (len(body), chunk.size, chunk.compression, len(chunk.packed))
-        if found != (
+        actual = (len(body), chunk.size, chunk.compression, len(chunk.packed))
+        if actual != (
             index.chunk_length - _RECORD_BYTES,
             index.uncompressed_size,
             index.compression,
@@ -165,8 +165,8 @@ class TrialReader:
     def _message_offsets(self, index: ChunkIndex, channel: int) -> NDArray[np.uint64]:
         offset = index.message_index_offsets[channel]
         body = self._contents.record(offset, Opcode.MESSAGE_INDEX)
-        found, size = _INDEX.unpack_from(body)
-        if found != channel or size % 16 or size != len(body) - _INDEX.size:
+        actual, size = _INDEX.unpack_from(body)
+        if actual != channel or size % 16 or size != len(body) - _INDEX.size:
             raise TrialFileError(self.path, "has a damaged message index")
         return np.frombuffer(body, "<u8", size // 8, _INDEX.size)[1::2]
 

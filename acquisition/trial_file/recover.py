@@ -30,13 +30,13 @@ class TrialCopy:
     Attributes:
         messages: how many there are so far.
         metadata: names of the metadata records so far.
-        facts: what the metadata record `recovered` is going to say.
+        details: what the metadata record `recovered` is going to say.
     """
 
-    def __init__(self, file: IO[bytes], facts: Mapping[str, str]) -> None:
+    def __init__(self, file: IO[bytes], details: Mapping[str, str]) -> None:
         self.messages = 0
         self.metadata: set[str] = set()
-        self.facts = dict(facts)
+        self.details = dict(details)
         self._writer = Writer(
             file,
             chunk_size=CHUNK_BYTES,
@@ -86,11 +86,11 @@ class TrialCopy:
         Raises:
             OSError: the disk is full or gone.
         """
-        dropped = int(self.facts["source_bytes"]) - salvage.kept_bytes
-        self.facts["reason"] = salvage.reason or self.facts["reason"]
-        self.facts["messages_kept"] = str(self.messages)
-        self.facts["bytes_dropped"] = str(dropped if salvage.reason else 0)
-        self.facts["attachments_dropped"] = " ".join(salvage.left_out)
+        dropped = int(self.details["source_bytes"]) - salvage.kept_bytes
+        self.details["reason"] = salvage.reason or self.details["reason"]
+        self.details["messages_kept"] = str(self.messages)
+        self.details["bytes_dropped"] = str(dropped if salvage.reason else 0)
+        self.details["attachments_dropped"] = " ".join(salvage.left_out)
         missed = int((np.diff(np.array(self._numbers, np.int64)) - 1).sum())
         result = {
             "complete": "false",
@@ -101,7 +101,7 @@ class TrialCopy:
             "late_cycles": str(self._late),
         }
         self._writer.flush()
-        self._writer.add_metadata("recovered", self.facts)
+        self._writer.add_metadata("recovered", self.details)
         self._writer.add_metadata("result", result)
         self._writer.finish()
 
@@ -185,17 +185,17 @@ def recover_file(source: Path) -> Recovery:
     else:
         return Recovery(source, source, verified, _message_count(source))
     target = recovered_path(source)
-    facts = {
+    details = {
         "source": os.fsencode(source.name).decode(errors="replace"),
         "source_sha256": hashlib.sha256(data).hexdigest(),
         "source_bytes": str(len(data)),
         "reason": reason,
     }
     if target.exists():
-        return _earlier(source, target, facts)
+        return _earlier(source, target, details)
     try:
         with tempfile.TemporaryDirectory(prefix=".recover-", dir=source.parent) as room:
-            return _recover(data, source, facts, Path(room) / target.name)
+            return _recover(data, source, details, Path(room) / target.name)
     except OSError as error:
         raise TrialFileError(
             target,
@@ -205,10 +205,10 @@ def recover_file(source: Path) -> Recovery:
 
 
 def _recover(
-    data: bytes, source: Path, facts: Mapping[str, str], written: Path
+    data: bytes, source: Path, details: Mapping[str, str], written: Path
 ) -> Recovery:
     salvage = SoundRecords(data, source)
-    copy = _write(salvage, source, facts, written)
+    copy = _write(salvage, source, details, written)
     try:
         verified = verify_file(written)
     except TrialFileError as error:
@@ -220,26 +220,26 @@ def _recover(
         path=target,
         verified=verified,
         messages=copy.messages,
-        bytes_dropped=int(copy.facts["bytes_dropped"]),
+        bytes_dropped=int(copy.details["bytes_dropped"]),
         seconds_dropped=salvage.lost_seconds,
-        reason=copy.facts["reason"],
+        reason=copy.details["reason"],
         is_new=True,
     )
 
 
 def _write(
-    salvage: SoundRecords, source: Path, facts: Mapping[str, str], written: Path
+    salvage: SoundRecords, source: Path, details: Mapping[str, str], written: Path
 ) -> TrialCopy:
     """Write what `salvage` gives into `written`, down to the disk."""
     with written.open("xb") as file:
-        copy = TrialCopy(file, facts)
+        copy = TrialCopy(file, details)
         try:
             for record in salvage:
                 copy.add(record)
         except (struct.error, ValueError, OverflowError, MemoryError) as error:
             raise TrialFileError(source, f"cannot be copied ({error})") from error
         if not copy.messages or "trial" not in copy.metadata:
-            why = salvage.reason or facts["reason"]
+            why = salvage.reason or details["reason"]
             raise TrialFileError(source, f"has nothing to save: it {why}")
         copy.finish(salvage)
         file.flush()
@@ -247,25 +247,25 @@ def _write(
     return copy
 
 
-def _earlier(source: Path, target: Path, facts: Mapping[str, str]) -> Recovery:
+def _earlier(source: Path, target: Path, details: Mapping[str, str]) -> Recovery:
     """Return what an earlier recovery of this very file has given."""
-    found = TrialReader(target).metadata.get("recovered", {})
-    if found.get("source_sha256") != facts["source_sha256"]:
+    earlier = TrialReader(target).metadata.get("recovered", {})
+    if earlier.get("source_sha256") != details["source_sha256"]:
         raise TrialFileError(
             target,
             f"exists already and was not made from {source.name} as it is now",
             hint="Move it away to recover again; nothing is ever overwritten.",
         )
     with as_trial_file_error(target):
-        messages = int(found.get("messages_kept", ""))
-        dropped = int(found.get("bytes_dropped", ""))
+        messages = int(earlier.get("messages_kept", ""))
+        dropped = int(earlier.get("bytes_dropped", ""))
     return Recovery(
         source=source,
         path=target,
         verified=verify_file(target),
         messages=messages,
         bytes_dropped=dropped,
-        reason=found.get("reason", facts["reason"]),
+        reason=earlier.get("reason", details["reason"]),
     )
 
 

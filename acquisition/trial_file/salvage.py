@@ -60,21 +60,21 @@ class SoundRecords:
             return
         self.kept_bytes = len(MAGIC)
         while True:
-            found = record_at(self._data, self.kept_bytes)
-            if found is None:
+            raw = record_at(self._data, self.kept_bytes)
+            if raw is None:
                 is_at_end = self.kept_bytes == len(self._data)
                 where = "after" if is_at_end else "in the record at"
                 self.reason = f"is cut off {where} byte {self.kept_bytes}"
                 return
-            if found.opcode == Opcode.DATA_END:
+            if raw.opcode == Opcode.DATA_END:
                 return
             try:
                 with as_trial_file_error(self._path):
-                    yield from self._read(found)
+                    yield from self._read(raw)
             except TrialFileError as error:
                 self.reason = f"{error.reason} (byte {self.kept_bytes})"
                 return
-            self.kept_bytes = found.end
+            self.kept_bytes = raw.end
 
     @property
     def lost_seconds(self) -> float:
@@ -85,26 +85,26 @@ class SoundRecords:
             is_next = self.last_ns <= start_ns <= end_ns < self.last_ns + _LONGEST_NS
             if opcode == Opcode.CHUNK and is_next:
                 last_ns = max(last_ns, end_ns)
-            found = record_at(self._data, at)
-            if found is None:
+            raw = record_at(self._data, at)
+            if raw is None:
                 break
-            at = found.end
+            at = raw.end
         return (last_ns - self.last_ns) * 1e-9
 
-    def _read(self, found: RawRecord) -> Generator[Salvaged]:
+    def _read(self, raw: RawRecord) -> Generator[Salvaged]:
         """Give the records of one top-level record; it raises before it gives any."""
-        match found.opcode:
+        match raw.opcode:
             case Opcode.CHUNK:
-                yield from self._read_chunk(found.body)
+                yield from self._read_chunk(raw.body)
             case Opcode.METADATA:
-                yield Metadata.read(_stream(found.body))
+                yield Metadata.read(_stream(raw.body))
             case Opcode.ATTACHMENT:
-                yield from self._read_attachment(found.body)
+                yield from self._read_attachment(raw.body)
             case Opcode.SCHEMA | Opcode.CHANNEL | Opcode.MESSAGE:
-                yield self._parse(found)
+                yield self._parse(raw)
             case Opcode.HEADER if self.kept_bytes == len(MAGIC):
                 pass
-            case Opcode.MESSAGE_INDEX if _is_index(found.body):
+            case Opcode.MESSAGE_INDEX if _is_index(raw.body):
                 pass
             case opcode:  # perhaps a chunk once: what follows would have a hole before
                 raise TrialFileError(self._path, f"has a broken record, kind {opcode}")
@@ -115,34 +115,34 @@ class SoundRecords:
         if self._room < 0:
             raise TrialFileError(self._path, "has chunks that unpack to too much")
         data = memoryview(self._unpacker.unpack(chunk))
-        for found in self._split(data):
-            self._parse(found)
-        for found in self._split(data):
-            yield self._parse(found)
+        for raw in self._split(data):
+            self._parse(raw)
+        for raw in self._split(data):
+            yield self._parse(raw)
         self.last_ns = max(self.last_ns, chunk.end_ns)
 
     def _split(self, data: memoryview) -> Generator[RawRecord]:
         at = 0
         while at < len(data):
-            found = record_at(data, at)
-            if found is None:
+            raw = record_at(data, at)
+            if raw is None:
                 raise TrialFileError(self._path, "has a chunk that ends in a record")
-            if found.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
-                yield found
-            at = found.end
+            if raw.opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+                yield raw
+            at = raw.end
 
-    def _parse(self, found: RawRecord) -> Salvaged:
-        if found.opcode == Opcode.MESSAGE:
-            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(found.body)
+    def _parse(self, raw: RawRecord) -> Salvaged:
+        if raw.opcode == Opcode.MESSAGE:
+            channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(raw.body)
             if channel not in self._channels:
                 raise TrialFileError(self._path, "has messages without a channel")
-            content = bytes(found.body[_MESSAGE.size :])
+            content = bytes(raw.body[_MESSAGE.size :])
             return Message(channel, log_time, content, publish_time, sequence)
-        if found.opcode == Opcode.SCHEMA:
-            schema = Schema.read(_stream(found.body))
+        if raw.opcode == Opcode.SCHEMA:
+            schema = Schema.read(_stream(raw.body))
             self._schemas.add(schema.id)
             return schema
-        record = Channel.read(_stream(found.body))
+        record = Channel.read(_stream(raw.body))
         if record.schema_id not in self._schemas:
             raise TrialFileError(self._path, "has a channel without a schema")
         self._channels.add(record.id)
@@ -160,12 +160,12 @@ def recorded_seconds(data: bytes) -> float:
     """Return how long the sound part of a recording is, from its chunks' heads [s]."""
     at, first_ns, last_ns = len(MAGIC), None, 0
     whole = memoryview(data)
-    while (found := record_at(whole, at)) is not None:
-        if found.opcode == Opcode.CHUNK and len(found.body) >= 16:
-            start_ns, end_ns = struct.unpack_from("<QQ", found.body)
+    while (raw := record_at(whole, at)) is not None:
+        if raw.opcode == Opcode.CHUNK and len(raw.body) >= 16:
+            start_ns, end_ns = struct.unpack_from("<QQ", raw.body)
             first_ns = start_ns if first_ns is None else min(first_ns, start_ns)
             last_ns = max(last_ns, end_ns)
-        at = found.end
+        at = raw.end
     return 0.0 if first_ns is None else max(0, last_ns - first_ns) * 1e-9
 
 

@@ -58,8 +58,8 @@ def verify_file(path: Path, counts: WriterCounts | None = None) -> VerifiedFile:
     if missing:
         raise TrialFileError(path, f"lacks metadata {', '.join(missing)}")
     _check_attachments(reader)
-    found = {topic: count for topic, count in reader.topic_counts().items() if count}
-    if counts is not None and found != counts.messages:
+    actual = {topic: count for topic, count in reader.topic_counts().items() if count}
+    if counts is not None and actual != counts.messages:
         raise TrialFileError(path, "holds other messages than were written")
     with as_trial_file_error(path):
         cycles, duration, worst = _check_cycles(reader)
@@ -76,10 +76,10 @@ def _check_attachments(reader: TrialReader) -> None:
         if not key.startswith("sha256:"):
             continue
         name = key.removeprefix("sha256:")
-        found = reader.attachments.get(name)
-        if found is None and not reader.is_complete:
+        actual = reader.attachments.get(name)
+        if actual is None and not reader.is_complete:
             continue
-        if found is None or hashlib.sha256(found).hexdigest() != digest:
+        if actual is None or hashlib.sha256(actual).hexdigest() != digest:
             raise TrialFileError(reader.path, f"has no sound attachment {name}")
 
 

@@ -59,20 +59,20 @@ class GravityGuide:
         def plan(start: Array, floor: float) -> list[MeasurementPose]:
             return plan_halts(model, start, choose_poses(model, count, floor), floor)
 
-        found = self._measure(self._walk.begin(plan, 2 * AVERAGE))
+        rests = self._measure(self._walk.begin(plan, 2 * AVERAGE))
         self._walk.end()
-        return self._fit(found, is_forced=is_forced)
+        return self._fit(rests, is_forced=is_forced)
 
     def _measure(self, halts: Sequence[MeasurementPose]) -> list[MeasuredMoments]:
-        found: dict[int, list[tuple[Array, Array]]] = {}
+        rests: dict[int, list[tuple[Array, Array]]] = {}
         for halt in halts:
             self._walk.go_to(halt)
             if halt.pose is None:
                 continue
-            found.setdefault(halt.pose, []).append(self._walk.rest(AVERAGE))
-            if len(found[halt.pose]) == 2:
+            rests.setdefault(halt.pose, []).append(self._walk.rest(AVERAGE))
+            if len(rests[halt.pose]) == 2:
                 self._console.say(f"pose {halt.pose + 1} measured")
-        return [_both(approaches) for approaches in found.values()]
+        return [_both(approaches) for approaches in rests.values()]
 
     def _fit(
         self, measured: list[MeasuredMoments], *, is_forced: bool

@@ -54,10 +54,10 @@ class SensorGuide:
             poses.append(poses[0])
             return plan_halts(model, start, poses, floor, is_two_sided=False)
 
-        found = self._measure(self._walk.begin(plan, AVERAGE))
+        measured = self._measure(self._walk.begin(plan, AVERAGE))
         self._walk.end()
-        rotations = np.array([rotation for rotation, _ in found])
-        readings = np.array([reading for _, reading in found])
+        rotations = np.array([rotation for rotation, _ in measured])
+        readings = np.array([reading for _, reading in measured])
         fit = fit_sensor(rotations[:-1], readings[:-1], mounting)
         drift = float(np.linalg.norm(readings[-1, :3] - readings[0, :3]))
         self._say(fit, drift)
@@ -73,15 +73,15 @@ class SensorGuide:
         )
 
     def _measure(self, halts: Sequence[MeasurementPose]) -> list[tuple[Array, Array]]:
-        found: list[tuple[Array, Array]] = []
+        measured: list[tuple[Array, Array]] = []
         for halt in halts:
             self._walk.go_to(halt)
             if halt.pose is None:
                 continue
             q, _ = self._walk.rest(AVERAGE)
-            found.append((self._rig.model.plate_pose(q)[1], self._mean_reading()))
-            self._console.say(f"orientation {len(found)} measured")
-        return found
+            measured.append((self._rig.model.plate_pose(q)[1], self._mean_reading()))
+            self._console.say(f"orientation {len(measured)} measured")
+        return measured
 
     def _mean_reading(self) -> Array:
         """Return the mean of the last two seconds [N, N m], shape (6,).

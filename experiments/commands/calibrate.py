@@ -82,8 +82,8 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     from experiments.session import write_new_text
     from wam.calibration import gravity_to_toml
 
-    found = GravityGuide(console_loop).run(args.poses, is_forced=args.force)
-    write_new_text(out, gravity_to_toml(found))
+    result = GravityGuide(console_loop).run(args.poses, is_forced=args.force)
+    write_new_text(out, gravity_to_toml(result))
     _say_use(console_loop, out, '[gravity] model = "calibrated"', "rig.toml")
 
 
@@ -96,9 +96,9 @@ def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> N
     assert tool is not None
     is_foot = args.what == "foot"
     mounting = (tool.sensor_angle, tool.sensor_sign) if is_foot else None
-    found = SensorGuide(console_loop).run(args.poses, mounting, is_forced=args.force)
-    write_new_text(out, sensor_to_toml(found))
-    section = f"feet.{found.foot}" if is_foot else "ft_sensor"
+    result = SensorGuide(console_loop).run(args.poses, mounting, is_forced=args.force)
+    write_new_text(out, sensor_to_toml(result))
+    section = f"feet.{result.foot}" if is_foot else "ft_sensor"
     _say_use(
         console_loop, out, f'calibration = "{out.name}" in [{section}]', "rig.toml"
     )
@@ -111,14 +111,14 @@ def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
     rig = console_loop.rig
     fit, points = TerrainGuide(console_loop).run(is_forced=args.force)
-    facts = {
+    fields = {
         "simulated": str(rig.is_simulated).lower(),
         "measured_utc": iso_utc(rig.clock.utc_ns()),
         "residual": f"{fit.residual:.6f}",
         "roll": f"{fit.roll:.6f}",
         "points": str([point.tolist() for point in points]),
     }
-    write_new_text(out, terrain_to_toml(rig.row.name, fit.frame, facts))
+    write_new_text(out, terrain_to_toml(rig.row.name, fit.frame, fields))
     line = f'calibration = "{out.name}" in the row of {rig.row.name}'
     _say_use(console_loop, out, line, "matrix.toml")
 

@@ -59,13 +59,13 @@ def run(args: argparse.Namespace) -> int:
     results: list[dict[str, object]] = []
     for series in _series(args):
         trial = prepare_trial(series, PrepareOptions())
-        found = recognise(trial, database, args.window)
+        result = recognise(trial, database, args.window)
         if args.json:
-            content = None if found is None else asdict(found)
+            content = None if result is None else asdict(result)
             results.append({"trial": series.name, "terrain": series.terrain})
             results[-1]["recognition"] = content
         else:
-            _print(series, found, args.window, console)
+            _print(series, result, args.window, console)
     if args.json:
         console.say(json.dumps(results, indent=1))
     return 0
@@ -77,26 +77,26 @@ def _series(args: argparse.Namespace) -> list[TractionSeries]:
 
     recorded = [path for path in args.files if path.suffix == ".mcap"]
     tables = [path for path in args.files if path.suffix != ".mcap"]
-    found = [load_trial(path).series() for path in recorded]
+    result = [load_trial(path).series() for path in recorded]
     if tables:
         columns = parse_columns(args.columns) if args.columns else None
         by_terrain = load_tables(tables, columns, args.terrain)
-        found += [series for group in by_terrain.values() for series in group]
-    return found
+        result += [series for group in by_terrain.values() for series in group]
+    return result
 
 
 def _print(
-    series: TractionSeries, found: Recognition | None, window: int, console: Console
+    series: TractionSeries, result: Recognition | None, window: int, console: Console
 ) -> None:
     seconds = window / _PER_SECOND
-    if found is None:
+    if result is None:
         console.say(f"{series.name}: under {seconds:g} s of motion; no answer.")
         return
     console.say(f"{series.name} ({series.terrain}), {seconds:g} s windows")
     rows = [
         [f"{moment.t:.1f} s", *(f"{p:.2f}" for p in moment.posterior), moment.best]
-        for moment in found.moments
+        for moment in result.moments
     ]
-    rows.append(["whole", *(f"{p:.2f}" for p in found.posterior), found.best])
-    console.table(["", *found.terrains, "answer"], rows)
-    console.say(f"smallest error: {found.least_error}")
+    rows.append(["whole", *(f"{p:.2f}" for p in result.posterior), result.best])
+    console.table(["", *result.terrains, "answer"], rows)
+    console.say(f"smallest error: {result.least_error}")

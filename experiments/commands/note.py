@@ -30,6 +30,6 @@ def run(args: argparse.Namespace) -> int:
     words: list[str] = args.words
     trial = words[0] if len(words) > 1 and looks_like_trial(words[0]) else ""
     text = " ".join(words[1:] if trial else words)
-    said = add_note(folder, trial, text, args.operator)
-    Console(color=not args.no_color).say(said)
+    text = add_note(folder, trial, text, args.operator)
+    Console(color=not args.no_color).say(text)
     return 0

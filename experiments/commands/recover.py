@@ -62,7 +62,7 @@ def find_sources(names: list[str]) -> list[Path]:
     """
     from acquisition import SettingsError
 
-    found: dict[Path, None] = {}
+    paths: dict[Path, None] = {}
     for name in names:
         path = Path(name)
         if path.is_dir():
@@ -76,8 +76,8 @@ def find_sources(names: list[str]) -> list[Path]:
                     f"There is no file {name}.",
                     hint="Name a .partial file or a session folder. Nothing was done.",
                 )
-        found |= dict.fromkeys(matches)
-    return list(found)
+        paths |= dict.fromkeys(matches)
+    return list(paths)
 
 
 def _matching(pattern: Path) -> list[Path]:

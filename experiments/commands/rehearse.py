@@ -71,13 +71,13 @@ def run(args: argparse.Namespace) -> int:
         f"trials · seed {plan.seed} · {folder}"
     )
     record_study(plan, folder, console.say)
-    found = analyse(plan, folder)
-    write_text(folder / "bands.json", json.dumps(as_plain(plan, found), indent=1))
-    return _print(plan, found, folder, console)
+    results = analyse(plan, folder)
+    write_text(folder / "bands.json", json.dumps(as_plain(plan, results), indent=1))
+    return _print(plan, results, folder, console)
 
 
 def _print(
-    plan: AcceptancePlan, found: Sequence[BandResult], folder: Path, console: Console
+    plan: AcceptancePlan, results: Sequence[BandResult], folder: Path, console: Console
 ) -> int:
     from experiments.operator import BAD, GOOD
 
@@ -88,11 +88,11 @@ def _print(
             finding.text,
             f"{finding.band.least:g} .. {finding.band.most:g}",
         ]
-        for finding in found
+        for finding in results
     ]
     console.table(["", "measure", "value", "band"], rows)
-    failed = [finding.band.id for finding in found if not finding.is_met]
-    met = f"{len(found) - len(failed)} of {len(found)} bands met"
+    failed = [finding.band.id for finding in results if not finding.is_met]
+    met = f"{len(results) - len(failed)} of {len(results)} bands met"
     console.say(f"{met}. {folder / 'bands.json'}")
     if not failed:
         return 0

@@ -99,8 +99,8 @@ def _show_log(args: argparse.Namespace) -> int:
     def tell(spoken: list[DecodedLine]) -> None:
         if args.summary:
             return
-        for said in spoken:
-            console.say(f"{(said.utc_ns - (start_ns or 0)) / 1e9:12.6f}  {said.text}")
+        for line in spoken:
+            console.say(f"{(line.utc_ns - (start_ns or 0)) / 1e9:12.6f}  {line.text}")
 
     try:
         with args.can.open(encoding="ascii", errors="replace") as file:

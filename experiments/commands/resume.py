@@ -48,12 +48,12 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
         owner_of,
     )
 
-    found = [
+    sessions = [
         session
         for session in find_unfinished(data)
         if session.folder.is_simulated or not is_fake
     ]
-    if not found:
+    if not sessions:
         for folder in list_sessions(data):
             is_meant = folder.is_simulated or not is_fake
             if is_meant and owner_of(folder) is not None:
@@ -62,10 +62,10 @@ def _only_one(data: Path, *, is_fake: bool) -> "SessionFolder":
             f"There is no unfinished session in {data / 'sessions'}.",
             hint="Start one: traction run TERRAIN",
         )
-    if len(found) > 1:
+    if len(sessions) > 1:
         raise SessionError(
-            f"{len(found)} sessions are unfinished: "
-            + " ".join(session.text() for session in found),
-            hint=f"Name one, e.g. traction resume {found[-1].folder.id}",
+            f"{len(sessions)} sessions are unfinished: "
+            + " ".join(session.text() for session in sessions),
+            hint=f"Name one, e.g. traction resume {sessions[-1].folder.id}",
         )
-    return found[0].folder
+    return sessions[0].folder

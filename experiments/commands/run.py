@@ -96,19 +96,19 @@ def _make_room(request: SessionRequest, *, is_new: bool) -> UnfinishedSession | 
     from experiments.session import find_unfinished
 
     is_fake, terrain = request.fake is not None, request.row.name
-    found = [
+    sessions = [
         session
         for session in find_unfinished(request.data)
         if session.folder.is_simulated is is_fake
     ]
-    while found:
+    while sessions:
         choice = ResumeChoice.CLOSE
         if not is_new:
             data = data_option(request.data)
             choice = choose_resume(
-                found, terrain, data, request.operator, request.console
+                sessions, terrain, data, request.operator, request.console
             )
-        newest = found.pop()
+        newest = sessions.pop()
         if choice is ResumeChoice.RESUME:
             return newest
         close(newest.folder, f"closed to start {terrain}", request.console)

@@ -25,8 +25,8 @@ def run(args: argparse.Namespace) -> int:
 
     folder = find_session(args.data, args.session)
     reason = " ".join(args.reason)
-    said = change_verdict(folder, args.trial, args.verdict, reason, args.operator)
+    lines = change_verdict(folder, args.trial, args.verdict, reason, args.operator)
     console = Console(color=not args.no_color)
-    for line in said:
+    for line in lines:
         console.say(line)
     return 0

@@ -37,8 +37,8 @@ class DoubleTap:
         Samples that were seen before are passed over.
         """
         rows = zip(t.tolist(), F_n.tolist(), v_t.tolist(), strict=True)
-        found = [self._step(*row) for row in rows if row[0] > self._last]
-        return any(found)
+        taps = [self._step(*row) for row in rows if row[0] > self._last]
+        return any(taps)
 
     def forget(self) -> None:
         """Begin anew."""

@@ -106,9 +106,9 @@ class TerminalInput:
         """
         self._receive(state.prompt)
         while self._waiting:
-            found = self._take(self._next().lower(), state.prompt)
-            if found:
-                return found
+            pressed = self._take(self._next().lower(), state.prompt)
+            if pressed:
+                return pressed
         return "q" if self._is_end else ""
 
     def line(self, state: PromptState) -> str | None:
@@ -121,8 +121,8 @@ class TerminalInput:
         while self._waiting:
             key = self._next()
             if key in "\r\n":
-                found, self.draft = self.draft, ""
-                return found
+                pressed, self.draft = self.draft, ""
+                return pressed
             if key == _ESCAPE and not self._skip_sequence():
                 self.draft = ""
                 return ""

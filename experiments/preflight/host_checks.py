@@ -36,28 +36,28 @@ class CheckResult:
 
 def check_governor(cpus: Path = CPUS) -> CheckResult:
     """Grade how the processors' clocks are governed."""
-    found: set[str] = set()
+    governors: set[str] = set()
     for path in cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"):
         try:
-            found.add(path.read_text(encoding="ascii", errors="replace").strip())
+            governors.add(path.read_text(encoding="ascii", errors="replace").strip())
         except OSError:
             continue
-    if not found:
+    if not governors:
         return CheckResult(GOOD, "CPU governor", "none on this machine")
-    if found == {FAST}:
+    if governors == {FAST}:
         return CheckResult(GOOD, "CPU governor", FAST)
-    names = ", ".join(sorted(found))
+    names = ", ".join(sorted(governors))
     fix = "cpupower frequency-set -g performance"
     return CheckResult(WARNING, "CPU governor", f"{names}: {fix}")
 
 
-def check_code(facts: dict[str, str]) -> CheckResult:
+def check_code(fields: dict[str, str]) -> CheckResult:
     """Grade the version of the program; `facts` are those of provenance."""
-    commit = facts["commit"][:10]
-    if facts["dirty"] == "true":
-        text = f"{facts['software']} {commit}, changed since: the diff is recorded"
+    commit = fields["commit"][:10]
+    if fields["dirty"] == "true":
+        text = f"{fields['software']} {commit}, changed since: the diff is recorded"
         return CheckResult(WARNING, "code", text)
-    return CheckResult(GOOD, "code", f"{facts['software']} {commit}")
+    return CheckResult(GOOD, "code", f"{fields['software']} {commit}")
 
 
 def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult:
@@ -85,30 +85,30 @@ def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult
     return CheckResult(GOOD if is_fine else WARNING, name, text)
 
 
-def reach_words(facts: Mapping[str, str], lever: float) -> str:
+def reach_words(fields: Mapping[str, str], lever: float) -> str:
     """Return the largest traction that a sensor with these facts can measure.
 
     Args:
-        facts: what it says about itself; "ranges" has six numbers [N, N m].
+        fields: what it says about itself; "ranges" has six numbers [N, N m].
         lever: how far below its origin the sole is [m].
     """
-    fx, fy, fz, tx, ty, tz = map(float, facts["ranges"].split())
+    fx, fy, fz, tx, ty, tz = map(float, fields["ranges"].split())
     most = largest_traction((fx, fy, fz, tx, ty, tz), lever)
     return f"F_t up to {most:.0f} N"
 
 
-def check_stream(facts: Mapping[str, str]) -> CheckResult | None:
+def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
     """Grade a serial stream by what became of it; None for a sensor on the bus."""
     name = "F/T stream"
-    if "frames" not in facts and "trouble" not in facts:
+    if "frames" not in fields and "trouble" not in fields:
         return None
-    if facts.get("trouble"):
-        return CheckResult(BAD, name, facts["trouble"])
-    text = f"{facts['lost']} of {int(facts['frames']) + int(facts['lost'])} lost"
-    text += f", {facts['bad_checks']} damaged"
-    bursts, reads = int(facts["bursts"]), int(facts["reads"])
+    if fields.get("trouble"):
+        return CheckResult(BAD, name, fields["trouble"])
+    text = f"{fields['lost']} of {int(fields['frames']) + int(fields['lost'])} lost"
+    text += f", {fields['bad_checks']} damaged"
+    bursts, reads = int(fields["bursts"]), int(fields["reads"])
     is_bursty = bursts > BURSTY * reads
     if is_bursty:
         text += ", comes in bursts: latency timer of the adapter to 1 ms"
-    is_fine = not is_bursty and facts["lost"] == facts["bad_checks"] == "0"
+    is_fine = not is_bursty and fields["lost"] == fields["bad_checks"] == "0"
     return CheckResult(GOOD if is_fine else WARNING, name, text)

@@ -142,13 +142,13 @@ def _check_arm(rig: Rig, add: Add) -> None:
 
 def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
     try:
-        facts = rig.backend.open_sensor()
+        fields = rig.backend.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
         raise _as_preflight(error, "idle") from error
-    name = f"{facts['model']}, {facts['measured_rate']}"
-    add(GOOD, "F/T sensor", f"{name}, {reach_words(facts, _lever(rig))}")
-    return facts
+    name = f"{fields['model']}, {fields['measured_rate']}"
+    add(GOOD, "F/T sensor", f"{name}, {reach_words(fields, _lever(rig))}")
+    return fields
 
 
 def _lever(rig: Rig) -> float:
@@ -160,13 +160,13 @@ def _lever(rig: Rig) -> float:
 
 def _check_stream(rig: Rig, add_result: Callable[[CheckResult], None]) -> None:
     """Grade what became of the sensor's stream while the loop was tested."""
-    facts = rig.backend.sensor_facts()
-    result = check_stream(facts)
+    fields = rig.backend.sensor_metadata()
+    result = check_stream(fields)
     if result is None:
         return
     add_result(result)
     if result.mark == BAD:
-        raise preflight_error("ft-lost", why=facts["trouble"].rstrip("."))
+        raise preflight_error("ft-lost", why=fields["trouble"].rstrip("."))
 
 
 def start_devices(rig: Rig) -> None:
@@ -199,23 +199,23 @@ def _check_exchange(rig: Rig, add: Add) -> None:
 
 def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
     """Say what the kernel refused to each process; return it for the recording."""
-    facts: dict[str, str] = {}
+    fields: dict[str, str] = {}
     refused: list[str] = []
     for process, grants in rig.backend.grants().items():
         words = [
             grant.what if grant.is_granted else f"no {grant.what} ({grant.reason})"
             for grant in grants
         ]
-        facts[f"scheduler:{process}"] = ", ".join(words) or "ordinary"
+        fields[f"scheduler:{process}"] = ", ".join(words) or "ordinary"
         refused += [
             f"{process}: {w}"
             for w, g in zip(words, grants, strict=True)
             if not g.is_granted
         ]
-    if facts:
+    if fields:
         text = "; ".join(refused) or "real-time scheduling, memory locked"
         add(WARNING if refused else GOOD, "scheduler", text)
-    return facts
+    return fields
 
 
 def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
@@ -262,8 +262,8 @@ def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
     can = settings.can
     if not is_bus or can.interface != "socketcan":
         return _as_preflight(error, "not touched")
-    facts = {"channel": can.channel, "bitrate": can.bitrate}
-    return preflight_error("can-down", detail=error.message, **facts)
+    fields = {"channel": can.channel, "bitrate": can.bitrate}
+    return preflight_error("can-down", detail=error.message, **fields)
 
 
 def _as_preflight(error: TractionError, arm_state: str) -> PreflightError:

@@ -130,8 +130,8 @@ def _open_safely(path: Path) -> int:
         descriptor = _open_or_make(path)
     except OSError as error:
         raise _unusable(path, error.strerror or str(error)) from error
-    facts = os.fstat(descriptor)
-    if not stat.S_ISREG(facts.st_mode) or facts.st_nlink != 1:
+    fields = os.fstat(descriptor)
+    if not stat.S_ISREG(fields.st_mode) or fields.st_nlink != 1:
         os.close(descriptor)
         raise _unusable(path, "it is not a plain file")
     return descriptor
@@ -158,14 +158,14 @@ def _write_owner(descriptor: int) -> None:
     """Say who has the arm; another user's file may not let us, and is locked anyway."""
     now = datetime.fromtimestamp(SystemClock().utc_ns() // NS_PER_S, UTC)
     command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])
-    facts = {
+    fields = {
         "pid": os.getpid(),
         "command": command[:_LONGEST_COMMAND],
         "since": f"{now:%Y-%m-%d %H:%M:%S} UTC",
     }
     try:
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, json.dumps(facts).encode(), 0)
+        os.pwrite(descriptor, json.dumps(fields).encode(), 0)
     except OSError:
         return
 
@@ -173,15 +173,15 @@ def _write_owner(descriptor: int) -> None:
 def _read_owner(descriptor: int) -> ArmOwner:
     """Return what the owner has written, without anything that is not printable."""
     try:
-        facts: object = json.loads(os.pread(descriptor, _MOST_BYTES, 0))
+        fields: object = json.loads(os.pread(descriptor, _MOST_BYTES, 0))
     except (OSError, ValueError, RecursionError):
         return ArmOwner()
-    if not isinstance(facts, dict):
+    if not isinstance(fields, dict):
         return ArmOwner()
-    said = cast("dict[str, object]", facts)
+    holder = cast("dict[str, object]", fields)
     names = {"pid", "command", "since"}
     return ArmOwner(
-        **{name: _printable(str(said[name])) for name in names & said.keys()}
+        **{name: _printable(str(holder[name])) for name in names & holder.keys()}
     )
 
 

@@ -50,7 +50,7 @@ class RigBackend(Protocol):
         """Open the wrist sensor; return what it says about itself."""
         ...
 
-    def sensor_facts(self) -> dict[str, str]:
+    def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text."""
         ...
 

@@ -24,7 +24,7 @@ from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
 from ft_sensor.vendors import BarrettSensor
 from wam.bus import CanBus, CanLink, FrameTap
 from wam.control import FootController, LockGains, SoftWalls, Walls
-from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_facts
+from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
 from wam.model import ArmConstants, ArmModel, Body, Tool, sensor_body
 
 
@@ -170,11 +170,11 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
         if not is_shared:  # those of a shared sensor are on the board already
             publish(samples, shared.wrenches)
 
-    def facts() -> dict[str, str]:
+    def metadata() -> dict[str, str]:
         arm = parts.arm
         return {
-            **health_facts(arm.health(), parts.clock.now_ns()),
-            **arm.counters.facts(),
+            **health_metadata(arm.health(), parts.clock.now_ns()),
+            **arm.counters.metadata(),
             "link": arm.counters.text(),
         }
 
@@ -195,5 +195,5 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             extra_flags=Flag.SIMULATED if parts.is_simulated else 0,
         ),
     )
-    around = LoopHooks(parts.clock.now_ns, facts, parts.ring)
+    around = LoopHooks(parts.clock.now_ns, metadata, parts.ring)
     return LoopServer(cycle, parts.arm, shared, around)

@@ -27,7 +27,7 @@ from experiments.rig.inline import InProcessBackend
 from experiments.settings import RigSettings, Settings, TerrainRow
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
-from wam.model import ArmModel, tool_facts, tool_of
+from wam.model import ArmModel, tool_metadata, tool_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +53,7 @@ class SimulatedRig:
     friction: float
     pace: str
 
-    def facts(self) -> dict[str, Any]:
+    def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
         frame = terrain_frame(self.row)
         scene = {
@@ -68,17 +68,17 @@ class SimulatedRig:
             },
             "start_q": list(self.row.start_q),
             "seed": self.seed,
-            "sensor": sensor_facts(self.rig.ft_sensor),
+            "sensor": sensor_metadata(self.rig.ft_sensor),
         }
         return {
             "scene": scene,
-            "tool": tool_facts(build_tool(self.rig, self.row.foot)),
+            "tool": tool_metadata(build_tool(self.rig, self.row.foot)),
             "friction": self.friction,
             "pace": self.pace,
         }
 
 
-def sensor_facts(section: AnySensor) -> dict[str, Any]:
+def sensor_metadata(section: AnySensor) -> dict[str, Any]:
     """Return which simulated sensor fits the settings, in plain values."""
     options = {"kind", "sinc", "baudrate", "sensitivity", "serial_number"}
     return section.model_dump(include=options)
@@ -100,14 +100,14 @@ def stepped(
     from fakes.serving import scene_of
     from fakes.world import FakeRig, LocalSimulation
 
-    clock, facts = SteppedClock(), world.facts()
+    clock, fields = SteppedClock(), world.metadata()
     model, law_model = models
     simulation = FakeRig(
-        scene_of(facts["scene"]),
+        scene_of(fields["scene"]),
         model.constants,
-        tool_of(facts["tool"]),
+        tool_of(fields["tool"]),
         clock,
-        options=PlantOptions(friction=facts["friction"]),
+        options=PlantOptions(friction=fields["friction"]),
     )
     clock.attach(simulation)
     link = build_link(simulation.bus, shared, clock)
@@ -132,7 +132,7 @@ def stepped(
         )
 
     backend = InProcessBackend(shared, clock, (arm, link), sensor, parts)
-    return clock, backend, LocalSimulation(simulation, PACES[facts["pace"]])
+    return clock, backend, LocalSimulation(simulation, PACES[fields["pace"]])
 
 
 def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSensor:
@@ -147,10 +147,10 @@ def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
     from fakes.serving import SensorLine
 
     section = settings.rig.ft_sensor
-    facts: dict[str, Any] = {"kind": kind}
+    fields: dict[str, Any] = {"kind": kind}
     if section.kind == kind:
-        facts = sensor_facts(section)
-    return SensorLine(path, SensorChoice(**facts))
+        fields = sensor_metadata(section)
+    return SensorLine(path, SensorChoice(**fields))
 
 
 def build_sensor_server(settings: Settings, line: tuple[Path, str]) -> SensorServer:
@@ -195,9 +195,9 @@ def build_server(
     port = open_can_port(*bus, settings.rig.can.bitrate)
     tool = build_tool(settings.rig, row.foot)
     served = _sensor_line(settings, *line) if line is not None else None
-    found = HomePose(tool, terrain_frame(row), served, is_idle)
+    home = HomePose(tool, terrain_frame(row), served, is_idle)
     try:
-        return build_home_server(port, found, SystemClock())
+        return build_home_server(port, home, SystemClock())
     except SettingsError:
         port.close()
         raise

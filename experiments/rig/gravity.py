@@ -52,33 +52,33 @@ def build_law_model(
         return ArmModel(constants, tool)
     if rig.gravity.model == "shipped":
         return gravity_model(constants, tool, constants.mus)
-    found = gravity_from_toml(gravity_text, rig.gravity.file)
+    stored = gravity_from_toml(gravity_text, rig.gravity.file)
     check_kind(
         rig.gravity.file,
-        is_of_simulation=found.is_simulated,
+        is_of_simulation=stored.is_simulated,
         is_simulated=is_simulated,
         instead=_INSTEAD,
     )
-    _check_tool(rig, found)
-    return gravity_model(constants, tool, found.mus, found.tool)
+    _check_tool(rig, stored)
+    return gravity_model(constants, tool, stored.mus, stored.tool)
 
 
 def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
     """Return the choice in words, for a session with `foot`."""
     if rig.gravity.model != "calibrated":
         return rig.gravity.model
-    found = gravity_from_toml(gravity_text, rig.gravity.file)
-    moved = "" if found.foot == foot else f", corrected from {found.foot} to {foot}"
-    return f"calibrated {found.measured_utc}, rms {found.residual:.2f} N m{moved}"
+    stored = gravity_from_toml(gravity_text, rig.gravity.file)
+    moved = "" if stored.foot == foot else f", corrected from {stored.foot} to {foot}"
+    return f"calibrated {stored.measured_utc}, rms {stored.residual:.2f} N m{moved}"
 
 
-def _check_tool(rig: RigSettings, found: GravityCalibration) -> None:
-    is_known = found.foot in type(rig.feet).model_fields
-    if is_known and fits_tool(found, build_tool(rig, found.foot)):
+def _check_tool(rig: RigSettings, stored: GravityCalibration) -> None:
+    is_known = stored.foot in type(rig.feet).model_fields
+    if is_known and fits_tool(stored, build_tool(rig, stored.foot)):
         return
-    sensor, body = found.tool.sensor, found.tool.foot
+    sensor, body = stored.tool.sensor, stored.tool.foot
     raise SettingsError(
-        f"{rig.gravity.file} was measured with another tool: foot {found.foot} of "
+        f"{rig.gravity.file} was measured with another tool: foot {stored.foot} of "
         f"{body.mass:.3f} kg at {body.com.tolist()}, sensor of {sensor.mass:.3f} kg; "
         "rig.toml says otherwise.",
         hint="Run traction calibrate gravity again, or set [gravity] model = "

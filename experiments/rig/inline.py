@@ -81,9 +81,9 @@ class InProcessBackend:
         self._sensor = self._open_sensor()
         return self._sensor.describe()
 
-    def sensor_facts(self) -> dict[str, str]:
+    def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text."""
-        return self._sensor.stream_facts() if self._sensor is not None else {}
+        return self._sensor.stream_metadata() if self._sensor is not None else {}
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""

@@ -128,12 +128,12 @@ class MultiProcessBackend:
         """Open the wrist sensor; return what it says about itself."""
         return (self._sensor or self._arm).open_sensor()
 
-    def sensor_facts(self) -> dict[str, str]:
+    def sensor_metadata(self) -> dict[str, str]:
         """Return what became of the sensor's samples since it was opened, as text.
 
         Nothing for a sensor on the arm's bus, whose process has a loop to run.
         """
-        return self._sensor.sensor_facts() if self._sensor is not None else {}
+        return self._sensor.sensor_metadata() if self._sensor is not None else {}
 
     def define_position(self, q: Sequence[float]) -> None:
         """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""

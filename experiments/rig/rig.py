@@ -107,9 +107,9 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         models = model, law_model
         clock, backend, simulation = stepped(world, settings, row, models, shared)
     else:
-        facts = world.facts() if world is not None else None
+        fields = world.metadata() if world is not None else None
         clock = SystemClock()
-        jobs = _jobs(settings, row, gravity_text, facts)
+        jobs = _jobs(settings, row, gravity_text, fields)
         backend = _start_processes(jobs, settings, shared, clock)
         if backend.fake is not None:
             simulation = connect_simulation(backend.fake)

@@ -55,7 +55,7 @@ class SensorService(Protocol):
         """Open the sensor; return its description."""
         ...
 
-    def sensor_facts(self) -> dict[str, str]:
+    def sensor_metadata(self) -> dict[str, str]:
         """Return the statistics of the stream since it was opened, as text."""
         ...
 

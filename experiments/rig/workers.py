@@ -40,7 +40,7 @@ from ft_sensor.serial_line import (
     ReconnectingSensor,
     SerialSensor,
     open_port,
-    stream_facts,
+    stream_metadata,
 )
 from wam.bus import CanLink, open_bus
 from wam.driver import ArmInfo, WamArm
@@ -244,9 +244,9 @@ class SensorWorker:
 
     def open_sensor(self) -> dict[str, str]:
         """Open the sensor; return its description."""
-        facts = self._reconnecting.open()
+        fields = self._reconnecting.open()
         self._is_open = True
-        return facts
+        return fields
 
     def _connect(self) -> SerialSensor:
         settings = self._context.settings
@@ -255,9 +255,9 @@ class SensorWorker:
         is_simulated = bool(settings["is_simulated"])
         return build_sensor(rig, port, self._clock, is_simulated=is_simulated)
 
-    def sensor_facts(self) -> dict[str, str]:
+    def sensor_metadata(self) -> dict[str, str]:
         """Return the statistics of the stream, as text."""
-        return stream_facts(self._reconnecting)
+        return stream_metadata(self._reconnecting)
 
     def grants(self) -> list[Grant]:
         """Return what the kernel granted."""

@@ -108,8 +108,8 @@ def _record(
     path = context.metadata.folder.trials / f"{name.kept}.mcap"
     recorder, console_loop = context.rig.backend.recorder, context.console_loop
     _set_aside(context, name.number)
-    facts = {"trial": name.number, "attempt": name.attempt}
-    context.append(Event.TRIAL_STARTED, **facts)
+    details = {"trial": name.number, "attempt": name.attempt}
+    context.append(Event.TRIAL_STARTED, **details)
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
     context.loop_client.watch_trial(is_recording=True)
@@ -134,7 +134,7 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
     rig, console_loop = context.rig, context.console_loop
     start = rig.clock.now_ns()
     watch, pace = EndDetector(rig.frame.travel), PaceMonitor()
-    said = 0.0
+    reported_at = 0.0
     while True:
         outcome.seconds = (rig.clock.now_ns() - start) * 1e-9
         context.fault_context = FaultContext(name.kept, outcome.seconds)
@@ -148,8 +148,11 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
             return
         if pace.is_too_fast(outcome.seconds, outcome.displacement):
             context.feedback.give(FeedbackSignal.TOO_FAST)
-        if not context.console.is_live and outcome.seconds >= said + LIVE_SECONDS:
-            said = outcome.seconds
+        if (
+            not context.console.is_live
+            and outcome.seconds >= reported_at + LIVE_SECONDS
+        ):
+            reported_at = outcome.seconds
             v_t, F_t, F_n = record["traction"].tolist()
             where = (outcome.seconds, outcome.displacement, rig.frame.travel)
             late = context.loop_client.late_cycles
@@ -163,7 +166,7 @@ def _end(
     archive, recorder = context.archive, context.rig.backend.recorder
     context.loop_client.watch_trial(is_recording=False)
     context.loop_client.advance(TICK)  # what the devices said until now is written down
-    recorder.event(20, "link", context.loop_client.device_facts().get("link", ""))
+    recorder.event(20, "link", context.loop_client.device_metadata().get("link", ""))
     recorder.event(20, "stop", outcome.reason)
     try:
         verified = context.console_loop.run_aside(
@@ -172,8 +175,8 @@ def _end(
     except TrialFileError as error:
         raise _lost("write-failed", context, name, error) from error
     archive.write_sidecar(name, verified, outcome)
-    facts = {"trial": name.number, "attempt": name.attempt}
-    context.append(Event.TRIAL_RECORDED, **facts)
+    details = {"trial": name.number, "attempt": name.attempt}
+    context.append(Event.TRIAL_RECORDED, **details)
     written = (
         f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · {verified.cycles} "
         "samples · written and verified"
@@ -198,15 +201,15 @@ def _lost(
     """Let the arm hold and return what is said of a trial the disk did not take."""
     context.loop_client.request(ArmState.HOLD)
     seconds = context.fault_context.seconds
-    facts = {
+    details = {
         "trial": name.kept,
         "when": "" if seconds is None else f" at {seconds:.2f} s",
         "detail": error.reason,
         "path": context.metadata.folder.trials / f"{name.kept}.mcap.partial",
     }
-    found = CATALOGUE[message]
+    entry = CATALOGUE[message]
     return TrialLostError(
-        found.what.format_map(facts),
-        hint=found.do.format_map(facts),
-        arm_state=found.arm,
+        entry.what.format_map(details),
+        hint=entry.do.format_map(details),
+        arm_state=entry.arm,
     )

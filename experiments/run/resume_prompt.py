@@ -59,7 +59,7 @@ def choose_resume(
         )
     name = "crash" if newest.is_crashed else "unfinished"
     name = "mismatch" if newest.folder.terrain != terrain else name
-    details = {**newest.facts(), "asked": terrain}
+    details = {**newest.metadata(), "asked": terrain}
     console.say(f"{WARNING} {text} {CATALOGUE[name].do.format_map(details)}  [q]uit")
     action = wait_for_key(operator, Prompt.CHOICE)
     if action is KeyAction.QUIT:
@@ -71,6 +71,6 @@ def _question(newest: UnfinishedSession, terrain: str) -> str:
     """Return which session is unfinished, with the terrains where they differ."""
     if newest.folder.terrain == terrain:
         return newest.text()
-    details = {**newest.facts(), "asked": terrain}
+    details = {**newest.metadata(), "asked": terrain}
     mismatch = CATALOGUE["mismatch"].what.format_map(details)
     return f"{newest.text()} {mismatch}" if newest.is_crashed else mismatch

@@ -85,9 +85,9 @@ def known_bias(
     for name, text in calibrations.items():
         if not name.startswith(_CALIBRATION) or "readings" not in text:
             continue  # of a container
-        found = sensor_from_toml(text, name.removeprefix(_CALIBRATION))
-        if found.foot == foot:
-            return found.fit.bias
+        stored = sensor_from_toml(text, name.removeprefix(_CALIBRATION))
+        if stored.foot == foot:
+            return stored.fit.bias
     return np.zeros(6) if is_simulated else None
 
 
@@ -109,8 +109,8 @@ def _measure(context: RunContext, name: TrialName) -> TareResult:
     except TareError as error:
         if error.spread is None:
             raise preflight_error("tare-poor", detail=error.message) from error
-        facts = {"spread": error.spread, "limit": limit}
-        raise preflight_error("tare-moved", **facts) from error
+        fields = {"spread": error.spread, "limit": limit}
+        raise preflight_error("tare-moved", **fields) from error
 
 
 def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
@@ -141,8 +141,8 @@ def _check_residual(rig: Rig, tared: Payload) -> None:
     limit = rig.settings.rig.limits.residual
     residual = residual_force(tared, known) if known is not None else 0.0
     if residual > limit:
-        facts = {"foot": rig.row.foot, "mass": rig.payload.mass}
-        raise preflight_error("residual", residual=residual, limit=limit, **facts)
+        fields = {"foot": rig.row.foot, "mass": rig.payload.mass}
+        raise preflight_error("residual", residual=residual, limit=limit, **fields)
 
 
 def _wait_still(context: RunContext, name: TrialName) -> None:

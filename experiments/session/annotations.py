@@ -104,26 +104,29 @@ def change_verdict(
     with session_lock(folder):
         journal = _journal(folder)
         name = _find_attempt(journal, trial)
-        facts: dict[str, object] = {
+        fields: dict[str, object] = {
             "trial": name.number,
             "attempt": name.attempt,
             "verdict": verdict,
             "reason": reason,
             "who": who,
         }
-        refused = refusal(journal.state, {"event": Event.VERDICT, **facts})
+        refused = refusal(journal.state, {"event": Event.VERDICT, **fields})
         if refused:
             raise SessionError(
                 f"{trial} of {folder.id} cannot get this verdict: {refused}.",
                 hint="Nothing was changed.",
             )
-        said = _check_file(journal, name) if verdict == KEEP else []
-        journal.append(Event.VERDICT, **facts)
+        remarks = _check_file(journal, name) if verdict == KEEP else []
+        journal.append(Event.VERDICT, **fields)
         place = f"trials/{name.kept}"
         if verdict != KEEP:
             place = f"rejected/{name.rejected}"
         kept, wanted = len(journal.state.kept), journal.state.wanted
-        return [*said, f"{place}: {verdict}. {folder.id} has {kept} of {wanted} kept."]
+        return [
+            *remarks,
+            f"{place}: {verdict}. {folder.id} has {kept} of {wanted} kept.",
+        ]
 
 
 def trial_path(folder: SessionFolder, trial: str) -> Path:

@@ -75,10 +75,10 @@ def _gather(folder: SessionFolder, name: TrialName) -> None:
 def _recover(partial: Path, path: Path) -> None:
     """Save what is sound of `partial` as `path`; nothing where nothing is."""
     try:
-        found = recover_file(partial).path
+        recovered = recover_file(partial).path
     except TrialFileError:
         return
-    move_file(found, path)
+    move_file(recovered, path)
     path.chmod(0o444)
 
 

@@ -177,8 +177,8 @@ def parse_line(line: bytes) -> dict[str, Any] | None:
     event = parse_object(line)
     if event is None or _CRC not in event:
         return event
-    found = _CHECKED.match(line.strip())
-    if found is None or zlib.crc32(found["body"] + b"}") != int(found[_CRC], 16):
+    checked = _CHECKED.match(line.strip())
+    if checked is None or zlib.crc32(checked["body"] + b"}") != int(checked[_CRC], 16):
         return None
     del event[_CRC]
     return event

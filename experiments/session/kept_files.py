@@ -70,23 +70,23 @@ def _compare(
     """
     events = folder.events()
     kept = [TrialName(*pair) for pair in sorted(replay(events).kept_attempts)]
-    found = [
+    faults = [
         ("events.jsonl", f"has a wrong checksum in line {number}")
         for number in damaged_lines(folder.journal_text())
     ]
     for name in kept:
         try:
-            found += _check_trial(folder, name, recorded_facts(events, name), digest)
+            faults += _check_trial(folder, name, recorded_facts(events, name), digest)
         except TrialFileError as error:
-            found.append((_below(folder, error), error.reason))
+            faults.append((_below(folder, error), error.reason))
     judged = {d.name for d in map(decision_of, events) if d is not None}
     for path in sorted(folder.trials.glob("T??.json")):
-        facts = read_json(path)
-        stem, attempt = path.stem, facts.get("attempt")
+        fields = read_json(path)
+        stem, attempt = path.stem, fields.get("attempt")
         is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
-        if events and facts.get("verdict") == KEEP and not is_judged:
-            found.append((f"trials/{path.name}", "is kept, the journal knows nothing"))
-    return found
+        if events and fields.get("verdict") == KEEP and not is_judged:
+            faults.append((f"trials/{path.name}", "is kept, the journal knows nothing"))
+    return faults
 
 
 def _below(folder: SessionFolder, error: TrialFileError) -> str:
@@ -131,12 +131,12 @@ def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
 
 def recorded_facts(events: Sequence[_Facts], name: TrialName) -> _Facts:
     """Return the event that kept the attempt last."""
-    facts: _Facts = {}
+    fields: _Facts = {}
     for event in events:
         decision = decision_of(event)
         if decision is not None and decision.name == name and decision.verdict == KEEP:
-            facts = event
-    return facts
+            fields = event
+    return fields
 
 
 def _check_trial(
@@ -150,18 +150,18 @@ def _check_trial(
     path = folder.trials / f"{name.kept}.mcap"
     if not is_there(path) and is_there(folder.rejected / f"{name.rejected}.json"):
         path = folder.rejected / f"{name.rejected}.mcap"  # follows at the next opening
-    stated, found = sidecar.get("sha256"), list[tuple[str, str]]()
+    stated, faults = sidecar.get("sha256"), list[tuple[str, str]]()
     wanted = event.get("sha256", stated)
     if not sidecar:
-        found.append((f"trials/{name.kept}.json", "is missing or unreadable"))
+        faults.append((f"trials/{name.kept}.json", "is missing or unreadable"))
     elif stated != wanted:
-        found.append((f"trials/{name.kept}.json", "states another checksum"))
+        faults.append((f"trials/{name.kept}.json", "states another checksum"))
     if not is_there(path):
-        found.append((f"trials/{path.name}", "is missing"))
+        faults.append((f"trials/{path.name}", "is missing"))
     elif wanted and digest(path) != wanted:
         size, before = path.stat().st_size, event.get("size", sidecar.get("size"))
-        found.append((f"trials/{path.name}", _changed(size, before)))
-    return found
+        faults.append((f"trials/{path.name}", _changed(size, before)))
+    return faults
 
 
 def _changed(size: int, before: object) -> str:

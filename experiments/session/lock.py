@@ -78,8 +78,12 @@ def locked_error(folder: SessionFolder) -> SessionError:
     """Return the refusal of a session that another process has open."""
     owner = _signature(folder.path / LOCK_FILE)
     message = CATALOGUE["locked"]
-    facts = {"session": folder.id, "pid": owner.pid or "?", "since": owner.since or "?"}
-    return SessionError(message.what.format_map(facts), hint=message.do)
+    fields = {
+        "session": folder.id,
+        "pid": owner.pid or "?",
+        "since": owner.since or "?",
+    }
+    return SessionError(message.what.format_map(fields), hint=message.do)
 
 
 def _take(descriptor: int) -> bool:
@@ -105,6 +109,6 @@ def sign(descriptor: int) -> None:
 
 
 def _signature(path: Path) -> LockOwner:
-    facts = read_json(path)
-    pid, since = facts.get("pid"), str(facts.get("since", ""))
+    fields = read_json(path)
+    pid, since = fields.get("pid"), str(fields.get("since", ""))
     return LockOwner(pid if type(pid) is int else 0, since[11:16])

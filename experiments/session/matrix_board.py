@@ -116,8 +116,8 @@ def compare_board(
     sessions = [
         s for s in every if s not in readable or _matches(_of_session(s), where)
     ]
-    found = [d for session in sessions for d in compare_kept(session, digest)]
-    return list(dict.fromkeys(found + [d for s in every for d in _hostile(s)]))
+    conditions = [d for session in sessions for d in compare_kept(session, digest)]
+    return list(dict.fromkeys(conditions + [d for s in every for d in _hostile(s)]))
 
 
 def _hostile(session: SessionFolder) -> list[Deviation]:
@@ -143,7 +143,7 @@ def parse_where(text: str) -> dict[str, str]:
     Raises:
         SettingsError: it is not of that form, or a key is unknown.
     """
-    found: dict[str, str] = {}
+    conditions: dict[str, str] = {}
     for part in filter(None, text.split(",")):
         key, sign, value = part.partition("=")
         if key not in KEYS or not sign or not value:
@@ -151,8 +151,8 @@ def parse_where(text: str) -> dict[str, str]:
                 f"--where {part!r} - expected KEY=VALUE, e.g. kind=live.",
                 hint=f"Keys: {', '.join(KEYS)}.",
             )
-        found[key] = value
-    return found
+        conditions[key] = value
+    return conditions
 
 
 def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> list[str]:
@@ -180,11 +180,11 @@ def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> lis
 
 
 def _of_session(session: SessionFolder) -> dict[str, str]:
-    facts = read_json(session.path / "session.json")
+    fields = read_json(session.path / "session.json")
     return {
         "kind": "simulated" if session.is_simulated else "live",
         "session": session.id,
-        "operator": str(facts.get("operator", "")),
+        "operator": str(fields.get("operator", "")),
     }
 
 
@@ -198,9 +198,9 @@ def _of_row(row: TerrainRow) -> dict[str, str]:
     }
 
 
-def _matches(facts: Mapping[str, str], where: Mapping[str, str]) -> bool:
+def _matches(fields: Mapping[str, str], where: Mapping[str, str]) -> bool:
     """Return whether every fact that is asked for has the value."""
-    return all(facts[key] == value for key, value in where.items() if key in facts)
+    return all(fields[key] == value for key, value in where.items() if key in fields)
 
 
 def _line(

@@ -138,9 +138,9 @@ def _whole(event: _Facts, key: str) -> int:
 
 def _numbers(value: object) -> tuple[float, ...]:
     """Return finite numbers of a list, nothing where there is anything else in it."""
-    found = cast("list[object]", value) if isinstance(value, list) else []
-    numbers = tuple(x for x in found if type(x) is float and isfinite(x))
-    return numbers if len(numbers) == len(found) else ()
+    entries = cast("list[object]", value) if isinstance(value, list) else []
+    numbers = tuple(x for x in entries if type(x) is float and isfinite(x))
+    return numbers if len(numbers) == len(entries) else ()
 
 
 # --- what a phase alone cannot know ------------------------------------------------

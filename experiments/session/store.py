@@ -125,14 +125,14 @@ class SessionFolder:
         for sidecar in sorted(self.trials.glob("T*.json")):
             if not _TRIAL_FILE.match(sidecar.name):
                 continue
-            facts = read_json(sidecar)
+            fields = read_json(sidecar)
             path = sidecar.with_suffix(".mcap")
-            stated, attempt = facts.get("sha256"), facts.get("attempt")
+            stated, attempt = fields.get("sha256"), fields.get("attempt")
             number = int(sidecar.stem[1:3])
             key = (number, attempt if type(attempt) is int else 0)
             is_recorded = recorded.get(key, stated) == stated
             is_sound = is_recorded and is_there(path) and digest(path) == stated
-            if facts.get("verdict") == "keep" and is_sound:
+            if fields.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
 
@@ -150,8 +150,8 @@ def list_sessions(data: Path) -> list[SessionFolder]:
     folder = data / "sessions"
     if not folder.is_dir():
         return []
-    found = [_session_at(path) for path in folder.iterdir() if path.is_dir()]
-    return sorted((s for s in found if s), key=lambda s: (int(s.id[1:]), s.path.name))
+    matches = [_session_at(path) for path in folder.iterdir() if path.is_dir()]
+    return sorted((s for s in matches if s), key=lambda s: (int(s.id[1:]), s.path.name))
 
 
 def find_session(data: Path, name: str) -> SessionFolder:
@@ -163,9 +163,9 @@ def find_session(data: Path, name: str) -> SessionFolder:
     as_path = _session_at(Path(name))
     if as_path is not None and as_path.path.is_dir():
         return as_path
-    found = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
-    if len(found) == 1:
-        return found[0]
+    matches = [s for s in list_sessions(data) if name in {s.id, s.path.name}]
+    if len(matches) == 1:
+        return matches[0]
     known = " ".join(s.id for s in list_sessions(data)) or "none yet"
     raise SessionError(
         f"There is no session {name!r} in {data / 'sessions'}.",

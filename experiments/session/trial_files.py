@@ -55,13 +55,13 @@ def decision_of(event: _Facts) -> Verdict | None:
 
 def last_decisions(events: Iterable[_Facts]) -> list[Verdict]:
     """Return the newest verdict on every attempt, in the order they were given."""
-    found: dict[TrialName, Verdict] = {}
+    newest: dict[TrialName, Verdict] = {}
     for event in events:
         decision = decision_of(event)
         if decision is not None:
-            found.pop(decision.name, None)
-            found[decision.name] = decision
-    return list(found.values())
+            newest.pop(decision.name, None)
+            newest[decision.name] = decision
+    return list(newest.values())
 
 
 def find_sidecar(folder: SessionFolder, name: TrialName) -> dict[str, Any]:
@@ -118,9 +118,9 @@ def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> s
     return path.stem
 
 
-def _list(facts: _Facts, key: str) -> list[object]:
+def _list(fields: _Facts, key: str) -> list[object]:
     """Return the list at `key`, an empty one where there is anything else."""
-    value = facts.get(key)
+    value = fields.get(key)
     return list(cast("list[object]", value)) if isinstance(value, list) else []
 
 

@@ -42,7 +42,7 @@ class UnfinishedSession:
         number = self.state.running
         return "" if number is None else TrialName(number, 1).kept
 
-    def facts(self) -> dict[str, object]:
+    def metadata(self) -> dict[str, object]:
         """Return what messages say about it."""
         where = "between trials"
         if self.running and self.seconds is None:
@@ -62,7 +62,7 @@ class UnfinishedSession:
     def text(self) -> str:
         """Return what there is to say about it, without what to do."""
         name = "crash" if self.is_crashed else "unfinished"
-        return CATALOGUE[name].what.format_map(self.facts())
+        return CATALOGUE[name].what.format_map(self.metadata())
 
 
 def find_unfinished(data: Path) -> list[UnfinishedSession]:
@@ -70,13 +70,13 @@ def find_unfinished(data: Path) -> list[UnfinishedSession]:
 
     Folders that cannot be read are left out: a look at old sessions stops no new one.
     """
-    found: list[UnfinishedSession] = []
+    sessions: list[UnfinishedSession] = []
     with suppress(OSError):
         for folder in list_sessions(data):
             with suppress(OSError, TrialFileError):
                 unfinished = inspect_session(folder)
-                found += [unfinished] if unfinished is not None else []
-    return found
+                sessions += [unfinished] if unfinished is not None else []
+    return sessions
 
 
 def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:

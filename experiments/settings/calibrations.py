@@ -15,8 +15,8 @@ from experiments.settings.rig import RigSettings
 from ft_sensor.calibration import (
     SensorCalibration,
     sensor_from_toml,
-    terrain_facts,
     terrain_from_toml,
+    terrain_metadata,
 )
 
 _LARGEST = 1_000_000  # bytes; a calibration has a few thousand
@@ -99,15 +99,15 @@ class _Reader:
         values = rig.model_dump()
         mount, feet = values["ft_sensor"], values["feet"]
         if rig.ft_sensor.calibration is not None:
-            found = self._sensor(rig.ft_sensor.calibration, "sensor", None)
-            mount["angle_deg"] = float(np.degrees(found.fit.angle))
-            mount["sign"] = int(found.fit.sign)
-            if found.foot in feet:
-                feet[found.foot].update(_body(found, rig.ft_sensor.height))
+            stored = self._sensor(rig.ft_sensor.calibration, "sensor", None)
+            mount["angle_deg"] = float(np.degrees(stored.fit.angle))
+            mount["sign"] = int(stored.fit.sign)
+            if stored.foot in feet:
+                feet[stored.foot].update(_body(stored, rig.ft_sensor.height))
         for name, section in (("tread", rig.feet.tread), ("bare", rig.feet.bare)):
             if section.calibration is not None:
-                found = self._sensor(section.calibration, "foot", name)
-                feet[name].update(_body(found, rig.ft_sensor.height))
+                stored = self._sensor(section.calibration, "foot", name)
+                feet[name].update(_body(stored, rig.ft_sensor.height))
         return _checked(RigSettings, values)
 
     def row(self, row: TerrainRow) -> TerrainRow:
@@ -119,7 +119,7 @@ class _Reader:
         terrain, frame = terrain_from_toml(text)
         if terrain != row.name:
             raise _mismatch(name, f"terrain {terrain}", f"terrain {row.name}")
-        is_of_simulation = terrain_facts(text).get("simulated") == "true"
+        is_of_simulation = terrain_metadata(text).get("simulated") == "true"
         self._check_kind(name, is_of_simulation=is_of_simulation)
         measured = {
             "incline_deg": float(np.degrees(frame.incline)),
@@ -130,11 +130,11 @@ class _Reader:
         return _checked(TerrainRow, {**row.model_dump(), **measured})
 
     def _sensor(self, name: str, what: str, foot: str | None) -> SensorCalibration:
-        found = sensor_from_toml(self._read(name, what), name)
-        self._check_kind(name, is_of_simulation=found.is_simulated)
-        if foot is not None and found.foot != foot:
-            raise _mismatch(name, f"foot {found.foot}", f"foot {foot}")
-        return found
+        stored = sensor_from_toml(self._read(name, what), name)
+        self._check_kind(name, is_of_simulation=stored.is_simulated)
+        if foot is not None and stored.foot != foot:
+            raise _mismatch(name, f"foot {stored.foot}", f"foot {foot}")
+        return stored
 
     def _read(self, name: str, what: str) -> str:
         instead = _INSTEAD.format(name=name)
@@ -151,9 +151,9 @@ class _Reader:
         )
 
 
-def _body(found: SensorCalibration, height: float) -> Mapping[str, object]:
-    com = tuple(found.com_in_frame_7(height).tolist())
-    return {"mass": found.fit.mass, "com": com}
+def _body(stored: SensorCalibration, height: float) -> Mapping[str, object]:
+    com = tuple(stored.com_in_frame_7(height).tolist())
+    return {"mass": stored.fit.mass, "com": com}
 
 
 def _checked(model: type[_M], values: object) -> _M:

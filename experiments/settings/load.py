@@ -219,7 +219,9 @@ def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Locatio
 def _sections_of(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [found for inner in get_args(annotation) for found in _sections_of(inner)]
+    return [
+        section for inner in get_args(annotation) for section in _sections_of(inner)
+    ]
 
 
 def _kind_of(section: type[BaseModel]) -> str:

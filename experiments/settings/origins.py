@@ -15,17 +15,17 @@ def flatten(value: object, place: str = "") -> dict[str, object]:
     A list of numbers or words is one value; a list of tables is numbered.
     """
     if isinstance(value, Mapping):
-        found: dict[str, object] = {}
+        values: dict[str, object] = {}
         for key, inner in cast("Mapping[str, object]", value).items():
-            found |= flatten(inner, f"{place}.{key}" if place else key)
-        return found
+            values |= flatten(inner, f"{place}.{key}" if place else key)
+        return values
     if isinstance(value, list | tuple):
         items = cast("Sequence[object]", value)
         if items and all(isinstance(item, Mapping) for item in items):
-            found = {}
+            values = {}
             for number, item in enumerate(items):
-                found |= flatten(item, f"{place}[{number}]")
-            return found
+                values |= flatten(item, f"{place}[{number}]")
+            return values
         return {place: list(items)}
     return {place: value}
 

@@ -110,19 +110,19 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
         **(measure_models(study) if is_whole else {}),
         **measure_slips(_grounds(study, trials)),
     }
-    found = [*hold_against_bands(measures), *_truth(trials)]
+    results = [*hold_against_bands(measures), *_truth(trials)]
     if is_whole:
-        return found
-    return [f for f in found if f.band.id[0] in _OF_FEW and f.band.id != "E7"]
+        return results
+    return [f for f in results if f.band.id[0] in _OF_FEW and f.band.id != "E7"]
 
 
-def as_plain(plan: AcceptancePlan, found: Sequence[BandResult]) -> dict[str, object]:
+def as_plain(plan: AcceptancePlan, results: Sequence[BandResult]) -> dict[str, object]:
     """Return plan and findings as values for JSON."""
     return {
         "plan": {**asdict(plan), "config": str(plan.config or "shipped default")},
         "bands": [
             {**asdict(f.band), "values": list(f.values), "is_met": f.is_met}
-            for f in found
+            for f in results
         ],
     }
 

@@ -49,7 +49,7 @@ def parse_script(text: str) -> tuple[TimedPress, ...]:
     Raises:
         SettingsError: a line is neither, or its time lies before the line above.
     """
-    found: list[TimedPress] = []
+    presses: list[TimedPress] = []
     after_ns = 0
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split("#")[0].split()
@@ -63,8 +63,8 @@ def parse_script(text: str) -> tuple[TimedPress, ...]:
                 hint=f'Expected [SECONDS] {"|".join(PRESSES)}, e.g. "3.0 activate".',
             )
         after_ns = time_ns
-        found.append(TimedPress(after_ns, press))
-    return tuple(found)
+        presses.append(TimedPress(after_ns, press))
+    return tuple(presses)
 
 
 def _parse_time(text: str) -> int | None:

@@ -70,10 +70,10 @@ class TrialArchive:
         Raises:
             TrialFileError: the disk is full or gone.
         """
-        facts = sidecar_of(name, verified, outcome)
+        details = sidecar_of(name, verified, outcome)
         if review is not None:
-            facts |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
-        write_json(self.metadata.folder.trials / f"{name.kept}.json", facts)
+            details |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
+        write_json(self.metadata.folder.trials / f"{name.kept}.json", details)
 
     def kept_ratios(self) -> list[float]:
         """Return the quick fits of the trials kept so far, from their sidecars."""
@@ -89,8 +89,8 @@ class TrialArchive:
 
     def _kept_sidecars(self) -> list[dict[str, Any]]:
         paths = sorted(self.metadata.folder.trials.glob("T*.json"))
-        found = [read_json(path) for path in paths]
-        return [sidecar for sidecar in found if sidecar.get("verdict") == KEEP]
+        sidecars = [read_json(path) for path in paths]
+        return [sidecar for sidecar in sidecars if sidecar.get("verdict") == KEEP]
 
 
 def cells_of(value: object) -> NDArray[np.int64]:

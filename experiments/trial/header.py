@@ -42,18 +42,18 @@ def collect_metadata(
     folder: SessionFolder, operator: str, seed: int | None, devices: Mapping[str, str]
 ) -> SessionMetadata:
     """Return the facts of a session; asks git once."""
-    facts = provenance.collect()
-    facts.update(devices)
-    return SessionMetadata(folder, operator, seed, facts, provenance.diff_patch())
+    details = provenance.collect()
+    details.update(devices)
+    return SessionMetadata(folder, operator, seed, details, provenance.diff_patch())
 
 
-def trial_header(rig: Rig, facts: SessionMetadata, name: TrialName) -> TrialHeader:
+def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHeader:
     """Return everything that is known about a trial before its first cycle."""
     row = rig.row
     offset, uncertainty = utc_offset_ns(rig.clock)
     assert rig.model.tool is not None
     trial = {
-        "session": facts.folder.id,
+        "session": details.folder.id,
         "trial": name.kept,
         "attempt": str(name.attempt),
         "terrain": row.name,
@@ -63,10 +63,10 @@ def trial_header(rig: Rig, facts: SessionMetadata, name: TrialName) -> TrialHead
         "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
         "foot_mass_kg": repr(rig.model.tool.foot.mass),
         "gravity_model": rig.settings.rig.gravity.model,
-        "operator": facts.operator,
+        "operator": details.operator,
         "notes": "",
         "simulated": "true" if rig.is_simulated else "false",
-        "seed": "" if facts.seed is None else str(facts.seed),
+        "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
     }
     terrain = {"stones": row.stones, "foot": row.foot}
@@ -77,7 +77,7 @@ def trial_header(rig: Rig, facts: SessionMetadata, name: TrialName) -> TrialHead
         "robot.urdf": urdf(rig.model.constants),
         "ft_calibration.toml": payload_to_toml(rig.tared, rig.model.tool.sole),
         "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
-        "diff.patch": facts.diff,
+        "diff.patch": details.diff,
     }
     attachments.update(rig.settings.calibrations)
     if rig.gravity_text:
@@ -86,7 +86,7 @@ def trial_header(rig: Rig, facts: SessionMetadata, name: TrialName) -> TrialHead
         trial=trial,
         utc_offset_ns=offset,
         offset_uncertainty_ns=uncertainty,
-        provenance={**facts.provenance, **rig.backend.loop_client.device_facts()},
+        provenance={**details.provenance, **rig.backend.loop_client.device_metadata()},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
     )

@@ -69,8 +69,8 @@ class MotorPuck:
 
     def hears(self, group: int) -> bool:
         """Return whether the puck belongs to `group` and runs."""
-        mine = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
-        return self.life.is_listening and group in mine
+        groups = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
+        return self.life.is_listening and group in groups
 
     def name_of(self, number: int) -> str | None:
         """Return what `number` means to the puck as it is now."""

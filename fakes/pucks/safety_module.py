@@ -272,6 +272,6 @@ class FakeSafetyModule:
             self._speeds.reset()
             self._too_fast_since_ns = None
         self._feel_beat()
-        told = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
-        self._schedule.emit(_BROADCAST_ID, told)
+        frame = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)
+        self._schedule.emit(_BROADCAST_ID, frame)
         self._on_change(before)

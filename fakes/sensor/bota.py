@@ -94,31 +94,31 @@ class BotaFirmware:
         """Boot; return the boot text, line by line."""
         self._forget()
         self.on_since_ns = t_ns
-        said: list[Saying] = []
+        sayings: list[Saying] = []
         speak_ns = t_ns + _BOOT_NS
         for line in bota.encode_boot_text(self._options.boot_text).splitlines(True):
-            said.append((speak_ns, line))
+            sayings.append((speak_ns, line))
             speak_ns += _LINE_PAUSE_NS
         self._ready_ns = speak_ns + _SETTLE_NS
         self._run_from(self._ready_ns)
-        return said
+        return sayings
 
     def receive(self, t_ns: int, data: bytes) -> list[Saying]:
         """Obey the commands in `data`; return the acknowledgements."""
         if self._options.is_deaf or t_ns < self._ready_ns:
             return []
-        said: list[Saying] = []
+        sayings: list[Saying] = []
         self._input = (self._input + data)[-bota.MAX_COMMAND_SIZE :]
         while self._input:
             command = _COMMAND.match(self._input)
             if command is not None:
                 self._input = self._input[command.end() :]
-                said += self._obey(t_ns, command)
+                sayings += self._obey(t_ns, command)
             elif _COMMAND_BEGIN.fullmatch(self._input):
                 break
             else:
                 self._input = self._input[1:]
-        return said
+        return sayings
 
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 37 bytes of a sample."""

@@ -78,7 +78,7 @@ class OptoForceFirmware:
         """Obey the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        said: list[Saying] = []
+        sayings: list[Saying] = []
         self._input = (self._input + data)[-_INPUT:]
         while self._input:
             size = _SIZES.get(self._input[0], 1)
@@ -86,8 +86,8 @@ class OptoForceFirmware:
                 break
             answer = self._obey(t_ns, self._input[:size])
             self._input = self._input[size if answer else 1 :]
-            said += [(t_ns + _REPLY_NS, answer)] if answer else []
-        return said
+            sayings += [(t_ns + _REPLY_NS, answer)] if answer else []
+        return sayings
 
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 22 bytes of a sample."""

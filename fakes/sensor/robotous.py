@@ -86,7 +86,7 @@ class RobotousFirmware:
         """Obey the commands in `data`; return the answers."""
         if self._options.is_deaf:
             return []
-        said: list[Saying] = []
+        sayings: list[Saying] = []
         self._input = (self._input + data)[-8 * robotous.COMMAND_SIZE :]
         while len(self._input) >= robotous.COMMAND_SIZE:
             command = robotous.decode_command(self._input[: robotous.COMMAND_SIZE])
@@ -95,8 +95,8 @@ class RobotousFirmware:
                 continue
             self._input = self._input[robotous.COMMAND_SIZE :]
             answer = self._obey(t_ns, *command)
-            said += [(t_ns + _REPLY_NS, answer)] if answer else []
-        return said
+            sayings += [(t_ns + _REPLY_NS, answer)] if answer else []
+        return sayings
 
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 19 bytes of a sample."""

@@ -70,9 +70,9 @@ class SensorStream:
 
     def reset(self, t_ns: int) -> None:
         """Switch the power off and on at `t_ns`; settings are lost."""
-        said = self.firmware.power_up(t_ns)
+        sayings = self.firmware.power_up(t_ns)
         self._begin_anew()
-        self._say(said)
+        self._say(sayings)
 
     def port_opened(self, t_ns: int) -> None:
         """Tell the device that somebody opened its port."""
@@ -82,10 +82,10 @@ class SensorStream:
     def receive(self, t_ns: int, data: bytes) -> None:
         """Take bytes written by the client at `t_ns`."""
         self._sample_until(t_ns)
-        said = self.firmware.receive(t_ns, data)
+        sayings = self.firmware.receive(t_ns, data)
         if self.firmware.on_since_ns != self.on_since_ns:
             self._begin_anew()
-        self._say(said)
+        self._say(sayings)
 
     def due(self, t_ns: int) -> list[Saying]:
         """Return (time, bytes) of all that has left the wire by `t_ns`, in order."""
@@ -146,8 +146,8 @@ class SensorStream:
         self._is_skipping = False
         self._number = 0
 
-    def _say(self, said: list[Saying]) -> None:
-        for say_ns, data in said:
+    def _say(self, sayings: list[Saying]) -> None:
+        for say_ns, data in sayings:
             self._send(say_ns, data)
         self._follow_schedule()
 

@@ -146,22 +146,22 @@ class PlantTruth:
         return truth_records(part, frame)
 
 
-def scene_of(facts: dict[str, Any]) -> SimulatedScene:
+def scene_of(fields: dict[str, Any]) -> SimulatedScene:
     """Return the scene that was put into plain values."""
-    frame = facts["frame"]
+    frame = fields["frame"]
     return SimulatedScene(
-        terrain=facts["terrain"],
-        stones=facts["stones"],
-        foot=facts["foot"],
+        terrain=fields["terrain"],
+        stones=fields["stones"],
+        foot=fields["foot"],
         frame=TerrainFrame(
             frame["incline"],
             frame["heading"],
             tuple(frame["far_end"]),
             frame["travel"],
         ),
-        start_q=np.array(facts["start_q"]),
-        seed=facts["seed"],
-        sensor=SensorChoice(**facts["sensor"]),
+        start_q=np.array(fields["start_q"]),
+        seed=fields["seed"],
+        sensor=SensorChoice(**fields["sensor"]),
     )
 
 

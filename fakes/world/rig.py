@@ -129,14 +129,14 @@ class FakeRig:
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
         self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
-        found = replace(network or NetworkOptions(), mt=constants.mt)
+        chosen = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:
-            found = replace(found, has_sensor=True)
+            chosen = replace(chosen, has_sensor=True)
         self.rake(0)
-        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if found.has_sensor else ()
+        kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
-        self.network = PuckNetwork(self.plant, found, clock.now_ns(), load)
+        self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
         self.bus = FakeCanBus(self.network, clock)
         self.stream = make_stream(
@@ -170,10 +170,10 @@ class FakeRig:
         if not self.network.options.has_sensor:
             now_ns = self._clock.now_ns
             sensor = stream_faults(self.stream, self._unplug, now_ns)
-        found = {**sensor, **network_faults(self.network), **self._body.by_name()}
+        chosen = {**sensor, **network_faults(self.network), **self._body.by_name()}
         if isinstance(self._clock, SteppedClock):
-            found["loop-late"] = lambda: self._let_lag(LAG_NS)
-        return found
+            chosen["loop-late"] = lambda: self._let_lag(LAG_NS)
+        return chosen
 
     def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""

@@ -1,8 +1,8 @@
 from .files import (
     payload_from_toml,
     payload_to_toml,
-    terrain_facts,
     terrain_from_toml,
+    terrain_metadata,
     terrain_to_toml,
 )
 from .fit import (
@@ -29,7 +29,7 @@ __all__ = [
     "payload_to_toml",
     "sensor_from_toml",
     "sensor_to_toml",
-    "terrain_facts",
     "terrain_from_toml",
+    "terrain_metadata",
     "terrain_to_toml",
 ]

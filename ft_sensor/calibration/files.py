@@ -48,9 +48,9 @@ def payload_from_toml(text: str) -> tuple[Payload, Array]:
         raise SettingsError(f"ft_calibration.toml is incomplete: {error}.") from error
 
 
-def terrain_to_toml(name: str, frame: TerrainFrame, facts: Mapping[str, str]) -> str:
+def terrain_to_toml(name: str, frame: TerrainFrame, fields: Mapping[str, str]) -> str:
     """Return `terrain.toml`: where the container stood and what was in it."""
-    extra = "".join(f"{key} = {_quoted(value)}\n" for key, value in facts.items())
+    extra = "".join(f"{key} = {_quoted(value)}\n" for key, value in fields.items())
     return (
         "# SI units, angles in rad, base frame of the arm.\n"
         f"name = {_quoted(name)}\n"
@@ -82,17 +82,17 @@ def terrain_from_toml(text: str) -> tuple[str, TerrainFrame]:
         raise SettingsError(f"terrain.toml is incomplete: {error}.") from error
 
 
-def terrain_facts(text: str) -> dict[str, str]:
+def terrain_metadata(text: str) -> dict[str, str]:
     """Return what else `terrain.toml` says, empty where it says nothing.
 
     Raises:
         SettingsError: the text is no TOML, or says it in another form.
     """
-    found: object = _parse(text, "terrain.toml").get("facts", {})
-    if not isinstance(found, dict):
+    table: object = _parse(text, "terrain.toml").get("facts", {})
+    if not isinstance(table, dict):
         raise SettingsError("terrain.toml is incomplete: facts is no table.")
-    facts = cast("dict[str, object]", found)
-    return {str(key): str(value) for key, value in facts.items()}
+    fields = cast("dict[str, object]", table)
+    return {str(key): str(value) for key, value in fields.items()}
 
 
 def _parse(text: str, name: str) -> dict[str, Any]:

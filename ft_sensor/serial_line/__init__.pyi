@@ -1,6 +1,6 @@
 from .framing import FrameScanner, wire_time_ns
 from .link import PortSettings, SerialLink, SerialPort, open_port
-from .reconnect import ReconnectingSensor, stream_facts
+from .reconnect import ReconnectingSensor, stream_metadata
 from .sensor import BURSTY, SerialDevice, SerialSensor
 from .startup import FIRST_READINGS, SerialDialog
 
@@ -16,6 +16,6 @@ __all__ = [
     "SerialPort",
     "SerialSensor",
     "open_port",
-    "stream_facts",
+    "stream_metadata",
     "wire_time_ns",
 ]

@@ -69,8 +69,8 @@ class ClockFit:
     def _hold_least(self) -> None:
         """Before there is a line the least delay so far has to do."""
         assert self._window is not None
-        found = min((offset for _, offset in self.least), default=self._window[1])
-        self._offset_ns = float(min(found, self._window[1]))
+        lowest = min((offset for _, offset in self.least), default=self._window[1])
+        self._offset_ns = float(min(lowest, self._window[1]))
 
     def _draw_line(self) -> None:
         """Put the line through the least delays, the longest three in ten left out.

@@ -95,14 +95,14 @@ class FrameScanner(Generic[F]):
     def _find_header(self, data: bytes, start: int, stop: int) -> int:
         """Return where a frame may begin, `stop` if nowhere before it."""
         header = self._header
-        found = data.find(header, start, stop + len(header) - 1)
-        if found >= 0:
-            return found
+        at = data.find(header, start, stop + len(header) - 1)
+        if at >= 0:
+            return at
         # The last bytes may be the first of a header that goes on in the next data.
-        found = max(start, len(data) - len(header) + 1)
-        while found < stop and not header.startswith(data[found:]):
-            found += 1
-        return min(found, stop)
+        at = max(start, len(data) - len(header) + 1)
+        while at < stop and not header.startswith(data[at:]):
+            at += 1
+        return min(at, stop)
 
     def _discard(self, count: int) -> None:
         self.counters.discarded += count

@@ -120,9 +120,12 @@ class ReconnectingSensor:
         )
 
 
-def stream_facts(reconnecting: ReconnectingSensor) -> dict[str, str]:
+def stream_metadata(reconnecting: ReconnectingSensor) -> dict[str, str]:
     """Return what became of the stream since it was opened last, as text."""
-    facts = {"reopened": str(reconnecting.reopened), "trouble": reconnecting.last_error}
+    fields = {
+        "reopened": str(reconnecting.reopened),
+        "trouble": reconnecting.last_error,
+    }
     if reconnecting.sensor is not None:
-        facts |= reconnecting.sensor.stream_facts()
-    return facts
+        fields |= reconnecting.sensor.stream_metadata()
+    return fields

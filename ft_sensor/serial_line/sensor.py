@@ -74,7 +74,7 @@ class SensorCounters:
         """Whether the adapter collects bytes before it delivers them."""
         return self.bursts > BURSTY * self.reads
 
-    def facts(self) -> dict[str, str]:
+    def metadata(self) -> dict[str, str]:
         """Return the counts as text for the recording."""
         return {name: str(value) for name, value in asdict(self).items()}
 
@@ -163,9 +163,9 @@ class SerialSensor:
             "measured_rate": f"{self._rate:.1f} Hz",
         }
 
-    def stream_facts(self) -> dict[str, str]:
+    def stream_metadata(self) -> dict[str, str]:
         """Return what became of the stream since it was opened, as text."""
-        return self.counters.facts()
+        return self.counters.metadata()
 
     def close(self) -> None:
         """Stop the stream and give the port back; never raises."""

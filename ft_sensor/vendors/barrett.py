@@ -126,20 +126,20 @@ class BarrettSensor:
 
     def describe(self) -> dict[str, str]:
         """Return what the sensor said about itself, as text."""
-        found = self._identity
+        identity = self._identity
         return {
             "model": "Barrett force/torque sensor, node 8",
-            "serial_number": _text(found.serial_number),
-            "firmware": f"{_text(found.vers)} (unreliable)",
-            "role": _role_text(found.role),
+            "serial_number": _text(identity.serial_number),
+            "firmware": f"{_text(identity.vers)} (unreliable)",
+            "role": _role_text(identity.role),
             "port": "the arm's CAN bus",
             "ranges": " ".join(f"{most:g}" for most in RANGES),
             "nominal_rate": "one sample per cycle",
-            "measured_rate": f"{found.answered} of {_QUESTIONS} questions answered",
+            "measured_rate": f"{identity.answered} of {_QUESTIONS} questions answered",
             "time": "question handed over + 191 us; filter delay unknown",
         }
 
-    def stream_facts(self) -> dict[str, str]:
+    def stream_metadata(self) -> dict[str, str]:
         """Return what became of its answers, as text."""
         return {name: str(value) for name, value in asdict(self.counters).items()}
 

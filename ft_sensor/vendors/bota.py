@@ -172,8 +172,8 @@ def encode_acknowledgement(answer: Acknowledgement) -> bytes:
 def find_acknowledgements(data: bytes) -> list[Acknowledgement]:
     """Return the acknowledgements in `data`, which may be binary around them."""
     return [
-        Acknowledgement(found[1].decode("ascii"), int(found[2][:9]))
-        for found in _ACKNOWLEDGEMENT.finditer(data)
+        Acknowledgement(match[1].decode("ascii"), int(match[2][:9]))
+        for match in _ACKNOWLEDGEMENT.finditer(data)
     ]
 
 
@@ -196,8 +196,8 @@ def find_boot_text(data: bytes) -> BootText:
     """Return the known tokens in `data`; text around them is not documented."""
 
     def line(pattern: re.Pattern[bytes]) -> str:
-        found = pattern.search(data)
-        return found[1].decode("ascii").strip() if found else ""
+        match = pattern.search(data)
+        return match[1].decode("ascii").strip() if match else ""
 
     return BootText(b"App Init" in data, line(_NAME), line(_SERIAL), line(_FIRMWARE))
 

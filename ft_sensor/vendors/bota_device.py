@@ -194,10 +194,10 @@ class BotaDevice:
         letter = chr(command[0])
 
         def answer() -> int | None:
-            for found in bota.find_acknowledgements(dialog.buffer):
-                if found.letter == letter:
+            for acknowledgement in bota.find_acknowledgements(dialog.buffer):
+                if acknowledgement.letter == letter:
                     self._answers += 1
-                    return found.code
+                    return acknowledgement.code
             return None
 
         return dialog.wait_for(answer, _ANSWER_NS)

@@ -97,8 +97,8 @@ def encode_configuration_answer(code: int) -> bytes:
 
 def find_configuration_answer(data: bytes) -> int | None:
     """Return the code of the newest answer in `data`, binary around it or not."""
-    found = _newest(data, _ANSWER, 7)
-    return None if found is None else found[4]
+    answer = _newest(data, _ANSWER, 7)
+    return None if answer is None else answer[4]
 
 
 def encode_serial_number(name: str) -> bytes:
@@ -108,18 +108,18 @@ def encode_serial_number(name: str) -> bytes:
 
 def find_serial_number(data: bytes) -> str | None:
     """Return the serial number told in `data`; None if there is none."""
-    found = _newest(data, _SERIAL, 14)
-    if found is None:
+    answer = _newest(data, _SERIAL, 14)
+    if answer is None:
         return None
-    return found[4:12].split(b"\0")[0].decode("ascii", errors="replace").strip()
+    return answer[4:12].split(b"\0")[0].decode("ascii", errors="replace").strip()
 
 
 def _newest(data: bytes, header: bytes, size: int) -> bytes | None:
     start = data.rfind(header)
     while start >= 0:
-        found = data[start : start + size]
-        if len(found) == size and _is_summed(found):
-            return found
+        answer = data[start : start + size]
+        if len(answer) == size and _is_summed(answer):
+            return answer
         start = data.rfind(header, 0, start + len(header) - 1)
     return None
 

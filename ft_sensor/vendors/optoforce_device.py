@@ -123,23 +123,23 @@ class OptoForceDevice:
     def _serial_number(self, dialog: SerialDialog) -> str:
         for _ in range(_TRIES):
             dialog.write(optoforce.ASK_SERIAL)
-            found = dialog.wait_for(
+            reply = dialog.wait_for(
                 lambda: optoforce.find_serial_number(dialog.buffer), _ANSWER_NS
             )
-            if found is not None:
+            if reply is not None:
                 break
         else:
             raise LinkTimeoutError(
                 "The F/T sensor does not tell its serial number.",
                 hint="Cycle its power. Without it the sensitivities are anybody's.",
             )
-        if found != self._settings.serial_number:
+        if reply != self._settings.serial_number:
             raise DeviceFaultError(
-                f"The F/T sensor is {found}, the sensitivities in rig.toml belong to "
+                f"The F/T sensor is {reply}, the sensitivities in rig.toml belong to "
                 f"{self._settings.serial_number}.",
                 hint="Enter sensitivity and serial_number of its own report.",
             )
-        return found
+        return reply
 
     def _configure(self, dialog: SerialDialog, command: bytes) -> None:
         for _ in range(_TRIES):

@@ -115,7 +115,7 @@ class RobotousDevice:
         """
         self._make_quiet(dialog)
         name = self._identify(dialog)
-        facts = {
+        fields = {
             "model": f"Robotous {name}",
             "serial_number": self._text(dialog, SERIAL),
             "firmware": self._text(dialog, FIRMWARE),
@@ -129,7 +129,7 @@ class RobotousDevice:
         self._refuse_absurd(dialog.first_readings())
         low_pass = f"low-pass {self._settings.filter_hz} Hz"
         return {
-            **facts,
+            **fields,
             "filter": low_pass if self._settings.filter_hz else "off",
             "overloads": " ".join(map(str, overloads[:6])),
             "time": "frames counted, fitted to arrival less wire time; no device clock",
@@ -148,18 +148,18 @@ class RobotousDevice:
             if not dialog.frames:
                 dialog.raise_no_reply(self.line.baudrate)
             raise
-        found = _model_of(name)
-        if found is None:
+        reply = _model_of(name)
+        if reply is None:
             raise DeviceFaultError(
                 f"The F/T sensor calls itself '{name}', whose scale is unknown.",
                 hint=f"Known are {', '.join(MODELS)}.",
             )
-        if found.most_hz < self._settings.rate:
+        if reply.most_hz < self._settings.rate:
             raise DeviceFaultError(
-                f"A {name} sends {found.most_hz} Hz at most; the loop needs 500.",
+                f"A {name} sends {reply.most_hz} Hz at most; the loop needs 500.",
                 hint="Use another model.",
             )
-        self._model, self.ranges = found, found.ranges
+        self._model, self.ranges = reply, reply.ranges
         return name
 
     def _leave_first_baudrate(self, dialog: SerialDialog) -> None:
@@ -207,11 +207,11 @@ class RobotousDevice:
         """
         for _ in range(_TRIES):
             dialog.write(robotous.encode_command(command, *parameters))
-            found = dialog.wait_for(
+            reply = dialog.wait_for(
                 lambda: robotous.find_answer(dialog.buffer, command), _ANSWER_NS
             )
-            if found is not None:
-                return found
+            if reply is not None:
+                return reply
         raise LinkTimeoutError(
             f"The F/T sensor did not answer command {command:#04x} within "
             f"{_TRIES * _ANSWER_NS / NS_PER_S:g} s.",

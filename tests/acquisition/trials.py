@@ -24,7 +24,7 @@ DATA_END_BYTES = 13
 
 
 def make_header(**changes):
-    facts: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "trial": {"session": "S", "trial": "T01", "simulated": "true"},
         "utc_offset_ns": OFFSET_NS,
         "offset_uncertainty_ns": 80,
@@ -32,7 +32,7 @@ def make_header(**changes):
         "attachments": ATTACHMENTS,
         "robot_description": "<robot name='wam7'/>",
     }
-    return TrialHeader(**(facts | changes))
+    return TrialHeader(**(fields | changes))
 
 
 def make_cycles(count=600, *, first=1000, skipped=(), seed=0) -> Any:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from acquisition.errors import SettingsError
 from experiments.settings.load import load_settings
 from ft_sensor.calibration.files import (
-    terrain_facts,
     terrain_from_toml,
+    terrain_metadata,
     terrain_to_toml,
 )
 from ft_sensor.payload import TerrainFrame
@@ -88,7 +88,7 @@ def test_a_terrain_file_needs_finite_numbers():
 @given(st.text(st.characters(exclude_categories=["Cs"]), max_size=40))
 def test_what_is_said_of_a_terrain_survives_its_file(text):
     written = terrain_to_toml("S10", FRAME, {"remark": text})
-    assert terrain_facts(written) == {"remark": text}
+    assert terrain_metadata(written) == {"remark": text}
 
 
 @pytest.mark.parametrize("path", ["/dev/zero", "/dev/full"])

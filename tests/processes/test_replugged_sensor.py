@@ -30,16 +30,16 @@ def is_fresh(rig):
 
 def test_a_sensor_is_read_again_after_it_was_unplugged(rig):
     rig.backend.start_arm()
-    facts = rig.backend.open_sensor()
+    fields = rig.backend.open_sensor()
     assert until(lambda: is_fresh(rig), 2)
     rig.simulation.inject("ft-unplugged")
     assert until(lambda: not is_fresh(rig), 2)
     assert until(lambda: "serial port" in trouble(rig), 3), trouble(rig)
     rig.simulation.clear_faults()
     assert until(lambda: is_fresh(rig), FOUND_AGAIN), trouble(rig)
-    assert rig.backend.sensor_facts()["reopened"] == "1"
-    assert rig.backend.open_sensor()["model"] == facts["model"]
+    assert rig.backend.sensor_metadata()["reopened"] == "1"
+    assert rig.backend.open_sensor()["model"] == fields["model"]
 
 
 def trouble(rig):
-    return rig.backend.sensor_facts()["trouble"]
+    return rig.backend.sensor_metadata()["trouble"]

@@ -125,12 +125,12 @@ def _shared(motor: dict[str, int]) -> dict[str, int]:
 
 def _at(table: str, vers: int) -> dict[str, int]:
     """Return the numbers that hold for firmware `vers`."""
-    found: dict[str, int] = {}
+    numbers_by_name: dict[str, int] = {}
     for line in table.splitlines():
         name, *entries = line.split()
         for number, first in (entry.split("@") for entry in entries):
             if int(first) <= vers:
-                found.pop(name, None)
+                numbers_by_name.pop(name, None)
                 if number != "-":
-                    found[name] = int(number)
-    return found
+                    numbers_by_name[name] = int(number)
+    return numbers_by_name

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError
-from wam.model import Array, Body, Tool, tool_facts, tool_of
+from wam.model import Array, Body, Tool, tool_metadata, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
 _LARGEST_MOMENT = 10.0  # kg m; a Barrett arm's largest is 3
@@ -42,18 +42,18 @@ class GravityCalibration:
 
 def gravity_to_toml(calibration: GravityCalibration) -> str:
     """Return the text of a calibration file."""
-    facts = tool_facts(calibration.tool)
+    fields = tool_metadata(calibration.tool)
     sections = "".join(
         f"\n[tool.{name}]\n"
         f"mass = {float(body['mass'])!r}\n"
         f"com = {body['com']}\n"
         f"inertia = {body['inertia']}\n"
         for name in ("sensor", "foot")
-        for body in (facts[name],)
+        for body in (fields[name],)
     )
     plain = "".join(
         f"{name} = {value}\n"
-        for name, value in facts.items()
+        for name, value in fields.items()
         if not isinstance(value, dict)
     )
     return (
@@ -115,16 +115,16 @@ def _weighs_the_same(one: Body, other: Body) -> bool:
     return abs(one.mass - other.mass) <= _SAME and bool(is_near.all())
 
 
-def _tool(facts: dict[str, Any]) -> Tool:
+def _tool(fields: dict[str, Any]) -> Tool:
     """Return the tool of a file; its numbers are checked, it may say anything."""
-    for body in (facts["sensor"], facts["foot"]):
+    for body in (fields["sensor"], fields["foot"]):
         _numbers(body["mass"], ())
         _numbers(body["com"], (3,))
         _numbers(body["inertia"], (3, 3))
-    _numbers(facts["sole"], (3,))
+    _numbers(fields["sole"], (3,))
     for name in ("sensor_height", "sensor_angle", "sensor_sign"):
-        _numbers(facts[name], ())
-    return tool_of(facts)
+        _numbers(fields[name], ())
+    return tool_of(fields)
 
 
 def _numbers(value: object, shape: tuple[int, ...]) -> Array:

@@ -1,5 +1,5 @@
 from .arm import WamArm
-from .health import complaints, health_facts, temperature_range
+from .health import complaints, health_metadata, temperature_range
 from .safety_module import (
     COUNTS_PER_SPEED,
     MONITORS,
@@ -27,7 +27,7 @@ __all__ = [
     "check_home",
     "complaints",
     "encode_pendant",
-    "health_facts",
+    "health_metadata",
     "home_error",
     "temperature_range",
 ]

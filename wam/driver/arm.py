@@ -253,11 +253,11 @@ class WamArm:
         except DeviceFaultError:
             self.counters.malformed += 1
 
-    def _check_taken(self, wanted: Sequence[int], found: Sequence[int]) -> None:
-        worst = max(abs(w - f) for w, f in zip(wanted, found, strict=True))
+    def _check_taken(self, wanted: Sequence[int], reported: Sequence[int]) -> None:
+        worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
         if worst > _ZEROED_WITHIN:
             raise DeviceFaultError(
-                f"The pucks report {list(found)} counts, told were {list(wanted)}.",
+                f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
                 hint="The arm must not move while it is zeroed. Zero it again.",
             )
 

@@ -50,9 +50,9 @@ class LinkCounters:
 
     def text(self) -> str:
         """Return the counters in one line."""
-        return ", ".join(f"{name} {value}" for name, value in self.facts().items())
+        return ", ".join(f"{name} {value}" for name, value in self.metadata().items())
 
-    def facts(self) -> dict[str, str]:
+    def metadata(self) -> dict[str, str]:
         """Return the counters as text for a recording, motors 1 to 7 in one line."""
         return {
             "link:missing_replies": " ".join(map(str, self.missing)),
@@ -185,16 +185,16 @@ class CycleTraffic:
     def _await_replies(self, now_ns: int) -> None:
         clock, deadline_ns = self._clock, now_ns + self._settings.give_up_ns
         clock.sleep_until(now_ns + self._settings.first_look_ns)
-        found = self._collect()
-        if found:
+        arrived = self._collect()
+        if arrived:
             self.arm_ns = clock.now_ns()
         while (None in self.received or self._owed) and clock.now_ns() < deadline_ns:
             if not clock.wait(self._link, deadline_ns):
                 break
             if more := self._collect():
-                found += more
+                arrived += more
                 self.arm_ns = clock.now_ns()
-        self.counters.stale += found - MOTORS + self.received.count(None)
+        self.counters.stale += arrived - MOTORS + self.received.count(None)
 
     def _missing(self) -> int:
         """Return the bits of the motors whose reply has not come."""
@@ -204,7 +204,7 @@ class CycleTraffic:
 
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
-        found, received = 0, self.received
+        arrived, received = 0, self.received
         for can_id, data, _ in self._link.receive():
             index = _POSITION_INDEX.get(can_id)
             try:
@@ -213,11 +213,11 @@ class CycleTraffic:
                     if received[index] is not None:
                         self._owed &= ~(1 << index)
                     received[index] = counts
-                    found += 1
+                    arrived += 1
                 else:
                     if self.bus_device is not None:
                         self.bus_device.on_frame(can_id, data)
                     self.poller.on_frame(can_id, data)
             except DeviceFaultError:
                 self.counters.malformed += 1
-        return found
+        return arrived

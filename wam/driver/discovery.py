@@ -52,12 +52,12 @@ def _ask(
     properties: PropertyClient, nodes: Iterable[int], within_ns: int
 ) -> dict[int, int]:
     """Return STAT by node of those of `nodes` that answer in time."""
-    found: dict[int, int] = {}
+    stat_by_node: dict[int, int] = {}
     for node in nodes:
         stat = properties.get(node, _STAT, within_ns)
         if stat is not None:
-            found[node] = stat
-    return found
+            stat_by_node[node] = stat
+    return stat_by_node
 
 
 def _mode(

@@ -95,13 +95,13 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
 
     Pucks that have not answered lately do not count and are named with their age.
     """
-    found = [
+    texts = [
         degc
         for puck in pucks
         for degc in (puck.puck_degc, puck.motor_degc)
         if degc is not None and puck.is_news(now_ns)
     ]
-    known = f"{min(found)}-{max(found)} °C" if found else "temperatures unknown"
+    known = f"{min(texts)}-{max(texts)} °C" if texts else "temperatures unknown"
     silent = [
         f"puck {node} silent for {(now_ns - puck.heard_ns) / NS_PER_S:.0f} s"
         for node, puck in enumerate(pucks, 1)
@@ -112,18 +112,18 @@ def temperature_range(pucks: Sequence[PuckHealth], now_ns: int) -> str:
 
 def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
     """Return what pucks 1 to 7 complain of, such as "puck 3 at 72 °C (limit 60)"."""
-    found: list[str] = []
+    texts: list[str] = []
     for node, puck in enumerate(pucks, 1):
         if not puck.is_news(now_ns):
             continue
         if puck.puck_degc is not None and puck.puck_degc > HOT:
-            found.append(f"puck {node} at {puck.puck_degc} °C (limit {HOT})")
+            texts.append(f"puck {node} at {puck.puck_degc} °C (limit {HOT})")
         if puck.error:
-            found.append(f"puck {node} reports error {puck.error}")
-    return found
+            texts.append(f"puck {node} reports error {puck.error}")
+    return texts
 
 
-def health_facts(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
+def health_metadata(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
     """Return the answers as text for a recording, pucks 1 to 7 in each line.
 
     "?" stands for what was never said, or not lately; the age [s] is of the last

@@ -220,10 +220,10 @@ class SafetyModule:
         for name, value in wanted.items():
             self._set(name, value)
         for name, value in wanted.items():
-            found = self._get(name)
-            if found != value:
+            actual = self._get(name)
+            if actual != value:
                 raise DeviceFaultError(
-                    f"The safety module has {name} = {found}, expected {value}.",
+                    f"The safety module has {name} = {actual}, expected {value}.",
                     hint="Switch the arm off and on, then start again.",
                 )
 

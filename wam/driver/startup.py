@@ -222,10 +222,10 @@ class StartUp:
         return self._properties.require(node, number, name)
 
 
-def _check_firmware(who: str, found: int, needed: int) -> None:
+def _check_firmware(who: str, actual: int, needed: int) -> None:
     """Raise DeviceFaultError for firmware whose properties have other numbers."""
-    if found < needed:
+    if actual < needed:
         raise DeviceFaultError(
-            f"{who} has firmware {found}; {needed} or later is needed.",
+            f"{who} has firmware {actual}; {needed} or later is needed.",
             hint="Ask Barrett for newer firmware.",
         )

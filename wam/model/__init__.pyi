@@ -3,7 +3,7 @@ from .arm_model import ArmModel, add_point, build_pinocchio, drive_inertia_matri
 from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
 from .gravity import VirtualMass, compensation, gravity_model
 from .moments import MomentFit, check_fit, fit_moments, regressor
-from .tool import Tool, sensor_body, tool_facts, tool_of
+from .tool import Tool, sensor_body, tool_metadata, tool_of
 
 __all__ = [
     "GRAVITY",
@@ -24,7 +24,7 @@ __all__ = [
     "load_constants",
     "regressor",
     "sensor_body",
-    "tool_facts",
+    "tool_metadata",
     "tool_of",
     "urdf",
 ]

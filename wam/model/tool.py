@@ -41,11 +41,11 @@ def box_inertia(mass: float, size: tuple[float, float, float]) -> Array:
     return mass / 12.0 * np.diag([y * y + z * z, x * x + z * z, x * x + y * y])
 
 
-def tool_facts(tool: Tool) -> dict[str, Any]:
+def tool_metadata(tool: Tool) -> dict[str, Any]:
     """Return `tool` as plain numbers, for another process or a file."""
     return {
-        "sensor": _body_facts(tool.sensor),
-        "foot": _body_facts(tool.foot),
+        "sensor": _body_metadata(tool.sensor),
+        "foot": _body_metadata(tool.foot),
         "sole": tool.sole.tolist(),
         "sensor_height": tool.sensor_height,
         "sensor_angle": tool.sensor_angle,
@@ -53,19 +53,19 @@ def tool_facts(tool: Tool) -> dict[str, Any]:
     }
 
 
-def tool_of(facts: Mapping[str, Any]) -> Tool:
-    """Return the tool that `tool_facts` put into numbers."""
+def tool_of(fields: Mapping[str, Any]) -> Tool:
+    """Return the tool that `tool_metadata` put into numbers."""
     return Tool(
-        sensor=_body_of(facts["sensor"]),
-        foot=_body_of(facts["foot"]),
-        sole=np.array(facts["sole"]),
-        sensor_height=facts["sensor_height"],
-        sensor_angle=facts["sensor_angle"],
-        sensor_sign=facts["sensor_sign"],
+        sensor=_body_of(fields["sensor"]),
+        foot=_body_of(fields["foot"]),
+        sole=np.array(fields["sole"]),
+        sensor_height=fields["sensor_height"],
+        sensor_angle=fields["sensor_angle"],
+        sensor_sign=fields["sensor_sign"],
     )
 
 
-def _body_facts(body: Body) -> dict[str, Any]:
+def _body_metadata(body: Body) -> dict[str, Any]:
     return {
         "mass": body.mass,
         "com": body.com.tolist(),
@@ -73,5 +73,5 @@ def _body_facts(body: Body) -> dict[str, Any]:
     }
 
 
-def _body_of(facts: Mapping[str, Any]) -> Body:
-    return Body(facts["mass"], np.array(facts["com"]), np.array(facts["inertia"]))
+def _body_of(fields: Mapping[str, Any]) -> Body:
+    return Body(fields["mass"], np.array(fields["com"]), np.array(fields["inertia"]))

@@ -35,7 +35,7 @@ LIMITS = GuardLimits(
 
 
 def reading(**changes):
-    facts = {
+    fields = {
         "host_ns": 10 * S,
         "arm_ns": 10 * S,
         "counts": [0] * 7,
@@ -46,7 +46,7 @@ def reading(**changes):
         "is_complete": True,
         "missing_cycles": 0,
     }
-    return ArmReading(**(facts | changes))
+    return ArmReading(**(fields | changes))
 
 
 OBSERVED = {

@@ -310,8 +310,8 @@ def test_an_error_of_an_unknown_kind_becomes_a_device_fault(device, remote):
 @pytest.mark.parametrize("name", ["Path", "Exception", "nothing"])
 def test_a_name_that_is_no_error_of_ours_becomes_a_device_fault(name):
     near, far = Channel.pair()
-    facts = {"type": name, "message": "m", "hint": "", "arm_state": "", "saved": ""}
-    far.send({"value": None, "error": facts})
+    fields = {"type": name, "message": "m", "hint": "", "arm_state": "", "saved": ""}
+    far.send({"value": None, "error": fields})
     with pytest.raises(DeviceFaultError, match="m"):
         send_call(Deaf(near), "fail", {})
     near.close()

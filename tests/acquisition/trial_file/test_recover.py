@@ -193,13 +193,13 @@ def test_a_recovered_trial_is_readable_and_incomplete(put, left):
 def test_it_says_what_it_was_made_from(put, left):
     cut = left[:-100]
     recovery = recover_file(put(cut))
-    facts = TrialReader(recovery.path).metadata["recovered"]
-    assert facts["source"] == "T07.mcap.partial"
-    assert facts["source_sha256"] == hashlib.sha256(cut).hexdigest()
-    assert facts["source_bytes"] == str(len(cut))
-    assert int(facts["messages_kept"]) == recovery.messages > 300
+    fields = TrialReader(recovery.path).metadata["recovered"]
+    assert fields["source"] == "T07.mcap.partial"
+    assert fields["source_sha256"] == hashlib.sha256(cut).hexdigest()
+    assert fields["source_bytes"] == str(len(cut))
+    assert int(fields["messages_kept"]) == recovery.messages > 300
     kept = len(cut) - recovery.bytes_dropped
-    assert facts["reason"] == f"is cut off in the record at byte {kept}"
+    assert fields["reason"] == f"is cut off in the record at byte {kept}"
 
 
 def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):

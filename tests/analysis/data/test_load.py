@@ -54,10 +54,10 @@ def make_cycles(count=100):
     return records
 
 
-def write(path, cycles=None, *, finish=True, drop=(), facts=(), **attachments):
+def write(path, cycles=None, *, finish=True, drop=(), fields=(), **attachments):
     texts = ATTACHMENTS | attachments
     header = TrialHeader(
-        trial={"session": "S001", "trial": "T01", "simulated": "true", **dict(facts)},
+        trial={"session": "S001", "trial": "T01", "simulated": "true", **dict(fields)},
         utc_offset_ns=1_700_000_000_000_000_000,
         offset_uncertainty_ns=10,
         provenance={},
@@ -81,10 +81,10 @@ def trial(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    ("facts", "stones"), [({"stone_size": "none"}, "none"), ({}, "")]
+    ("fields", "stones"), [({"stone_size": "none"}, "none"), ({}, "")]
 )
-def test_the_stones_are_those_of_the_recording(tmp_path, facts, stones):
-    trial = load_trial(write(tmp_path / "T01.mcap", facts=facts))
+def test_the_stones_are_those_of_the_recording(tmp_path, fields, stones):
+    trial = load_trial(write(tmp_path / "T01.mcap", fields=fields))
     assert trial.series().stones == trial.series("sole").stones == stones
 
 
@@ -265,10 +265,13 @@ def as_left(trial, name="T01", **columns):
     cycles["arm_ns"], cycles["ft_ns"] = cycles["host_ns"], cycles["host_ns"]
     for key, values in columns.items():
         cycles[key] = values
-    facts = {"pucks:temperature_degc": "30 31 ? 33", "pucks:motor_temperature_degc": ""}
+    fields = {
+        "pucks:temperature_degc": "30 31 ? 33",
+        "pucks:motor_temperature_degc": "",
+    }
     metadata = trial.metadata | {
         "trial": {"session": "S001", "trial": name, "effective_mass_kg": "0.3"},
-        "provenance": facts,
+        "provenance": fields,
     }
     return replace(trial, cycles=cycles, metadata=metadata)
 

@@ -216,8 +216,8 @@ def vouch_for(path):
 
     The journal becomes one of an older version, which says nothing about checksums.
     """
-    facts = sidecar(path) | {"sha256": digest(path)}
-    write_json(path.with_suffix(".json"), facts)
+    fields = sidecar(path) | {"sha256": digest(path)}
+    write_json(path.with_suffix(".json"), fields)
     folder = path.parents[1]
     newer = {"sha256", "size", "crc"}
     events = [{k: e[k] for k in e if k not in newer} for e in journal(folder)]

@@ -283,8 +283,8 @@ def _no_loop(scene):
 
 
 def _lost_sensor(scene):
-    facts = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(inline_crew.InProcessBackend, "sensor_facts", lambda _: facts)
+    fields = {"trouble": "The port is gone.", "reopened": "0"}
+    scene.patch.setattr(inline_crew.InProcessBackend, "sensor_facts", lambda _: fields)
     return resume(scene)
 
 

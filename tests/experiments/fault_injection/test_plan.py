@@ -66,8 +66,8 @@ def test_a_stale_sensor_interrupts_the_trial_and_it_is_redone(stale):
         "trial-recorded",
         "trial-kept",
     ]
-    facts = json.loads((stale.folder / "session.json").read_text())
-    assert (facts["kept"], facts["rejected"]) == (["T01"], 1)
+    fields = json.loads((stale.folder / "session.json").read_text())
+    assert (fields["kept"], fields["rejected"]) == (["T01"], 1)
 
 
 def test_a_stale_sensor_is_told_with_age_limit_and_what_the_arm_does(stale):
@@ -78,10 +78,10 @@ def test_a_stale_sensor_is_told_with_age_limit_and_what_the_arm_does(stale):
 
 def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
     path = stale.folder / "rejected" / "T01a.mcap"
-    facts = sidecar(path)
-    assert verify_file(path).sha256 == facts["sha256"] == digest(path)
-    assert (facts["verdict"], facts["status"]) == ("reject", "interrupted")
-    assert facts["reason"] == "interrupted: ft-stale"
+    fields = sidecar(path)
+    assert verify_file(path).sha256 == fields["sha256"] == digest(path)
+    assert (fields["verdict"], fields["status"]) == ("reject", "interrupted")
+    assert fields["reason"] == "interrupted: ft-stale"
     assert path.with_suffix(".truth.mcap").exists()
     reader = TrialReader(path)
     assert reader.metadata["result"]["stop_reason"] == "ft-stale"

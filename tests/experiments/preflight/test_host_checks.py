@@ -41,10 +41,10 @@ def test_a_slow_governor_comes_with_its_fix(tmp_path, names, mark, text):
 
 
 def test_changed_code_is_marked():
-    facts = {"software": "traction 0.1", "commit": "0123456789abcdef", "dirty": "true"}
-    assert check_code(facts).mark == WARNING
-    assert check_code({**facts, "dirty": "false"}).mark == GOOD
-    assert "0123456789" in check_code(facts).text
+    fields = {"software": "traction 0.1", "commit": "0123456789abcdef", "dirty": "true"}
+    assert check_code(fields).mark == WARNING
+    assert check_code({**fields, "dirty": "false"}).mark == GOOD
+    assert "0123456789" in check_code(fields).text
 
 
 def samples(count=400, *, noise=0.05, age_ms=2.0):
@@ -105,6 +105,6 @@ def test_a_sensor_on_the_bus_has_no_stream():
 
 
 def test_the_largest_traction_is_told():
-    facts = {"ranges": "500 500 1200 15 15 12"}
+    fields = {"ranges": "500 500 1200 15 15 12"}
     # 15 N m at a tenth of a metre
-    assert reach_words(facts, 0.1) == "F_t up to 150 N"
+    assert reach_words(fields, 0.1) == "F_t up to 150 N"

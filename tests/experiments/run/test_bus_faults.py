@@ -104,9 +104,9 @@ def test_a_fault_of_the_bus_ends_the_session_with_the_arm_at_rest(ended):
 def test_the_trial_is_kept_as_interrupted(ended):
     _, seen = ended
     path = seen.folder / "rejected" / "T01a.mcap"
-    facts = sidecar(path)
-    assert (facts["status"], facts["verdict"]) == ("interrupted", "reject")
-    assert facts["sha256"] == verify_file(path).sha256 == digest(path)
+    fields = sidecar(path)
+    assert (fields["status"], fields["verdict"]) == ("interrupted", "reject")
+    assert fields["sha256"] == verify_file(path).sha256 == digest(path)
     assert list((seen.folder / "trials").iterdir()) == []
 
 

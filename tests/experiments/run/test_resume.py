@@ -79,8 +79,8 @@ def redone(tmp_path_factory, recorded):
 def test_a_killed_session_is_resumed_and_completed(resumed):
     assert (resumed.done.code, resumed.done.err) == (0, "")
     assert kept_and_sound(resumed.folder) == ["T01", "T02"]
-    facts = json.loads((resumed.folder / "session.json").read_text())
-    assert (facts["phase"], facts["kept"]) == ("complete", ["T01", "T02"])
+    fields = json.loads((resumed.folder / "session.json").read_text())
+    assert (fields["phase"], fields["kept"]) == ("complete", ["T01", "T02"])
 
 
 def test_a_session_does_not_name_itself_as_open_elsewhere(resumed):
@@ -107,10 +107,10 @@ def test_what_was_recorded_before_the_kill_is_in_rejected(resumed):
     assert not verified.is_complete
     # a second before the trigger, then until the kill less half a second at most
     assert verified.duration > 1.0 + 1.0 - 0.5
-    facts = sidecar(path)
-    assert facts["sha256"] == verified.sha256
-    assert (facts["verdict"], facts["who"]) == ("reject", "traction")
-    assert facts["reason"] == "the session ended without closing"
+    fields = sidecar(path)
+    assert fields["sha256"] == verified.sha256
+    assert (fields["verdict"], fields["who"]) == ("reject", "traction")
+    assert fields["reason"] == "the session ended without closing"
     assert path.with_suffix(".partial").exists()
     assert not list((resumed.folder / "trials").glob("*.partial"))
 
@@ -147,9 +147,9 @@ def test_a_redo_records_one_trial_and_puts_the_old_one_aside(redone):
 
 
 def test_a_redo_keeps_the_history_of_the_old_trial(redone):
-    facts = sidecar(redone.folder / "rejected" / "T01a.mcap")
-    assert (facts["verdict"], facts["reason"]) == ("reject", "redone")
-    assert [entry["verdict"] for entry in facts["history"]] == ["keep"]
+    fields = sidecar(redone.folder / "rejected" / "T01a.mcap")
+    assert (fields["verdict"], fields["reason"]) == ("reject", "redone")
+    assert [entry["verdict"] for entry in fields["history"]] == ["keep"]
     redo = next(e for e in journal(redone.folder) if e["event"] == "redo-started")
     assert (redo["trial"], redo["reason"]) == (1, "bed was wet")
 

@@ -82,9 +82,9 @@ def test_a_velocity_warning_is_recorded_and_the_trial_is_kept(config, tmp_path):
 
 
 def test_a_trial_says_how_the_pucks_felt_when_it_began(first_trial):
-    facts = TrialReader(first_trial).metadata["provenance"]
-    assert facts["pucks:temperature_degc"] == "35 35 35 35 35 35 35"
-    assert facts["pucks:error"] == "0 0 0 0 0 0 0"
+    fields = TrialReader(first_trial).metadata["provenance"]
+    assert fields["pucks:temperature_degc"] == "35 35 35 35 35 35 35"
+    assert fields["pucks:error"] == "0 0 0 0 0 0 0"
 
 
 def test_slips_of_a_usual_trial_neither_warn_nor_fault(first_trial):

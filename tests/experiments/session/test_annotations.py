@@ -55,13 +55,13 @@ def test_a_rejected_trial_moves_with_reason_author_and_history(copied):
     assert (done.code, done.err) == (0, "")
     assert done.out == "rejected/T01a: reject. S001 has 1 of 2 kept.\n"
     path = copied.folder / "rejected" / "T01a.mcap"
-    facts = sidecar(path)
-    assert digest(path) == before == facts["sha256"]
-    assert (facts["verdict"], facts["reason"], facts["who"]) == (
+    fields = sidecar(path)
+    assert digest(path) == before == fields["sha256"]
+    assert (fields["verdict"], fields["reason"], fields["who"]) == (
         *("reject", "foot tilted", "mk"),
     )
-    assert facts["when"].endswith("Z")
-    (old,) = facts["history"]
+    assert fields["when"].endswith("Z")
+    (old,) = fields["history"]
     assert (old["verdict"], old["who"]) == ("keep", "auto")
     assert kept_and_sound(copied.folder) == ["T02"]
     assert replay(journal(copied.folder)).phase == "unfinished"
@@ -76,8 +76,8 @@ def test_a_trial_that_is_kept_again_is_the_same_file_with_a_longer_history(copie
     assert digest(path) == before
     assert [old["verdict"] for old in sidecar(path)["history"]] == ["keep", "reject"]
     assert list((copied.folder / "rejected").iterdir()) == []
-    facts = json.loads((copied.folder / "session.json").read_text())
-    assert (facts["phase"], facts["rejected"]) == ("complete", 0)
+    fields = json.loads((copied.folder / "session.json").read_text())
+    assert (fields["phase"], fields["rejected"]) == ("complete", 0)
 
 
 def test_a_trial_whose_file_has_changed_is_not_kept(copied):

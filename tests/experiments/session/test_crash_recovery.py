@@ -76,16 +76,16 @@ def make_session(data):
 
 
 def record(book, number, attempt, verdict):
-    facts = {"trial": number, "attempt": attempt}
-    book.append(Event.TRIAL_STARTED, **facts)
+    fields = {"trial": number, "attempt": attempt}
+    book.append(Event.TRIAL_STARTED, **fields)
     path = book.folder.trials / f"T{number:02d}.mcap"
     path.write_bytes(f"{number}.{attempt}".encode())
     path.with_suffix(".truth.mcap").write_bytes(f"truth {number}.{attempt}".encode())
     name = f"T{number:02d}"
     sidecar = {"trial": name, "attempt": attempt, "sha256": sha256_of(path)}
     write_json(path.with_suffix(".json"), sidecar)
-    book.append(Event.TRIAL_RECORDED, **facts)
-    book.append(verdict, **facts, reason="", who="mk")
+    book.append(Event.TRIAL_RECORDED, **fields)
+    book.append(verdict, **fields, reason="", who="mk")
 
 
 def contents(folder):
@@ -115,12 +115,12 @@ def kill_in_verdict(data, monkeypatch, step, verdict):
     """Kill a process that gives a verdict on T01, settle; return if it was killed."""
     book = make_session(data)
     before = set(contents(book.folder))
-    facts = {"trial": 1, "verdict": "reject", "attempt": 2, "reason": "", "who": "mk"}
+    fields = {"trial": 1, "verdict": "reject", "attempt": 2, "reason": "", "who": "mk"}
     if verdict == "keep":  # the other attempt at the same number
-        book.append(Event.VERDICT, **facts)
-        facts |= {"verdict": "keep", "attempt": 1}
+        book.append(Event.VERDICT, **fields)
+        fields |= {"verdict": "keep", "attempt": 1}
     with killed_at(step, monkeypatch) as was_killed:
-        book.append(Event.VERDICT, **facts)
+        book.append(Event.VERDICT, **fields)
     recover_session(open_journal(book.folder, Now()))
     check_agreement(book.folder)
     assert set(contents(book.folder)) == before
@@ -185,8 +185,8 @@ def test_a_sealed_trial_without_a_verdict_is_put_away_whole(crashed):
     sidecar = {"trial": "T01", "attempt": 1, "displacement": 0.4, "verdict": ""}
     write_json(path.with_suffix(".json"), sidecar)
     recover_session(crashed)
-    facts = read_json(crashed.folder.rejected / "T01a.json")
-    assert (facts["displacement"], facts["verdict"]) == (0.4, "reject")
+    fields = read_json(crashed.folder.rejected / "T01a.json")
+    assert (fields["displacement"], fields["verdict"]) == (0.4, "reject")
     assert (crashed.folder.rejected / "T01a.mcap").read_bytes() == b"1.1"
 
 

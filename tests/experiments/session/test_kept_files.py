@@ -36,8 +36,8 @@ def files(data):
 def test_the_journal_has_checksum_and_size_of_every_kept_trial(recorded):
     kept = [e for e in journal(recorded.folder) if e["event"] == "trial-kept"]
     trials = recorded.folder / "trials"
-    facts = [sidecar(trials / f"T0{event['trial']}.mcap") for event in kept]
-    wanted = [(fact["sha256"], fact["size"]) for fact in facts]
+    fields = [sidecar(trials / f"T0{event['trial']}.mcap") for event in kept]
+    wanted = [(fact["sha256"], fact["size"]) for fact in fields]
     assert [(event["sha256"], event["size"]) for event in kept] == wanted
 
 
@@ -61,8 +61,8 @@ def test_missing_and_changed_files_are_named(spoiled):
 def test_a_trial_changed_together_with_its_sidecar_is_found(data):
     path = only_session(data) / "trials" / "T01.mcap"
     cut(path)
-    facts = sidecar(path) | {"sha256": digest(path)}
-    path.with_suffix(".json").write_text(json.dumps(facts))
+    fields = sidecar(path) | {"sha256": digest(path)}
+    path.with_suffix(".json").write_text(json.dumps(fields))
     assert files(data) == {"trials/T01.json", "trials/T01.mcap"}
 
 

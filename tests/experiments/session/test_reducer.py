@@ -13,8 +13,8 @@ END = {"event": "session-ended", "reason": "unfinished"}
 BEGIN = (START, ACTIVE)
 
 
-def event(name, trial=None, **facts):
-    given = {"event": name, **facts}
+def event(name, trial=None, **fields):
+    given = {"event": name, **fields}
     return given if trial is None else {**given, "trial": trial}
 
 

@@ -68,23 +68,23 @@ def test_the_settings_of_a_session_are_kept_word_for_word(recorded, config):
 
 def test_the_journal_replays_to_what_session_json_says(recorded):
     state = replay(journal(recorded.folder))
-    facts = json.loads((recorded.folder / "session.json").read_text())
+    fields = json.loads((recorded.folder / "session.json").read_text())
     assert (
-        facts["kept"] == [f"T{number:02d}" for number in state.kept] == ["T01", "T02"]
+        fields["kept"] == [f"T{number:02d}" for number in state.kept] == ["T01", "T02"]
     )
-    assert (facts["terrain"], facts["trials"]) == (state.terrain, state.wanted)
-    assert (facts["rejected"], facts["ended"]) == (state.rejected, state.ended)
+    assert (fields["terrain"], fields["trials"]) == (state.terrain, state.wanted)
+    assert (fields["rejected"], fields["ended"]) == (state.rejected, state.ended)
     assert state.ended == "complete"
 
 
 def test_a_sidecar_has_verdict_checksum_and_author(recorded):
     for name in ("T01", "T02"):
         path = recorded.folder / "trials" / f"{name}.mcap"
-        facts = sidecar(path)
-        assert facts["sha256"] == digest(path)
-        assert facts["size"] == path.stat().st_size
-        assert (facts["verdict"], facts["status"]) == ("keep", "complete")
-        assert (facts["who"], facts["stop_reason"]) == ("auto", "travel")
+        fields = sidecar(path)
+        assert fields["sha256"] == digest(path)
+        assert fields["size"] == path.stat().st_size
+        assert (fields["verdict"], fields["status"]) == ("keep", "complete")
+        assert (fields["who"], fields["stop_reason"]) == ("auto", "travel")
 
 
 def test_trial_files_are_read_only(recorded):
@@ -103,10 +103,10 @@ def test_the_loop_ran_at_500_hz_without_a_gap(cycles):
 
 
 def test_a_trial_reaches_from_the_pre_roll_to_the_end_of_travel(cycles, first_trial):
-    facts = sidecar(first_trial)
+    fields = sidecar(first_trial)
     lasted = len(cycles.data) / 500
-    assert lasted == pytest.approx(facts["duration"], abs=0.003)  # one period
-    assert facts["displacement"] > TRAVEL
+    assert lasted == pytest.approx(fields["duration"], abs=0.003)  # one period
+    assert fields["displacement"] > TRAVEL
 
 
 def test_every_cycle_is_marked_as_simulated_active_and_fresh(cycles):

@@ -103,8 +103,8 @@ def test_a_moved_trial_never_replaces_another(tmp_path):
 def test_a_damaged_json_file_reads_as_empty(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "damaged.json"
     path.write_bytes(content)
-    facts = read_json(path)
-    assert facts == {} or json.loads(content) == facts
+    fields = read_json(path)
+    assert fields == {} or json.loads(content) == fields
 
 
 def test_a_data_folder_below_a_file_is_refused(tmp_path):

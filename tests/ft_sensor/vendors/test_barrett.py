@@ -258,11 +258,11 @@ def test_a_sensor_opened_first_is_woken_and_left_alone_while_it_boots():
 
 
 def test_an_opened_sensor_says_who_it_is():
-    facts = Bench().started().sensor.describe()
-    assert facts["model"] == "Barrett force/torque sensor, node 8"
-    assert facts["serial_number"] == "1008"
-    assert facts["role"] == "ROLE 0x0006"
-    assert facts["measured_rate"] == "20 of 20 questions answered"
+    fields = Bench().started().sensor.describe()
+    assert fields["model"] == "Barrett force/torque sensor, node 8"
+    assert fields["serial_number"] == "1008"
+    assert fields["role"] == "ROLE 0x0006"
+    assert fields["measured_rate"] == "20 of 20 questions answered"
 
 
 def test_opening_sends_no_tare():

@@ -56,8 +56,8 @@ def test_every_sensor_tells_who_it_is_and_what_became_of_its_samples(any_bench):
     told = any_bench.sensor.describe()
     assert {"model", "serial_number", "firmware", "measured_rate", "time"} <= set(told)
     assert min(map(float, told["ranges"].split())) > 0
-    facts = any_bench.sensor.stream_facts()
-    assert any(int(count) > 0 for count in facts.values())
+    fields = any_bench.sensor.stream_metadata()
+    assert any(int(count) > 0 for count in fields.values())
 
 
 def test_every_sensor_can_be_closed_twice(any_bench):

@@ -59,8 +59,8 @@ def test_missing_replies_are_counted_for_each_puck(bench):
     readings = [bench.cycle() for _ in range(5)]
     assert bench.arm.counters.missing == [0, 3, 0, 0, 0, 0, 1]
     assert [r.missing_cycles for r in readings] == [1, 2, 3, 0, 0]
-    facts = bench.arm.counters.facts()
-    assert facts["link:missing_replies"] == "0 3 0 0 0 0 1"
+    fields = bench.arm.counters.metadata()
+    assert fields["link:missing_replies"] == "0 3 0 0 0 0 1"
     assert "link:missing_replies 0 3 0 0 0 0 1" in bench.arm.counters.text()
 
 

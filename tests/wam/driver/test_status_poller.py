@@ -10,7 +10,7 @@ from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_set
 from wam.driver.arm import WamArm
-from wam.driver.health import PuckHealth, complaints, health_facts, temperature_range
+from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
 
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000
@@ -175,9 +175,9 @@ def test_a_puck_that_falls_silent_is_shown_with_the_age_of_what_it_said(bench):
     now_ns, pucks = bench.rig.clock.t_ns, bench.arm.health()
     assert (pucks[2].puck_degc, pucks[2].is_news(now_ns)) == (35, False)
     assert temperature_range(pucks, now_ns) == "33-35 °C, puck 3 silent for 4 s"
-    facts = health_facts(pucks, now_ns)
-    assert facts["pucks:temperature_degc"] == "35 35 ? 35 35 35 35"
-    assert float(facts["pucks:age_s"].split()[2]) > 3.0
+    fields = health_metadata(pucks, now_ns)
+    assert fields["pucks:temperature_degc"] == "35 35 ? 35 35 35 35"
+    assert float(fields["pucks:age_s"].split()[2]) > 3.0
 
 
 def test_a_puck_that_is_hot_or_reports_an_error_is_named():
@@ -189,7 +189,7 @@ def test_a_puck_that_is_hot_or_reports_an_error_is_named():
 
 def test_health_is_text_in_the_order_of_the_pucks():
     pucks = [PuckHealth(31, 29, 48, 0, S), PuckHealth(-5, None, 47, 3, 2 * S)]
-    assert health_facts(pucks, 2 * S) == {
+    assert health_metadata(pucks, 2 * S) == {
         "pucks:age_s": "1.0 0.0",
         "pucks:temperature_degc": "31 -5",
         "pucks:motor_temperature_degc": "29 ?",
