@@ -5,6 +5,7 @@ packages (`__init__.pyi`), so that a surface hides no dependency from these numb
 """
 
 import ast
+import re
 import sys
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping
@@ -188,8 +189,8 @@ def cycles() -> list[str]:
     return []
 
 
-def serving_one() -> list[str]:
-    """Return modules that exactly one other module imports."""
+def serving_one(apart: tuple[str, ...] = ENTRIES) -> list[str]:
+    """Return modules that exactly one other module imports, those `apart` left out."""
     users: Imports = defaultdict(set)
     for module, targets in dependencies().items():
         for target in targets:
@@ -197,7 +198,7 @@ def serving_one() -> list[str]:
     return [
         f"{module} <- {next(iter(used))}"
         for module, used in sorted(users.items())
-        if len(used) == 1 and not is_package(module) and not module.startswith(ENTRIES)
+        if len(used) == 1 and not is_package(module) and not module.startswith(apart)
     ]
 
 
@@ -270,6 +271,38 @@ def undocumented() -> list[str]:
     ]
 
 
+def stale_docstrings() -> list[str]:
+    """Return names that an `Attributes:` or `Args:` section keeps and the code lost."""
+    return [
+        f"{module}.{node.name}: {name}"
+        for module, path in sources().items()
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.ClassDef | ast.FunctionDef)
+        for name in sorted(documented_names(node) - defined_names(node))
+    ]
+
+
+def documented_names(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return the names that begin an entry of the docstring's sections."""
+    docstring = ast.get_docstring(node) or ""
+    sections = re.findall(
+        r"^(?:Attributes|Args):\n((?:    .*\n?|\n)*)", docstring, re.M
+    )
+    entries = re.findall(r"^    ([\w*, ]+):(?: |$)", "".join(sections), re.M)
+    return {name.strip(" *") for entry in entries for name in entry.split(",")}
+
+
+def defined_names(node: ast.ClassDef | ast.FunctionDef) -> set[str]:
+    """Return every attribute, method and parameter that `node` defines."""
+    inner = list(ast.walk(node))
+    return {
+        *(n.arg for n in inner if isinstance(n, ast.arg)),
+        *(n.id for n in inner if isinstance(n, ast.Name)),
+        *(n.attr for n in inner if isinstance(n, ast.Attribute)),
+        *(n.name for n in inner if isinstance(n, ast.FunctionDef)),
+    }
+
+
 def measures() -> list[Measure]:
     """Return everything that is measured, in the order of the table."""
     folders = modules_per_folder()
@@ -291,6 +324,7 @@ def measures() -> list[Measure]:
         listed("private accesses in tests", private_accesses()),
         listed("modules, classes, functions too large", oversized()),
         listed("packages without a page of docstring", undocumented()),
+        listed("documented names that are gone", stale_docstrings()),
     ]
 
 
@@ -305,6 +339,8 @@ def main() -> int:
         if is_long or not measure.is_met:
             for place in measure.where:
                 print(f"      {place}")  # noqa: T201
+    everything = len(serving_one(()))
+    print(f"  modules for one other, entries of tables counted: {everything}")  # noqa: T201
     return int(not all(measure.is_met for measure in measures()))
 
 

@@ -95,7 +95,7 @@ class SharedLayout:
         status: state of the loop, newest value.
         recorder: state of the recorder, newest value.
         health: what the pucks said about themselves, newest value.
-        beats: who is alive.
+        heartbeats: who is alive.
     """
 
     def __init__(self, memory: SharedMemory) -> None:

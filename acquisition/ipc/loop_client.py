@@ -30,8 +30,8 @@ class LoopClient:
     """What the console has of the loop, wherever it runs.
 
     Attributes:
-        passing: how time passes.
-        on_pass: called after every 20 ms that pass.
+        advance_cycles: lets a number of cycles pass.
+        on_tick: called after every 20 ms that pass.
     """
 
     def __init__(

@@ -64,14 +64,13 @@ class LoopServer:
 
     Attributes:
         is_over: the loop is to end after this cycle.
-        is_orphaned: the console's process has died; set from a signal handler.
     """
 
     def __init__(
         self, cycle: Cycle, arm: Arm, shared: SharedLayout, hooks: LoopHooks
     ) -> None:
         self.is_over = False
-        self.is_orphaned = False
+        self._is_orphaned = False
         self.stats = LoopStats()
         self._cycle = cycle
         self._arm = arm
@@ -118,6 +117,10 @@ class LoopServer:
     def _publish_metadata(self) -> None:
         self._shared.health.write(json.dumps(dict(self._hooks.metadata())).encode())
 
+    def orphan(self) -> None:
+        """The console's process has died: hold, brake and end by itself."""
+        self._is_orphaned = True
+
     def _watch(self, now_ns: int) -> None:
         """Stop the arm when those who look after it have gone."""
         heartbeats = self._shared.heartbeats
@@ -131,7 +134,7 @@ class LoopServer:
             and now_ns - heartbeats.last_ns(_RECORDER) > SILENT_NS
         ):
             self._cycle.report(verdict_for(Fault.RECORDER_SILENT))
-        if self.is_orphaned:
+        if self._is_orphaned:
             self._brake_alone(now_ns)
 
     def _brake_alone(self, now_ns: int) -> None:

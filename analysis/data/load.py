@@ -94,7 +94,7 @@ class RecordedTrial:
 
         Args:
             frame: "terrain" projects on the plane of the container, "sole" on the sole
-                as it was tilted in each cycle: the normal is against joint 7's axis,
+                with its tilt of each cycle; the normal is against joint 7's axis,
                 slip is along what x_T leaves in the sole.
         """
         v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T

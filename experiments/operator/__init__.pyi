@@ -1,7 +1,13 @@
 from .console import BAD, GOOD, WARNING, Console
-from .double_tap import FootKeys
 from .feedback import FeedbackSignal, OperatorFeedback, build_feedback
-from .keys import NOTE_KEYS, REJECT_REASONS, KeyAction, key_action, screen_keys
+from .keys import (
+    NOTE_KEYS,
+    REJECT_REASONS,
+    FootKeys,
+    KeyAction,
+    key_action,
+    screen_keys,
+)
 from .prompts import OperatorInput, Prompt, PromptState
 from .screens import (
     EndView,

@@ -1,10 +1,11 @@
 from .conditions import (
     check_conditions,
+    confirm_foot,
+    last_foot,
     rig_conditions,
     sensor_conditions,
     write_conditions,
 )
-from .foot_check import confirm_foot, last_foot
 from .host_checks import free_bytes
 from .preflight import LOOP_TEST, Preflight, connect_rig, run_preflight, start_devices
 

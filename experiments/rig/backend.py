@@ -1,12 +1,18 @@
 """The seam between the console and the devices, in this process or in others."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from acquisition import PERIOD_NS, Clock, SafetyMode
-from acquisition.control_loop import Grant
-from acquisition.ipc import LoopClient
-from acquisition.recording import TrialRecording
+import numpy as np
+
+from acquisition import PERIOD_NS, Clock, SafetyMode, WrenchSensor
+from acquisition.control_loop import Grant, Loop
+from acquisition.ipc import LoopClient, SharedLayout
+from acquisition.recording import Recorder, TrialRecording
+from experiments.rig.build import LoopConfig, build_loop_server
+from experiments.rig.claim import release
+from wam.bus import CanLink
 from wam.driver import ArmInfo, WamArm
 
 EXCHANGE_CYCLES = 100
@@ -94,3 +100,114 @@ def measure_exchange(arm: WamArm, clock: Clock) -> list[int]:
             times.append(reading.arm_ns - reading.host_ns)
         next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
     return times
+
+
+_GATHERED = 130  # cycles that the recorder in this thread writes at once, 0.26 s
+
+
+class InlineAdvance:
+    """Loop and recorder in this thread: nothing runs unless the console waits.
+
+    The recorder drains as often as it would flush anyway: a process of its own drains
+    every 20 ms, but here one long piece of work costs half of many short ones, and it
+    is the simulation that waits for it.
+    """
+
+    def __init__(self, loop: Loop, recorder: Recorder) -> None:
+        self._loop = loop
+        self._recorder = recorder
+        self._passed = 0
+
+    def __call__(self, cycles: int) -> None:
+        """Run the loop for `cycles` periods; drain the recorder when it is time."""
+        self._loop.run(cycles)
+        self._passed += cycles
+        if self._passed >= _GATHERED:
+            self._passed = 0
+            self._recorder.drain()
+        if self._recorder.failure is not None:
+            raise self._recorder.failure
+
+
+class InProcessBackend:
+    """Arm, sensor, loop and recorder in this thread, on any clock."""
+
+    def __init__(
+        self,
+        shared: SharedLayout,
+        clock: Clock,
+        devices: tuple[WamArm, CanLink],
+        open_sensor: Callable[[], WrenchSensor],
+        parts: Callable[[WrenchSensor], LoopConfig],
+    ) -> None:
+        self.arm, self._link = devices
+        self._shared = shared
+        self._clock = clock
+        self._open_sensor = open_sensor
+        self._parts = parts
+        self._sensor: WrenchSensor | None = None
+        self.recorder = Recorder(shared, clock)
+        self._advance_loop: InlineAdvance | None = None  # once the loop runs
+        self.loop_client = LoopClient(shared, clock, self._advance)
+
+    @property
+    def recorder_pid(self) -> int:
+        """Number of this process, which writes the trials too."""
+        return os.getpid()
+
+    def start_arm(self) -> ArmInfo:
+        """Find, wake and question the arm; raises as `WamArm.start`."""
+        return self.arm.start()
+
+    def measure_exchange(self) -> list[int]:
+        """Ask 100 times for the positions, without torque."""
+        return measure_exchange(self.arm, self._clock)
+
+    def open_sensor(self) -> dict[str, str]:
+        """Open the wrist sensor; return what it says about itself."""
+        self._sensor = self._open_sensor()
+        return self._sensor.describe()
+
+    def sensor_metadata(self) -> dict[str, str]:
+        """Return what became of the sensor's samples since it was opened, as text."""
+        return self._sensor.stream_metadata() if self._sensor is not None else {}
+
+    def define_position(self, q: Sequence[float]) -> None:
+        """Tell the arm that its joints stand at `q` [rad]; see `WamArm`."""
+        self.arm.define_position(np.array(q))
+
+    def begin(self) -> None:
+        """Let the loop run from here on, whenever the console waits."""
+        if self._sensor is None:
+            raise RuntimeError("the sensor was not opened")
+        loop_server = build_loop_server(self._parts(self._sensor))
+        loop = Loop(loop_server, self._clock, stats=loop_server.stats)
+        self._advance_loop = InlineAdvance(loop, self.recorder)
+        self.loop_client.beat()
+
+    def grants(self) -> dict[str, list[Grant]]:
+        """Return nothing: this thread asks for nothing."""
+        return {}
+
+    def idle(self) -> bool:
+        """Brake the arm; return whether that is confirmed."""
+        return self.arm.idle()
+
+    def safety_mode(self) -> SafetyMode:
+        """Return what the safety module said last."""
+        return self.arm.safety_mode()
+
+    def close(self) -> None:
+        """Brake the arm if it got torques, give bus and port back; safe to repeat."""
+        self.recorder.abandon()
+        release(self.arm, self._link)
+        if self._sensor is not None:
+            self._sensor.close()
+            self._sensor = None
+        self._shared.close()
+
+    def _advance(self, cycles: int) -> None:
+        """Let `cycles` periods of the loop pass."""
+        if self._advance_loop is None:
+            raise RuntimeError("the loop does not run yet")
+        self._advance_loop(cycles)

@@ -142,7 +142,7 @@ class LoopConfig:
         law_model: the arm as the control law weighs it.
         arm: driver of the arm.
         sensor: the wrist sensor as the loop polls it.
-        board: the shared memory.
+        shared: the memory that the processes share.
         clock: the loop's time.
         is_simulated: the devices are simulated.
         ring: rings a bell for a person.

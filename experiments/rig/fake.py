@@ -13,7 +13,7 @@ from acquisition import (
     WrenchSensor,
 )
 from acquisition.ipc import SharedLayout
-from experiments.rig.backend import RigBackend
+from experiments.rig.backend import InProcessBackend, RigBackend
 from experiments.rig.build import (
     LoopConfig,
     build_arm,
@@ -23,7 +23,6 @@ from experiments.rig.build import (
     open_bus_sensor,
     terrain_frame,
 )
-from experiments.rig.inline import InProcessBackend
 from experiments.settings import RigSettings, Settings, TerrainRow
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor

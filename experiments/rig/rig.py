@@ -48,8 +48,8 @@ class Rig:
 
     Attributes:
         clock: the console's time.
-        crew: who works the rig.
-        board: the memory they share.
+        backend: whoever serves bus, sensor and loop.
+        shared: the memory that the processes share.
         model: the arm with its tool.
         payload: what the sensor carries, not tared.
         tared: the same with the bias of the newest tare.
@@ -57,7 +57,7 @@ class Rig:
         row: row of the matrix.
         settings: all settings.
         gravity_text: the gravity calibration in use; empty for none.
-        rehearsal: handle of the simulation; None on the real rig.
+        simulation: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """
 

@@ -183,7 +183,8 @@ class ControlWorker:
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
-                loop_server.is_orphaned = self._is_orphaned
+                if self._is_orphaned:
+                    loop_server.orphan()
                 loop.step()
         finally:
             arm = self._opened()

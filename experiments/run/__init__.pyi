@@ -1,7 +1,14 @@
 from .activation import activate
 from .console_loop import TICK, ConsoleLoop
-from .resume import ResumeRequest, close, redo, resume_request, resume_session
-from .resume_prompt import ResumeChoice, choose_resume
+from .resume import (
+    ResumeChoice,
+    ResumeRequest,
+    choose_resume,
+    close,
+    redo,
+    resume_request,
+    resume_session,
+)
 from .session import OpenMode, SessionRequest, run_session
 from .stop import ArmFaultError, StopFlag, StopRequestedError, handle_signals
 

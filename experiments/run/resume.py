@@ -1,8 +1,9 @@
 """Sessions on the disk that are opened again: resumed, redone, or closed."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,16 @@ from pydantic import TypeAdapter, ValidationError
 from acquisition import SessionError, SettingsError, SystemClock
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
-from experiments.operator import WARNING, Console, choose_operator
+from experiments.operator import (
+    WARNING,
+    Console,
+    KeyAction,
+    OperatorInput,
+    Prompt,
+    TerminalInput,
+    choose_operator,
+    wait_for_key,
+)
 from experiments.rig import FakeOptions
 from experiments.run.session import OpenMode, SessionRequest, run_session
 from experiments.session import (
@@ -19,6 +29,7 @@ from experiments.session import (
     Journal,
     SessionFolder,
     SessionPhase,
+    UnfinishedSession,
     check_kept,
     open_journal,
     recover_session,
@@ -26,6 +37,66 @@ from experiments.session import (
     session_lock,
 )
 from experiments.settings import load_settings
+
+
+class ResumeChoice(Enum):
+    """What becomes of an unfinished session."""
+
+    RESUME = "resume"
+    CLOSE = "close"
+
+
+_CHOICES = {
+    KeyAction.RESUME: ResumeChoice.RESUME,
+    KeyAction.CLOSE: ResumeChoice.CLOSE,
+}
+
+
+def choose_resume(
+    sessions: Sequence[UnfinishedSession],
+    terrain: str,
+    data: str,
+    operator: OperatorInput,
+    console: Console,
+) -> ResumeChoice:
+    """Ask what becomes of the newest unfinished session.
+
+    Args:
+        sessions: the unfinished sessions, oldest first, at least one.
+        terrain: the requested one.
+        data: option of a command that names the data folder, "" for none.
+        operator: who answers.
+        console: where it is asked.
+
+    Raises:
+        SessionError: nobody is there to ask, or the answer was [q]uit.
+    """
+    newest = sessions[-1]
+    text = _question(newest, terrain)
+    if not isinstance(operator, TerminalInput):
+        raise SessionError(
+            " ".join([text, *(other.text() for other in sessions[:-1])]),
+            hint=f"To go on: traction resume {newest.folder.id}{data}   To close what "
+            "is unfinished: the same command with --new. Nothing was started.",
+        )
+    name = "crash" if newest.is_crashed else "unfinished"
+    name = "mismatch" if newest.folder.terrain != terrain else name
+    details = {**newest.metadata(), "asked": terrain}
+    console.say(f"{WARNING} {text} {CATALOGUE[name].do.format_map(details)}  [q]uit")
+    action = wait_for_key(operator, Prompt.CHOICE)
+    if action is KeyAction.QUIT:
+        raise SessionError(text, hint="Nothing was started.")
+    return _CHOICES[action]
+
+
+def _question(newest: UnfinishedSession, terrain: str) -> str:
+    """Return which session is unfinished, with the terrains where they differ."""
+    if newest.folder.terrain == terrain:
+        return newest.text()
+    details = {**newest.metadata(), "asked": terrain}
+    mismatch = CATALOGUE["mismatch"].what.format_map(details)
+    return f"{newest.text()} {mismatch}" if newest.is_crashed else mismatch
+
 
 _FAKE = TypeAdapter(FakeOptions)
 _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)

@@ -1,5 +1,4 @@
-from .adapter import CanPort
-from .hub import Frame, SocketHub
+from .hub import CanPort, Frame, SocketHub
 from .in_process import FakeCanBus
 
 __all__ = [

@@ -75,7 +75,7 @@ class RigServer:
         self._hub = SocketHub(folder / "can")
         now_ns = self._clock.now_ns()
         self._pty = SerialPty(self._rig.stream, now_ns, folder / "sensor")
-        rig.cable = PtyCable(self._pty, clock)
+        rig.lay_cable(PtyCable(self._pty, clock))
         self._can_path = folder / "can"
         self._server = RpcServer(
             bind(SimulationControl, simulation),

@@ -109,9 +109,6 @@ class FakeRig:
     """Simulated devices joined by one plant; a World for the stepped clock.
 
     The wrist sensor is on a serial port, or on the bus where `network` has one.
-
-    Attributes:
-        cable: of the serial sensor, while its port is open; None before.
     """
 
     def __init__(
@@ -143,12 +140,16 @@ class FakeRig:
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
         self._port: FakeSerialPort | None = None
-        self.cable: Cable | None = None
+        self._cable: Cable | None = None
 
     def open_port(self) -> FakeSerialPort:
         """Return the sensor's serial port, opened now."""
-        self.cable = self._port = FakeSerialPort(self.stream, self._clock)
+        self._cable = self._port = FakeSerialPort(self.stream, self._clock)
         return self._port
+
+    def lay_cable(self, cable: Cable) -> None:
+        """Use `cable` for the serial sensor, as a port that others have opened."""
+        self._cable = cable
 
     def advance(self, t_ns: int) -> None:
         """Let every device go on to `t_ns`."""
@@ -178,8 +179,8 @@ class FakeRig:
     def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
         self.stream.recover()
-        if self.cable is not None:
-            self.cable.plug_in()
+        if self._cable is not None:
+            self._cable.plug_in()
         self._body.clear_faults()
         self.network.silence(SENSOR_NODE, is_mute=False)
         clear_network_faults(self.network)
@@ -192,8 +193,8 @@ class FakeRig:
 
     def _unplug(self) -> None:
         """Pull the sensor's cable; a port that is not open yet will bring nothing."""
-        if self.cable is not None:
-            self.cable.unplug()
+        if self._cable is not None:
+            self._cable.unplug()
         else:
             self.stream.go_silent()
 

@@ -9,7 +9,7 @@ from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.ipc.loop_server import LoopServer
 from experiments.rig import build, fake
-from experiments.rig.inline import InProcessBackend
+from experiments.rig.backend import InProcessBackend
 from fakes.world.rig import FakeRig
 
 

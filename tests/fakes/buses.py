@@ -4,9 +4,8 @@ from itertools import count
 
 import can
 
-from fakes.bus.adapter import CanPort
 from fakes.bus.client import SocketBus
-from fakes.bus.hub import SocketHub
+from fakes.bus.hub import CanPort, SocketHub
 from fakes.pucks.network import PuckNetwork
 from fakes.serving.puck_server import PuckServer
 from tests.fakes.stepped import Motors, Rig, SteppedClock

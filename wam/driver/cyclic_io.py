@@ -87,9 +87,8 @@ class CycleTraffic:
         arm_ns: when the last of them arrived [ns], 0 = none did.
         sent: torques that the bus took last [puck units], motors 1 to 7.
         sent_ns: when it took them [ns], 0 = never.
-        watch: safety module and pucks, asked in the free bus time.
-        p_number: number of the property that holds a puck's position.
-        companion: asked right after the positions, while the pucks latch theirs.
+        poller: safety module and pucks, asked in the free bus time.
+        bus_device: asked right after the positions, while the pucks latch theirs.
         counters: what was dropped so far.
         is_down: the bus refused the last question for positions.
     """

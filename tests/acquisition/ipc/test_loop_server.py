@@ -151,7 +151,7 @@ def test_a_silent_recorder_stops_a_trial_only(loop):
 
 def test_an_orphaned_arm_holds_at_once_and_brakes_after_a_second(loop):
     loop.run(0.1)
-    loop.loop_server.is_orphaned = True
+    loop.loop_server.orphan()
     loop.run(0.002)
     assert loop.reasons() == {"console-lost"}
     loop.run(0.998)

@@ -21,7 +21,7 @@ from experiments.fault_injection.plan import FaultPlan
 from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.preflight import preflight
-from experiments.rig import inline as inline_crew
+from experiments.rig import backend as inline_crew
 from experiments.run import activation
 from experiments.run import tare as taring
 from experiments.session.lock import session_lock

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-from experiments.preflight.foot_check import last_foot
+from experiments.preflight.conditions import last_foot
 from tests.experiments.program import only_session, traction
 
 

@@ -5,7 +5,7 @@ import pytest
 from experiments.operator.console import Console
 from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.terminal import TerminalInput
-from experiments.run.resume_prompt import ResumeChoice, choose_resume
+from experiments.run.resume import ResumeChoice, choose_resume
 from experiments.session.lock import session_lock
 from experiments.session.store import create_session
 from experiments.session.unfinished import find_unfinished

@@ -5,8 +5,7 @@ import pytest
 
 from fakes.sensor.bota import BotaOptions, bota_stream
 from fakes.sensor.errors import SensorErrors
-from fakes.sensor.stream import SensorStream
-from fakes.sensor.stream_faults import ByteFault, damage
+from fakes.sensor.stream import ByteFault, SensorStream, damage
 from ft_sensor.serial_line.framing import FrameScanner
 from ft_sensor.vendors.bota import (
     Acknowledgement,

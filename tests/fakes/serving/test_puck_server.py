@@ -6,7 +6,7 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from acquisition.errors import LinkError
-from fakes.bus.adapter import CanPort
+from fakes.bus.hub import CanPort
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.serving.puck_server import (

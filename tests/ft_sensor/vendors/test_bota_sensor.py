@@ -13,7 +13,7 @@ from acquisition.errors import (
 from fakes.sensor.bota import BotaOptions, bota_stream
 from fakes.sensor.errors import SensorErrors
 from fakes.sensor.port import FakeSerialPort
-from fakes.sensor.stream_faults import ByteFault
+from fakes.sensor.stream import ByteFault
 from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.sensor import SerialSensor
 from ft_sensor.vendors.bota import BotaStatus

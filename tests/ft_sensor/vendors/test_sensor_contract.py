@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import DeviceFaultError, LinkError, LinkTimeoutError
-from fakes.sensor.stream_faults import ByteFault
+from fakes.sensor.stream import ByteFault
 from ft_sensor.reading import axis_names, largest_traction
 from tests.ft_sensor.sensor_bench import LOAD, MAKES, MS, BusBench, SensorBench
 
