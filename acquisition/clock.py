@@ -27,7 +27,7 @@ class Readable(Protocol):
 
 
 class Clock(Protocol):
-    """Tells the time and waits; everything else is told the time."""
+    """The one source of time: reads it and waits for it."""
 
     def now_ns(self) -> int:
         """Return the monotonic time [ns]."""

@@ -122,7 +122,7 @@ class Arm(Protocol):
 
     @property
     def safety_heard_ns(self) -> int:
-        """Return when the safety circuit last told its state [ns], 0 = never."""
+        """Return when the safety circuit last reported its state [ns], 0 = never."""
         ...
 
     def safety_warnings(self) -> tuple[str, ...]:

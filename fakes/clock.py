@@ -9,7 +9,7 @@ EPOCH_UTC_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 
 
 class World(Protocol):
-    """Simulated devices that are driven by the time they are told."""
+    """Simulated devices that are driven by a given time."""
 
     def advance(self, t_ns: int) -> None:
         """Let everything happen that happens up to `t_ns`."""
@@ -35,7 +35,7 @@ class SteppedClock:
         self.lag_ns = 0
 
     def attach(self, world: World) -> None:
-        """Let `world` go on while somebody waits; it needs the clock to be made."""
+        """Let `world` go on while a caller waits; it needs the clock to be made."""
         self._world = world
 
     def now_ns(self) -> int:

@@ -12,7 +12,7 @@ MOST_ROWS = 60_000  # two minutes; a trial lasts half of one at most
 
 
 class Truth:
-    """What really happened, one row per cycle; terrain frame where not said.
+    """What really happened, one row per cycle; terrain frame unless stated.
 
     Columns: q [rad] 0-6, sole [m] 7-9, its velocity [m/s] 10-12, ground's force on the
     foot against x, along y, along z [N] 13-15, hand's force [N] 16-18.
@@ -26,7 +26,7 @@ class Truth:
         self._values: list[float] = []
 
     def add(self, t_ns: int, values: Sequence[float]) -> None:
-        """Append one row; one that nobody takes does not grow for ever."""
+        """Append one row; a record without a reader stays bounded."""
         if len(self.t_ns) >= MOST_ROWS:
             return
         self.t_ns.append(t_ns)

@@ -117,7 +117,7 @@ def check(
     """Return the next state and the most severe verdict of this cycle.
 
     Torques that are commanded are judged unless the brakes are confirmed since before:
-    a safety circuit of unknown state may drive the arm. E-stop is always told.
+    a safety circuit of unknown state may drive the arm. E-stop is always reported.
 
     Among equally severe ones: what takes the arm away (safety circuit, silence), then
     motion, then what only ends the trial (sensor, cadence).

@@ -116,7 +116,7 @@ class ControlStatus:
     Attributes:
         state: what the arm is doing.
         safety: what the safety circuit says.
-        verdict: the worst the guard has said since the last request; None = nothing.
+        verdict: the guard's worst verdict since the last request; None = nothing.
         ft_age_ns: age of the force sample [ns].
     """
 

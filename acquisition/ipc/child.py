@@ -173,7 +173,7 @@ def main(arguments: list[str]) -> None:
         settings = link.receive()
         run(ChildContext(SharedLayout(SharedMemory(int(shared))), link, settings))
     except ChannelClosedError:
-        return  # the console has gone; whoever has an arm has braked it
+        return  # the console has gone; the process with the arm has braked it
 
 
 def name_process(name: str) -> None:

@@ -94,7 +94,7 @@ class SharedLayout:
         commands: the console's commands to the loop.
         status: state of the loop, newest value.
         recorder: state of the recorder, newest value.
-        health: what the pucks said about themselves, newest value.
+        health: newest reports of the pucks.
         heartbeats: who is alive.
     """
 

@@ -55,7 +55,7 @@ class LoopClient:
         """State of the arm and the guard's verdict since the last request."""
         loop = self.loop
         if loop.obeyed < self._asked:
-            loop.control.verdict = None  # said before the loop heard of the request
+            loop.control.verdict = None  # given before the loop saw the request
         return loop.control
 
     @property
@@ -129,5 +129,5 @@ class LoopClient:
         return self._shared.timings.reader()
 
     def device_metadata(self) -> dict[str, str]:
-        """Return what the devices said last about themselves."""
+        """Return the newest metadata of the devices."""
         return json.loads(self._shared.health.read() or b"{}")

@@ -78,7 +78,7 @@ class TrialCopy:
                     record.data,
                 )
             case _:
-                pass  # a schema or channel that was said before
+                pass  # a schema or channel that is known already
 
     def finish(self, salvage: SoundRecords) -> None:
         """Write what was saved and lost, and the summary.

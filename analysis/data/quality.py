@@ -24,7 +24,7 @@ _LOAD_WORDS = (
 )
 # What people can do: the extremes come by themselves in slips and at lift-off.
 _AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
-JOINT7_WARNING = 0.020  # motion of the locked joint that a person is told of [rad]
+JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
 ENOUGH = 0.02  # share of the samples a cell should hold
 
 

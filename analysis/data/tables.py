@@ -30,7 +30,7 @@ _BROKEN_NPZ = (
     EOFError,
     MemoryError,
     RuntimeError,  # an encrypted member
-    NotImplementedError,  # a compression nobody knows
+    NotImplementedError,  # an unknown compression
     zipfile.BadZipFile,
     zlib.error,
 )

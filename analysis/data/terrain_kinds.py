@@ -2,8 +2,8 @@
 
 The size of the stones is a fact of the recording (`stones` in matrix.toml, `stone_size`
 in a trial's metadata) or is given with a table; it never follows from a terrain's name.
-Only where nothing is said do the eight names of the paper stand for their stones. Any
-other terrain of unknown stones is a kind of its own, under its own name.
+Only where nothing is recorded do the eight names of the paper stand for their stones.
+Any other terrain of unknown stones is a kind of its own, under its own name.
 """
 
 from collections.abc import Iterable, Mapping

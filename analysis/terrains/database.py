@@ -110,7 +110,7 @@ class KnownTerrain:
         What a walking controller asks before it puts its weight on: at a load F_n [N],
         is the traction that the step needs available? Velocities below the slowest one
         that was measured count as that; whether the load lies
-        outside the table is said by `predict(...).is_extrapolated`.
+        outside the table is marked by `predict(...).is_extrapolated`.
 
         Raises:
             SettingsError: a value is no finite number.

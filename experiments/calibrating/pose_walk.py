@@ -24,7 +24,7 @@ _HOLD = 0.2  # s between a stop and the brakes
 
 
 def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
-    """Do `work` and return the exit code; what goes wrong is said on the console.
+    """Do `work` and return the exit code; an error is shown on the console.
 
     Every way out leaves the arm idle: after a stop it holds first, or damps when the
     stop was asked for twice.
@@ -64,7 +64,8 @@ AcceptancePlan = Callable[[Array, float], Sequence[MeasurementPose]]
 class PoseWalk:
     """Moves the arm from halt to halt and knows where it was sent last.
 
-    At 0.5 rad/s and 0.3 m/s at most, after a person has said that the space is clear.
+    At 0.5 rad/s and 0.3 m/s at most, after the operator has confirmed that the space
+    is clear.
     """
 
     def __init__(self, console_loop: ConsoleLoop) -> None:
@@ -113,7 +114,7 @@ class PoseWalk:
         self._here = halt.q
 
     def end(self) -> None:
-        """Ask for support and idle the arm; nobody need hold it afterwards."""
+        """Ask for support and idle the arm; it needs no support afterwards."""
         self.ask("Support the arm, it goes idle. [space]", Prompt.SUPPORT)
         self.console_loop.make_safe()
 

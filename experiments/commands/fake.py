@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Serve until told to stop and return the exit code."""
+    """Serve until a signal ends it and return the exit code."""
     from acquisition import SystemClock
     from experiments.operator import Console
     from experiments.rig import build_server, open_bus_log
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
 def _serve_sensor(
     settings: Settings, line: tuple[Path, str] | None, console: Console
 ) -> int:
-    """Serve a sensor without an arm until told to stop."""
+    """Serve a sensor without an arm until a signal ends it."""
     from acquisition import SettingsError
     from experiments.rig import build_sensor_server
     from experiments.run import StopFlag, handle_signals

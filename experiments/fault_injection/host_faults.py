@@ -75,7 +75,7 @@ class HostFaults:
 
 @contextmanager
 def _occupied(path: Path) -> Generator[None]:
-    """Hold a lock of one's own: a lock belongs to whoever opened the file."""
+    """Hold a lock through a description of its own: a lock belongs to the open file."""
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)

@@ -1,4 +1,4 @@
-"""What is said to the person: the one place that prints."""
+"""Output to the operator: the one place that prints."""
 
 import io
 import os
@@ -19,7 +19,7 @@ class Console:
     """Prints lines, and below them a panel that changes, where there is a terminal.
 
     Attributes:
-        is_lost: nobody reads any more: the other end of the pipe was closed.
+        is_lost: the other end of the pipe was closed.
         is_live: there is a terminal that can show a panel.
     """
 
@@ -103,7 +103,7 @@ class Console:
             self._lose()
 
     def _lose(self) -> None:
-        """Remember that nobody reads any more; whatever is said goes nowhere."""
+        """Remember that the reader has gone; further output is dropped."""
         self.is_lost = True
         self._live = None
         _discard_output()

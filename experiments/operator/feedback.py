@@ -73,16 +73,16 @@ class SpeechOutput:
     _speaking: subprocess.Popen[bytes] | None = field(default=None)
 
     def say(self, words: str) -> None:
-        """Begin to say `words`; what is still being said is cut short.
+        """Begin to speak `words`; speech that is still going on is cut short.
 
-        A program that cannot be started is passed over: nobody stops for a voice.
+        A program that cannot be started is passed over: speech is a convenience.
         """
         self.close()
         with suppress(OSError):
             self._speaking = _start((self.program, words))
 
     def close(self) -> None:
-        """End what is being said; safe to repeat."""
+        """End the speech that is going on; safe to repeat."""
         speaking, self._speaking = self._speaking, None
         if speaking is not None:
             speaking.kill()

@@ -116,7 +116,7 @@ class ReadyView:
         kept: how many are.
         rejected: how many were not.
         elapsed: since the session was opened [s].
-        left: how long the missing ones will take [s]; None = nobody knows yet.
+        left: how long the missing ones will take [s]; None = not known yet.
         reset: what is to be done to the terrain before each trial.
         suggestion: of the next push; empty if there is none.
     """

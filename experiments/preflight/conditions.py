@@ -219,7 +219,7 @@ def confirm_foot(
     """Return the line about the foot for the page; ask when it has changed.
 
     Raises:
-        SessionError: nobody confirmed it.
+        SessionError: it was not confirmed.
     """
     if before is None or before.foot == row.foot:
         return CheckResult(GOOD, "foot", row.foot)

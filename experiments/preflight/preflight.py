@@ -39,7 +39,7 @@ SESSION_GB = 0.9
 
 @dataclass(frozen=True, slots=True)
 class Preflight:
-    """The page, and what the devices said about themselves."""
+    """The page of results, and the metadata of the devices."""
 
     checks: tuple[CheckResult, ...]
     devices: dict[str, str]
@@ -256,7 +256,7 @@ def check_disk(rig: Rig, data: Path, add: Add, probe: DiskProbe = free_bytes) ->
 def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
     """Return the refusal of an arm that cannot be reached, or answers wrongly.
 
-    A bus that is down is told in the catalogue's words, with the command that helps.
+    A bus that is down gets the catalogue's message, with the command that helps.
     """
     is_bus = isinstance(error, LinkError) and not isinstance(error, LinkTimeoutError)
     can = settings.can

@@ -107,7 +107,7 @@ def _keeps(session: SessionFolder) -> bool:
 def tell_missing(
     sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
 ) -> list[str]:
-    """Name the kept trials that are missing or changed, and return what was said.
+    """Name the kept trials that are missing or changed, and return the messages.
 
     Raises:
         KeptDataError: there are some, and `allow_missing` is false.

@@ -148,7 +148,7 @@ def _open_or_make(path: Path) -> int:
         try:
             made = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | _FLAGS, _MODE)
         except FileExistsError:
-            continue  # somebody was faster
+            continue  # another program was faster
         os.fchmod(made, _MODE)  # whatever the umask is
         return made
     raise OSError("it comes and goes")

@@ -77,7 +77,7 @@ class RigBackend(Protocol):
         ...
 
     def safety_mode(self) -> SafetyMode:
-        """Return what the safety module said last."""
+        """Return the safety module's newest mode."""
         ...
 
     def close(self) -> None:
@@ -194,7 +194,7 @@ class InProcessBackend:
         return self.arm.idle()
 
     def safety_mode(self) -> SafetyMode:
-        """Return what the safety module said last."""
+        """Return the safety module's newest mode."""
         return self.arm.safety_mode()
 
     def close(self) -> None:

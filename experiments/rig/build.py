@@ -75,7 +75,7 @@ def build_walls(rig: RigSettings, constants: ArmConstants) -> Walls:
 
 
 def build_safety_limits(rig: RigSettings) -> SafetyLimits:
-    """Return what the safety module is told; see [safety] of rig.toml."""
+    """Return the limits for the safety module; see [safety] of rig.toml."""
     safety = rig.safety
     speed, torque = safety.speed_warning, safety.torque_warning_units
     if speed is None:

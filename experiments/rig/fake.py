@@ -1,4 +1,4 @@
-"""The simulated world under a session: what it is told, and how it is stepped."""
+"""The simulated world under a session: its settings, and how it is stepped."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def build_law_model(
 
     A calibration contains the foot that was on. For another foot of rig.toml it is
     corrected by the difference of the two. A foot or sensor whose numbers have changed
-    since is none that was fitted: which of them is wrong nobody can say, so it is
+    since is none that was fitted: which of them is wrong is not observable, so it is
     refused.
 
     Raises:

@@ -63,10 +63,10 @@ class MultiProcessBackend:
         """Start the processes; nothing is sent yet.
 
         Args:
-            jobs: what they are told.
+            jobs: settings of each.
             shared: the memory they share.
             clock: the console's time.
-            lock: of the arm, given back by `close`; None = its bus is nobody else's.
+            lock: of the arm, given back by `close`; None = the bus is private.
 
         Raises:
             PreflightError: processes cannot share memory safely on this machine.
@@ -182,7 +182,7 @@ class MultiProcessBackend:
         return self._arm.idle()
 
     def safety_mode(self) -> SafetyMode:
-        """Return what the safety module said last."""
+        """Return the safety module's newest mode."""
         if self.loop_client.loop.is_running or not self._control.is_alive:
             return self.loop_client.status.safety
         return self._arm.safety_mode()
@@ -197,7 +197,7 @@ class MultiProcessBackend:
             if self._control.is_alive and self.loop_client.loop.is_running:
                 self.loop_client.leave()
         except TractionError:
-            pass  # the safety module brakes an arm that nobody asks any more
+            pass  # without questions for positions the safety module brakes the arm
         finally:
             for child in reversed(self._children.values()):
                 child.stop()

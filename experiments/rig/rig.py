@@ -48,7 +48,7 @@ class Rig:
 
     Attributes:
         clock: the console's time.
-        backend: whoever serves bus, sensor and loop.
+        backend: serves bus, sensor and loop.
         shared: the memory that the processes share.
         model: the arm with its tool.
         payload: what the sensor carries, not tared.
@@ -151,7 +151,7 @@ def _jobs(
     gravity_text: str,
     world: dict[str, Any] | None,
 ) -> WorkerConfigs:
-    """Return what the processes are told; `world` is of the simulated rig."""
+    """Return the settings of the processes; `world` is of the simulated rig."""
     rig = settings.rig
     common: dict[str, Any] = {
         "rig": rig.model_dump(mode="json"),

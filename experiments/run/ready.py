@@ -131,7 +131,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
                 pass
             is_over = True
         except ArmFaultError as fault:
-            context.clear_faults(fault)  # and nobody is there: the pause goes on
+            context.clear_faults(fault)  # and there is no answer: the pause goes on
     context.append(Event.CONTINUED)
     context.loop_client.request(ArmState.FLOAT)
 

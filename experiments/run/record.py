@@ -165,7 +165,9 @@ def _end(
     """Seal the files, say what they are worth; an interrupted one is rejected."""
     archive, recorder = context.archive, context.rig.backend.recorder
     context.loop_client.watch_trial(is_recording=False)
-    context.loop_client.advance(TICK)  # what the devices said until now is written down
+    context.loop_client.advance(
+        TICK
+    )  # the metadata of the devices so far is written down
     recorder.event(20, "link", context.loop_client.device_metadata().get("link", ""))
     recorder.event(20, "stop", outcome.reason)
     try:
@@ -198,7 +200,7 @@ def _end(
 def _lost(
     message: str, context: RunContext, name: TrialName, error: TrialFileError
 ) -> TrialLostError:
-    """Let the arm hold and return what is said of a trial the disk did not take."""
+    """Let the arm hold and return the message of a trial that the disk did not take."""
     context.loop_client.request(ArmState.HOLD)
     seconds = context.fault_context.seconds
     details = {

@@ -69,7 +69,7 @@ def choose_resume(
         console: where it is asked.
 
     Raises:
-        SessionError: nobody is there to ask, or the answer was [q]uit.
+        SessionError: there is no terminal to ask on, or the answer was [q]uit.
     """
     newest = sessions[-1]
     text = _question(newest, terrain)

@@ -173,7 +173,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
             try:
                 context.clear_faults(fault)
             except ArmFaultError:
-                # The trial is whole, but nobody can give a verdict any more.
+                # The trial is whole, but no verdict can be given any more.
                 context.reject(name, _ENDED)
                 raise
             continue

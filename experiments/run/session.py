@@ -130,7 +130,7 @@ def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Pr
 
     Raises:
         PreflightError: the rig is not fit.
-        SessionError: nobody confirmed the foot.
+        SessionError: the foot was not confirmed.
     """
     console = request.console
     before = last_foot(request.data, is_simulated=rig.is_simulated)

@@ -79,8 +79,8 @@ def known_bias(
 ) -> Array | None:
     """Return what the sensor shows without any load [N, N m], shape (6,).
 
-    It is in a calibration with this foot; a simulated sensor that nobody calibrated
-    has none by construction. None where nobody knows.
+    It is in a calibration with this foot; a simulated sensor without calibration
+    has none by construction. None where it is unknown.
     """
     for name, text in calibrations.items():
         if not name.startswith(_CALIBRATION) or "readings" not in text:

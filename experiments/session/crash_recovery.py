@@ -22,7 +22,7 @@ from experiments.session.trial_files import (
 )
 from experiments.session.trial_name import TrialName
 
-WHO = "traction"  # a verdict that nobody gave
+WHO = "traction"  # author of an automatic verdict
 REASON = "the session ended without closing"
 
 

@@ -15,7 +15,7 @@ from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
 
 LOCK_FILE = ".lock"
-_TRIES = 5  # somebody who only looks holds the lock for a moment
+_TRIES = 5  # a reader holds the lock for a moment
 _PAUSE_NS = 10_000_000
 
 
@@ -24,7 +24,7 @@ class LockOwner:
     """The living process that has a session open.
 
     Attributes:
-        pid: its number, 0 where it has not said so yet.
+        pid: its number, 0 where it is not written yet.
         since: time of day [UTC] at which it opened the session.
     """
 

@@ -231,7 +231,7 @@ def suggest_order(rows: Sequence[TerrainRow], done: Sequence[str]) -> list[str]:
     """Return the terrains still to be recorded in a good order.
 
     A foot that wears, a sensor that drifts and a person who learns change with time.
-    If the inclines came in rising order, nobody could tell these from the incline. So
+    If the inclines came in rising order, these could not be told from the incline. So
     of many random orders that one is taken in which inclination, size of the stones
     and tread go least with the place in the whole sequence.
 

@@ -68,7 +68,7 @@ class SocketBus(can.BusABC):
         """Connect to the socket at path `channel`; other settings mean nothing here.
 
         Raises:
-            can.CanInitializationError: nobody serves a bus there.
+            can.CanInitializationError: no bus is served there.
         """
         self.ignored = 0
         self.channel_info = f"traction-fake:{channel}"

@@ -52,11 +52,11 @@ class SocketHub:
         return len(self._clients)
 
     def fileno(self) -> int:
-        """Return a descriptor that is readable when somebody connects or sends."""
+        """Return a descriptor that is readable when a client connects or sends."""
         return self._poll.fileno()
 
     def is_readable(self) -> bool:
-        """Return whether somebody connects or has sent something."""
+        """Return whether a client connects or has sent something."""
         return bool(self._poll.poll(0))
 
     def receive(self) -> list[Frame]:
@@ -224,7 +224,7 @@ class CanPort:
         try:
             self._bus.send(message)
         except (can.CanError, OSError):
-            self.lost += 1  # as on a wire where nobody acknowledges
+            self.lost += 1  # as on a wire without an acknowledgement
 
     def close(self) -> None:
         """Give the bus back; a second call does nothing."""

@@ -116,7 +116,7 @@ class FakeCanBus(can.BusABC):
 
 
 class _Inbox:
-    """What a clock waits for while somebody waits for a frame."""
+    """What a clock waits for while a reader waits for a frame."""
 
     def __init__(self, bus: FakeCanBus) -> None:
         self._bus = bus

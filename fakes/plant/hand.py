@@ -45,7 +45,7 @@ _CARRY, _REST, _PUSH, _AWAY = (
 
 
 class Hand:
-    """Does what it is told, with forces a person could exert."""
+    """Follows its orders with forces a person could exert."""
 
     def __init__(self, dt: float) -> None:
         self._dt = dt

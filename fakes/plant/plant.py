@@ -57,7 +57,7 @@ class ArmPlant:
         disturbance: joint torques from outside [N m], shape (7,).
         terrain: the ground; None = the foot hangs above nothing.
         hand: the operator's.
-        finger: force of somebody who touches the foot, terrain frame [N].
+        finger: force of a person who touches the foot, terrain frame [N].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
     """

@@ -96,7 +96,7 @@ PACES = {
 
 
 class Push:
-    """One push from rest, until the hand is told something else."""
+    """One push from rest, until the hand gets another order."""
 
     def __init__(
         self, pace: Pace, rng: np.random.Generator, view: HandView, dt: float

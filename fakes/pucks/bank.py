@@ -34,7 +34,7 @@ class MotorSide(Protocol):
 
 
 class PuckBank:
-    """Motor pucks 1 to 7: they are told, asked, driven, and lose their power.
+    """Motor pucks 1 to 7: they are set, asked, driven, and lose their power.
 
     Motors are advanced to the instants at which pucks touch them and no further.
     `on_positions` is called with the positions [counts] by node that are reported at

@@ -1,4 +1,4 @@
-"""The time of a simulated network: what happens later, and what has been said."""
+"""The time of a simulated network: what happens later, and the frames sent."""
 
 from collections.abc import Callable
 from heapq import heappop, heappush

@@ -130,7 +130,7 @@ class PuckNetwork:
         self._bank.set_property(node, name, value)
 
     def forget_positions(self) -> None:
-        """Let nobody know where the joints are, as after power-up."""
+        """Forget where the joints are, as after power-up."""
         self._safety.forget_positions()
 
     def trip(self, monitor: Strainable) -> None:

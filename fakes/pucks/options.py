@@ -9,7 +9,7 @@ from acquisition import SafetyMode
 class NetworkOptions:
     """The arm as it is found.
 
-    What nobody outside Barrett knows, such as the boot time, is a plain choice.
+    What is not documented outside Barrett, such as the boot time, is a plain choice.
 
     Attributes:
         safety_mode: mode at the start; in E_STOP the pucks have no power.

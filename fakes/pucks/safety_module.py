@@ -191,7 +191,7 @@ class FakeSafetyModule:
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
     def _miss_beat(self) -> None:
-        """Fault the arm: nobody has asked for positions in time."""
+        """Fault the arm: positions were not asked for in time."""
         self._fault("heartbeat")
 
     def _answer(self, number: int, name: str) -> None:

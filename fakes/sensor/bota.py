@@ -9,11 +9,11 @@ from fakes.sensor.firmware import Measurement, SampleSchedule, Saying
 from fakes.sensor.stream import SensorStream, Source
 from ft_sensor.vendors import Acknowledgement, BootText, BotaFrame, bota
 
-_BOOT_NS = 400_000_000  # nothing is said before the port's opening has settled
+_BOOT_NS = 400_000_000  # silence until the port's opening has settled
 _LINE_PAUSE_NS = 100_000_000
 _SETTLE_NS = 200_000_000  # from the boot text to the first sample
 _REPLY_NS = 2_000_000
-_SHIPPED_SINC = 512  # 100 Hz: what the device does until it is told otherwise
+_SHIPPED_SINC = 512  # 100 Hz: the device's default
 _BOOT_TEXT = BootText(True, "Fake F/T sensor", "20001", "fake 1.0")
 _COMMAND = re.compile(rb"[CRI#]|c,\d,\d,\d,\d|f,(\d{1,4}),\d,\d,\d")
 _COMMAND_BEGIN = re.compile(rb"c(,(\d(,(\d(,(\d(,)?)?)?)?)?)?)?|f(,[\d,]{0,10})?")

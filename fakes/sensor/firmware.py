@@ -6,7 +6,7 @@ from typing import Protocol
 
 from ft_sensor import Wrench
 
-Saying = tuple[int, bytes]  # when it is said [ns], and what
+Saying = tuple[int, bytes]  # time of sending [ns], bytes
 FULL_COUNT = 32767  # of a sensor that sends 16-bit counts
 
 

@@ -47,7 +47,7 @@ def make_stream(
 ) -> SensorStream:
     """Return a sensor that has been running for a while at `t_ns`.
 
-    One on the bus gets the stream of a bota that nobody reads.
+    One on the bus gets the stream of a bota without a reader.
     """
     return _MAKERS.get(choice.kind, _bota)(choice, source, errors, t_ns)
 

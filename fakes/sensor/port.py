@@ -35,7 +35,7 @@ class FakeSerialPort:
     fit into the kernel's buffer is lost and counted.
 
     Attributes:
-        overrun: bytes lost because nobody read.
+        overrun: bytes lost without a reader.
     """
 
     def __init__(self, stream: ByteStream, clock: Clock, line_xor: int = 0) -> None:
@@ -107,7 +107,7 @@ class FakeSerialPort:
         raise io.UnsupportedOperation("a simulated port has no descriptor")
 
     def close(self) -> None:
-        """Close the port; the device goes on talking to nobody."""
+        """Close the port; the device goes on sending."""
         self._is_open = False
         self._buffer.clear()
 

@@ -15,7 +15,7 @@ class SerialPty:
 
     Attributes:
         path: of the end that a driver opens: `link`, or e.g. /dev/pts/3.
-        overrun: bytes lost because nobody read.
+        overrun: bytes lost without a reader.
     """
 
     def __init__(self, stream: ByteStream, t_ns: int, link: Path | None = None) -> None:
@@ -47,11 +47,11 @@ class SerialPty:
         os.set_blocking(self._device, False)
         if self._link is not None:
             self._link.symlink_to(os.ttyname(self._line))
-        self._stream.due(t_ns)  # what it said to nobody is gone
+        self._stream.due(t_ns)  # bytes without a reader are gone
         self._stream.port_opened(t_ns)
 
     def unplug(self) -> None:
-        """Pull the cable: whoever has the port open finds it gone."""
+        """Pull the cable: an open port disappears."""
         if self._link is not None and self.is_plugged_in:
             self._link.unlink(missing_ok=True)
         self.close()
@@ -67,7 +67,7 @@ class SerialPty:
         for _, data in self._stream.due(t_ns):
             try:
                 sent = os.write(self._device, data)
-            except OSError:  # full, or nobody there
+            except OSError:  # full, or without a reader
                 sent = 0
             self.overrun += len(data) - sent
 

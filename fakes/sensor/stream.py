@@ -139,7 +139,7 @@ class SensorStream:
         self._say(sayings)
 
     def port_opened(self, t_ns: int) -> None:
-        """Tell the device that somebody opened its port."""
+        """Tell the device that its port was opened."""
         if self.resets_on_open:
             self.reset(t_ns)
 

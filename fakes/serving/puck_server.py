@@ -37,7 +37,7 @@ class Port(Protocol):
 
     Attributes:
         ignored: what came and was no classic data frame.
-        lost: frames that nobody took in time.
+        lost: frames that were not taken in time.
     """
 
     ignored: int
@@ -70,7 +70,7 @@ class Port(Protocol):
 
 
 class SupportedMotors:
-    """Motors of an arm that somebody carries as long as no motor pulls.
+    """Motors of an arm that a person carries as long as no motor pulls.
 
     Implements fakes.pucks.bank.MotorSide. Without power, and under zero torque, the arm
     stays where it is instead of falling.
@@ -158,7 +158,7 @@ class PuckServer:
         """Wait for a frame or for the network, 2 ms at most, and let both go on.
 
         Args:
-            tap: told of every frame on the bus.
+            tap: called for every frame on the bus.
 
         Raises:
             LinkError: the bus broke.

@@ -51,7 +51,7 @@ class SensorServer:
 
     @property
     def losses(self) -> str:
-        """What nobody took in time, in words; empty if all was taken."""
+        """Bytes that were not taken in time, in words; empty if all were."""
         lost = self._pty.overrun
         return f"{lost} bytes of the sensor were not read in time." if lost else ""
 

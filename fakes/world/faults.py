@@ -134,7 +134,7 @@ class BodyFaults:
         }
 
     def clear_faults(self) -> None:
-        """Let nobody twist or touch the foot any more."""
+        """End every twist and touch of the foot."""
         self._plant.finger = (0.0, 0.0, 0.0)
         self._is_twisting = False
         self._plant.disturbance[_JOINT_7] = 0.0

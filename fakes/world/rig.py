@@ -94,7 +94,7 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
 
 
 class Cable(Protocol):
-    """What joins a serial sensor and whoever reads it."""
+    """What joins a serial sensor and its reader."""
 
     def unplug(self) -> None:
         """Pull it out."""
@@ -187,7 +187,7 @@ class FakeRig:
         self._let_lag(0)
 
     def _let_lag(self, lag_ns: int) -> None:
-        """Let everybody who sleeps on stepped time wake `lag_ns` too late."""
+        """Let all sleepers on stepped time wake `lag_ns` too late."""
         if isinstance(self._clock, SteppedClock):
             self._clock.lag_ns = lag_ns
 

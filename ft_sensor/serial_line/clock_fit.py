@@ -61,7 +61,7 @@ class ClockFit:
     def host_ns(self, device_ns: int) -> int:
         """Return when the device's clock showed `device_ns` [monotonic ns].
 
-        Before the first message nobody knows: the result is `device_ns`.
+        Before the first message the offset is unknown: the result is `device_ns`.
         """
         beyond = device_ns - self._origin_ns
         return device_ns + round(self._offset_ns + self._slope * beyond)

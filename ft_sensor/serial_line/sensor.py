@@ -100,7 +100,7 @@ class SerialSensor:
         Raises:
             LinkError: the port failed, or bytes came that are not this sensor's.
             LinkTimeoutError: the sensor is silent or does not answer.
-            DeviceFaultError: it refused what it was told, its numbers cannot be
+            DeviceFaultError: it refused a setting, its numbers cannot be
                 trusted, or its rate is below 495 Hz.
         """
         device, scanner = self.device, self.device.scanner()

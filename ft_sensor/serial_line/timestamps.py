@@ -18,7 +18,7 @@ class DeviceClock:
     Attributes:
         lost: samples missing by the device's own count.
         jumps: times it showed something else than time that had passed: the device
-            was restarted, and does no longer what it was told at its opening.
+            was restarted and has lost the settings of its opening.
     """
 
     def __init__(self, timing: StreamTiming) -> None:
@@ -60,7 +60,7 @@ class DeviceClock:
 class FrameCounter:
     """The time of a device that shows none: its frames are counted.
 
-    Damaged bytes and long silence tell of lost frames at once. A loss that nobody saw
+    Damaged bytes and long silence tell of lost frames at once. A loss without a sign
     makes every later frame arrive whole periods after the time it is counted for, and
     is put right then.
 

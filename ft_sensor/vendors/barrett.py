@@ -31,14 +31,14 @@ _GET_FT = encode_get(_FT)
 _VERS, _ROLE, _SN, _STAT = 0, 1, 2, 5  # the same asleep and awake
 _MS = 1_000_000
 _WAKE_NS = 10 * _MS
-_BOOT_NS = 1_000 * _MS  # nobody may talk while a transceiver comes up
+_BOOT_NS = 1_000 * _MS  # the bus stays silent while a transceiver comes up
 _ANSWER_NS = 50 * _MS  # it answers within 1 ms; a slow adapter may sit on it
 _QUESTIONS = 20  # before the sensor is believed to be there
 
 
 @dataclass(frozen=True, slots=True)
 class _Identity:
-    """What node 8 said about itself; None = nothing."""
+    """Identity that node 8 reported; None = none."""
 
     role: int | None = None
     vers: int | None = None
@@ -125,7 +125,7 @@ class BarrettSensor:
         self._exchange()
 
     def describe(self) -> dict[str, str]:
-        """Return what the sensor said about itself, as text."""
+        """Return the sensor's identity as text."""
         identity = self._identity
         return {
             "model": "Barrett force/torque sensor, node 8",

@@ -48,7 +48,7 @@ class BarrettCounters:
         samples: pairs of force and torque.
         unanswered: questions that no pair came to before the next question.
         unpaired: a force without its torque, or the reverse.
-        unasked: pairs that nobody had asked for.
+        unasked: pairs without a question.
         malformed: frames that contradict the protocol.
     """
 
@@ -110,7 +110,7 @@ class WrenchPairing:
         self._counters.samples += 1
         wrench = (*force, *torque)
         beyond = axes_beyond(wrench, RANGES)
-        if status & ~_RETARE:  # a gauge, or bad data: which axes, nobody knows
+        if status & ~_RETARE:  # a gauge, or bad data: which axes is unknown
             beyond = ALL_AXES
         return WrenchSample(
             t_ns=asked_ns + SAMPLING_DELAY_NS,

@@ -107,7 +107,7 @@ def encode_serial_number(name: str) -> bytes:
 
 
 def find_serial_number(data: bytes) -> str | None:
-    """Return the serial number told in `data`; None if there is none."""
+    """Return the serial number in `data`; None if there is none."""
     answer = _newest(data, _SERIAL, 14)
     if answer is None:
         return None

@@ -61,7 +61,7 @@ class OptoForceSettings:
 class OptoForceDevice:
     """Implements `ft_sensor.serial_line.sensor.SerialDevice` for a HEX sensor.
 
-    Nothing it is told can be read back: that it accepted is checked, and its rate.
+    No setting can be read back: its acknowledgement is checked, and its rate.
     """
 
     stop = optoforce.encode_configuration(optoforce.STOPPED, 0)

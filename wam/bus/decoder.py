@@ -33,7 +33,7 @@ from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, nam
 
 LIMIT_NS = 1_000_000  # an answer is late after this
 _GIVE_UP_NS = 1_000_000_000
-_USUAL_VERS = 200  # of a device that has not told its firmware
+_USUAL_VERS = 200  # of a device whose firmware is unknown
 _MEMBERS = {
     Group.BUS: range(1, 8),
     Group.LOWER_TORQUE: range(1, 5),
@@ -71,7 +71,7 @@ _Key = tuple[int, ReplyKind | int]  # node, and what it is to say: a property by
 
 @dataclass(frozen=True, slots=True)
 class DecodedLine:
-    """A sentence, and when it was said: UTC [ns]."""
+    """A line of text and its time: UTC [ns]."""
 
     utc_ns: int
     text: str
@@ -88,7 +88,7 @@ class BusSummary:
         answers: those that came.
         late: those that came after more than 1 ms.
         slowest_ns: the longest wait for an answer.
-        unasked: answers that nobody had asked for.
+        unasked: answers without a question.
         silent: questions without an answer, by device and property.
     """
 

@@ -36,7 +36,7 @@ class Link(Protocol):
 
     @property
     def mode_hints(self) -> int:
-        """Number of times the safety module has said that its mode changed."""
+        """Number of changes of mode that the safety module has announced."""
         ...
 
     def send(self, can_id: int, data: bytes) -> None:

@@ -172,7 +172,7 @@ class WamArm:
 
     @property
     def safety_heard_ns(self) -> int:
-        """When the safety module last told its mode [monotonic ns], 0 = never."""
+        """When the safety module last reported its mode [monotonic ns], 0 = never."""
         return self._poller.heard_ns
 
     def safety_warnings(self) -> tuple[str, ...]:
@@ -189,7 +189,7 @@ class WamArm:
         return self._traffic.is_down
 
     def health(self) -> tuple[PuckHealth, ...]:
-        """Return what pucks 1 to 7 said last, and when; does not wait."""
+        """Return the newest reports of pucks 1 to 7 and their times; does not wait."""
         return tuple(self._poller.health.pucks)
 
     def idle(self) -> bool:

@@ -8,14 +8,14 @@ from acquisition import NS_PER_S
 from wam.bus import MOTOR_NODES, Device, Property, property_number
 
 # The loop asks each puck something every 0.7 s; four questions without an answer and
-# what it said before is no longer news.
+# older reports are no longer news.
 NEWS_NS = 3 * NS_PER_S
 HOT = 60  # where a puck by its own default (OTEMP) is too hot [degrees Celsius]
 
 
 @dataclass(frozen=True, slots=True)
 class PuckHealth:
-    """What one puck said last, and when; None = it never answered.
+    """Newest report of one puck and its time; None = it never answered.
 
     Attributes:
         puck_degc: temperature of the puck (TEMP) [degrees Celsius].
@@ -126,7 +126,7 @@ def complaints(pucks: Sequence[PuckHealth], now_ns: int) -> list[str]:
 def health_metadata(pucks: Sequence[PuckHealth], now_ns: int) -> dict[str, str]:
     """Return the answers as text for a recording, pucks 1 to 7 in each line.
 
-    "?" stands for what was never said, or not lately; the age [s] is of the last
+    "?" stands for what was never reported, or not lately; the age [s] is of the last
     answer.
     """
     ages = [

@@ -1,4 +1,4 @@
-"""What the arm's driver is told: transmission, limits and the timing of its cycle."""
+"""Settings of the arm's driver: transmission, limits and the timing of its cycle."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ def _shipped_j2mp() -> Matrix:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmSettings:
-    """What the driver is told about the arm and the cycle.
+    """Settings of the driver: the arm and the cycle.
 
     Attributes:
         j2mp: motor angles from joint angles, shape (7, 7).
@@ -28,7 +28,7 @@ class ArmSettings:
         safety_poll_cycles: cycles between questions for the safety mode, and between
             those for the pendant's word.
         health_poll_cycles: cycles between questions for the health of a puck.
-        safety_limits: what the safety module is told to tolerate.
+        safety_limits: what the safety module is set to tolerate.
         boot_ns: silence while pucks boot [ns].
         idle_ns: longest wait for the safety module to confirm IDLE [ns].
     """

@@ -72,7 +72,7 @@ _ABSOLUTE_SINCE = 118  # firmware from which MECH can be believed
 
 @dataclass(frozen=True, slots=True)
 class PuckInfo:
-    """What one motor puck said about itself at start-up.
+    """Properties of one motor puck at start-up.
 
     Attributes:
         node: puck number, 1 to 7.

@@ -41,11 +41,11 @@ class StatusPoller:
 
     Attributes:
         mode: last known mode of the safety module.
-        heard_ns: when the module last told a mode [ns], 0 = never.
+        heard_ns: when the module last reported a mode [ns], 0 = never.
         warnings: monitors of the module that warn.
         faults: monitors of the module that report a fault.
         health: the newest answers of the pucks.
-        is_lowering: the module is told IDLE again with every question for its mode,
+        is_lowering: IDLE is sent again with every question for its mode,
             until it says that it is.
     """
 
@@ -82,7 +82,7 @@ class StatusPoller:
     def ask(self, *, is_urgent: bool = False) -> None:
         """Put the question that is due, if there is one, once in a cycle.
 
-        The mode is also asked for when it `is_urgent` or was said to change.
+        The mode is also asked for when it `is_urgent` or its change was announced.
 
         Raises:
             LinkError: the bus is down.
@@ -126,7 +126,7 @@ class StatusPoller:
             self.note_pendant(decode_pendant(reply.value & 0xFFFFFFFF))
 
     def note_mode(self, mode: SafetyMode, now_ns: int) -> None:
-        """Take the mode as the module said it by `now_ns`; UNKNOWN = it did not."""
+        """Take the mode that the module reported by `now_ns`; UNKNOWN = none."""
         self.mode = mode
         if mode is not SafetyMode.UNKNOWN:
             self.heard_ns = now_ns
@@ -135,7 +135,7 @@ class StatusPoller:
             self.is_lowering = False
 
     def note_pendant(self, pendant: PendantWord) -> None:
-        """Take the monitors as the module just said them."""
+        """Take the monitors that the module has just reported."""
         self.warnings = pendant.warnings
         self.faults = pendant.faults
 

@@ -23,7 +23,7 @@ Matrix = NDArray[np.float64]
 
 
 class TorqueCommand(NamedTuple):
-    """What the pucks are told; a tuple, because it is made in every cycle.
+    """Torques for the pucks; a tuple, because it is made in every cycle.
 
     Attributes:
         units: torque of each motor [puck units], whole numbers.
