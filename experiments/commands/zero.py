@@ -62,9 +62,8 @@ def _start(rig: Rig) -> ArmInfo:
     try:
         return rig.backend.start_arm()
     except TractionError as error:
-        raise PreflightError(
-            error.message, hint=error.hint, arm_state="not touched"
-        ) from error
+        state = error.arm_state or "not touched"
+        raise PreflightError(error.message, hint=error.hint, arm_state=state) from error
 
 
 def _check_encoders(rig: Rig, info: ArmInfo, console: Console) -> None:

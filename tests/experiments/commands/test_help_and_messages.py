@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from string import Formatter
 
 import numpy as np
 import pytest
@@ -29,6 +28,8 @@ from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
 from ft_sensor import tare
 from tests.experiments.built import Built, watch_builds
+from tests.experiments.commands.test_shared_arm import SHARED_ARM
+from tests.experiments.messages import pattern
 from tests.experiments.program import (
     Done,
     digest,
@@ -437,8 +438,6 @@ CASES = {
     "interrupted": Case(lambda s: resume(s, press=give_up(Prompt.SUPPORT)), 5),
     "nothing-lost": refused(lambda s: _failing_status(s, KeyboardInterrupt()), 130),
 }
-# Asked at a prompt that is not there without a terminal; the hint takes its place.
-NO_KEYS = {"crash", "mismatch", "unfinished"}
 
 
 @pytest.fixture(scope="module")
@@ -466,25 +465,9 @@ def scene(base, config, tmp_path, monkeypatch):
     return SimulatedScene(tmp_path / "data", config, monkeypatch)
 
 
-def pattern(name):
-    """Return what the catalogue says as a regular expression, anything filled in."""
-    message = CATALOGUE[name]
-    arm = f"ARM: {message.arm}." if message.arm else ""
-    do = "" if name in NO_KEYS else message.do
-    parts = [part for part in (message.what, arm, do) if part]
-    return "".join(
-        re.escape(text) + (".*" if open_ is not None else "")
-        for text, open_, *_ in Formatter().parse(" ".join(parts))
-    )
-
-
 def files_of_first(scene):
     paths = (scene.folder / "trials").glob("T01.*")
     return {path.name: (digest(path), path.stat().st_mtime_ns) for path in paths}
-
-
-# Two programs on one arm: test_shared_arm, tests/experiments/rig/test_arm_lock.
-SHARED_ARM = {"arm-busy", "arm-lock", "arm-active", "other-master"}
 
 
 def test_every_row_of_the_catalogue_has_a_case():

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,11 +19,14 @@ from fakes.bus.hub import SocketHub
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from fakes.serving.puck_server import PuckServer
+from tests.experiments.messages import pattern
 from tests.experiments.program import traction, write_config
 from tests.fakes.buses import COUNTS
 from tests.fakes.stepped import Motors
 from tests.wam.bus.test_link import message
 
+# Messages of two programs on one arm; each has a test here.
+SHARED_ARM = {"arm-busy", "arm-lock", "arm-active", "other-master"}
 COMMANDS = {
     "check": ("check",),
     "bench": ("bench", "--seconds", 1),
@@ -74,17 +78,32 @@ def active_arm(tmp_path):
     server.close()
 
 
-def refused(command, config, tmp_path):
+def refused(command, config, tmp_path, name):
+    """Run `command`; return what it prints, which is the message `name`."""
     done = traction(*COMMANDS[command], "--config", config, "--data", tmp_path)
     assert done.code == 3, done.err
+    assert name in SHARED_ARM
+    assert re.search(pattern(name), done.err)
     return done.err
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_lock_that_is_no_file_is_not_used(command, config, tmp_path):
+    lock = ArmLock("traction-fake", str(tmp_path / "bus"))
+    lock.close()
+    lock.path.unlink()
+    os.mkfifo(lock.path)
+    try:
+        assert str(lock.path) in refused(command, config, tmp_path, "arm-lock")
+    finally:
+        lock.path.unlink()
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path):
     lock = ArmLock("traction-fake", str(tmp_path / "bus"))
     try:
-        err = refused(command, config, tmp_path)
+        err = refused(command, config, tmp_path, "arm-busy")
     finally:
         lock.close()
         lock.path.unlink()
@@ -96,7 +115,7 @@ def test_an_arm_that_another_program_has_is_not_opened(command, config, tmp_path
 def test_an_active_arm_is_asked_for_its_mode_and_left_active(
     command, config, tmp_path, active_arm
 ):
-    assert "ACTIVE" in refused(command, config, tmp_path)
+    refused(command, config, tmp_path, "arm-active")
     own = [frame for frame in active_arm.frames if frame[0] < 0x400]
     assert set(own) == {MODE_ASKED}
     assert active_arm.network.safety_mode is SafetyMode.ACTIVE
@@ -108,7 +127,7 @@ def test_another_master_is_heard_and_nothing_is_sent_to_its_arm(
     command, config, tmp_path, active_arm
 ):
     active_arm.has_master = True
-    assert "404" in refused(command, config, tmp_path)
+    assert "404" in refused(command, config, tmp_path, "other-master")
     assert {can_id for can_id, _ in active_arm.frames if not can_id & 0x3E0} == {0x404}
     assert active_arm.network.safety_mode is SafetyMode.ACTIVE
 
