@@ -2,15 +2,35 @@
 
 import os
 import signal
+import subprocess
+import sys
 
+import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from acquisition.control_loop.states import ArmState
-from tests.processes.watching import running_trial, until
+from acquisition.schema import TRUTH
+from tests.processes.watching import is_running, running_trial, until, wait
 
-pytestmark = pytest.mark.wall_clock
+pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(400)]
 LIMIT = 0.5  # s, of a heartbeat
 REACTION = 0.6  # s
+STEP = 10  # samples, over which a true speed is taken
+FASTEST = 2.0  # rad/s of any joint; 1.0 is the limit that begins a hold
+HOG = (
+    "import os, sys, time; os.sched_setaffinity(0, {int(sys.argv[1])});"
+    "os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90));"
+    "end = time.monotonic() + float(sys.argv[2])\n"
+    "while time.monotonic() < end: pass"
+)
+# Everything that can stand still beside a running arm, for how long [s].
+STOPS = [
+    (victim, seconds)
+    for victim in ("console", "recorder", "sensor reader", "control", "every core")
+    for seconds in (0.05, 0.3, 1.0)
+]
+SHORT = {("control", 0.3), ("every core", 0.3)}
 
 
 def holds(seen):
@@ -47,3 +67,54 @@ def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):
         assert seen.process.wait(15) == 5, seen.output()
         assert "ARM: idle, braked." in seen.output()
         assert not list(tmp_path.rglob("*.partial"))
+
+
+def stop(seen, victim, seconds):
+    """Let a process, or every other program on the machine, stand still."""
+    if victim == "every core":
+        hogs = [
+            subprocess.Popen([sys.executable, "-c", HOG, str(core), str(seconds)])
+            for core in os.sched_getaffinity(0)
+        ]
+        assert [hog.wait(20) for hog in hogs] == [0] * len(hogs)
+        return
+    pid = seen.process.pid if victim == "console" else seen.pids[victim]
+    os.kill(pid, signal.SIGSTOP)
+    wait(seconds)
+    os.kill(pid, signal.SIGCONT)
+
+
+def true_speeds(data):
+    """Return the largest true speed of each joint in every trial [rad/s]."""
+    paths = list(data.glob("sessions/*/*/T*.truth.mcap"))
+    assert paths, "no truth was recorded"
+    return [fastest(path) for path in paths]
+
+
+def fastest(path):
+    with path.open("rb") as stream:
+        messages = make_reader(stream).iter_messages("/truth")
+        data = b"".join(message.data for _, _, message in messages)
+    records = np.frombuffer(data, TRUTH.dtype)
+    seconds = np.diff(records["host_ns"][::STEP].astype(np.int64)) * 1e-9
+    moved = np.diff(records["position"][::STEP], axis=0)
+    return np.abs(moved / seconds[:, None]).max(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("victim", "seconds"),
+    [
+        pytest.param(*case, marks=[] if case in SHORT else pytest.mark.long)
+        for case in STOPS
+    ],
+)
+def test_whatever_stands_still_the_arm_is_not_thrown(tmp_path, victim, seconds):
+    with running_trial(tmp_path) as seen:
+        stop(seen, victim, seconds)
+        assert until(seen.has_trial_ended, 60), seen.output()
+        seen.process.send_signal(signal.SIGINT)
+        assert until(lambda: not is_running(seen.process.pid), 30)
+        assert "Traceback" not in seen.output()
+        assert "ARM: idle, braked." in seen.output()
+        for speeds in true_speeds(seen.data):
+            assert speeds.max() < FASTEST

@@ -22,6 +22,7 @@ from tests.experiments.program import write_config
 
 ROOT = Path(__file__).parents[2]
 CLOCK = SystemClock()
+TRIES = 8  # of sessions on a machine that stalls
 NAMES = {
     "control": "traction-contro",  # the kernel keeps 15 characters
     "recorder": "traction-record",
@@ -31,6 +32,15 @@ NAMES = {
 STALLED = re.compile(
     "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
 )
+WITNESS = """import sys, time
+while True:
+    start = time.monotonic_ns()
+    time.sleep(0.001)
+    end = time.monotonic_ns()
+    if end - start > float(sys.argv[1]) * 1e6:
+        print(end, flush=True)
+"""
+STALL = 6.0  # ms, of a sleep of 1 ms: three cycles
 START = "import sys; from experiments.cli import main; sys.exit(main())"
 
 
@@ -160,6 +170,47 @@ def patient_config(folder):
     return write_config(folder, rig=change)
 
 
+class StallWitness:
+    """A program that only sleeps, on every core: it shows when the machine stood still.
+
+    The simulated devices share the machine with the loop. When it stalls, the guard
+    stops the arm, which is right, but not what a test looks at.
+    """
+
+    def __init__(self, folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        self._path = folder / "stalls.txt"
+        self._out = self._path.open("w")
+        self._processes = [self._watch(core) for core in os.sched_getaffinity(0)]
+
+    def _watch(self, core):
+        command = [sys.executable, "-c", WITNESS, str(STALL)]
+        process = subprocess.Popen(command, stdout=self._out)
+        os.sched_setaffinity(process.pid, {core})
+        return process
+
+    def stalls_since(self, t_ns):
+        """Return how often a core stood still since `t_ns` [monotonic ns]."""
+        lines = self._path.read_text().splitlines()
+        return sum(int(line) > t_ns for line in lines)
+
+    def close(self):
+        for process in self._processes:
+            process.kill()
+            process.wait()
+        self._out.close()
+
+
+@contextmanager
+def stall_witness(folder):
+    """Watch for stalls of the machine; yield the witness."""
+    witness = StallWitness(folder)
+    try:
+        yield witness
+    finally:
+        witness.close()
+
+
 @contextmanager
 def session(data, *options):
     """Start a session; whatever is left of it at the end is ended."""
@@ -184,16 +235,20 @@ def session(data, *options):
 
 
 @contextmanager
-def running_trial(folder, tries=3):
+def running_trial(folder, tries=TRIES):
     """Yield a session in the second second of its trial.
 
-    A machine that stalls may end a trial, or never let it begin; another is begun then.
+    A machine that stalls, as the witness saw, may end a trial, or never let it begin;
+    another is begun then.
     """
-    for number in range(tries):
-        with session(folder / f"data{number}") as seen:
-            if seen.wait_for_trial():
-                wait(1.0)
-                if not seen.has_trial_ended():
-                    yield seen
-                    return
+    with stall_witness(folder) as witness:
+        for number in range(tries):
+            start_ns = CLOCK.now_ns()
+            with session(folder / f"data{number}") as seen:
+                if seen.wait_for_trial():
+                    wait(1.0)
+                    if not seen.has_trial_ended():
+                        yield seen
+                        return
+            assert witness.stalls_since(start_ns), seen.output()
     raise AssertionError(f"the machine ended {tries} trials before they were looked at")
