@@ -1,5 +1,6 @@
 from .events import Slip, find_slips
 from .load import Frame, RecordedTrial, load_trial
+from .plausibility import Doubt, doubts_of, doubts_of_record, summed_up
 from .prepare import (
     MINIMUM_KEPT,
     MINIMUM_TRAVEL_SHARE,
@@ -12,8 +13,18 @@ from .prepare import (
 from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, suggest
 from .samples import SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
-from .tables import load_tables, parse_columns, parse_stones
-from .terrain_kinds import BIG, FLAT, LEVELS, SMALL, groups_of, kind_title, terrain_kind
+from .tables import load_tables, parse_columns
+from .terrain_kinds import (
+    BIG,
+    FLAT,
+    LEVELS,
+    SMALL,
+    groups_of,
+    kind_title,
+    parse_stones,
+    terrain_kind,
+)
+from .units import parse_units
 
 __all__ = [
     "BIG",
@@ -25,6 +36,7 @@ __all__ = [
     "SMALL",
     "Array",
     "CoverageGrid",
+    "Doubt",
     "Frame",
     "Indices",
     "PrepareOptions",
@@ -36,6 +48,8 @@ __all__ = [
     "TractionSeries",
     "TrainingSet",
     "coverage",
+    "doubts_of",
+    "doubts_of_record",
     "find_slips",
     "groups_of",
     "kind_title",
@@ -44,8 +58,10 @@ __all__ = [
     "moving_average",
     "parse_columns",
     "parse_stones",
+    "parse_units",
     "prepare_trial",
     "quick_ratio",
     "suggest",
+    "summed_up",
     "terrain_kind",
 ]

@@ -16,9 +16,8 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data.series import Array, TractionSeries
-from analysis.data.terrain_kinds import STONE_SIZES
+from analysis.data.units import COLUMNS, factor, split_header
 
-COLUMNS = ("t", "v_t", "F_n", "F_t")
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 64_000_000  # bytes, also of an npz once unpacked
 MOST_TRIALS = 2000
@@ -56,30 +55,12 @@ def parse_columns(text: str) -> dict[str, str]:
     return columns
 
 
-def parse_stones(text: str) -> dict[str, str]:
-    """Return the size of the stones by terrain from `Sand=none,Beach=small`.
-
-    Raises:
-        SettingsError: a part is not TERRAIN=SIZE, or there is no such size.
-    """
-    stones: dict[str, str] = {}
-    for part in filter(None, text.split(",")):
-        terrain, equals, size = (piece.strip() for piece in part.rpartition("="))
-        if not (equals and terrain) or size not in STONE_SIZES:
-            raise SettingsError(
-                f"--stones {text}: {part!r} does not give the stones of a terrain.",
-                hint=f"The sizes are {', '.join(STONE_SIZES)}; write e.g. "
-                "--stones Sand=none,Beach=small",
-            )
-        stones[terrain] = size
-    return stones
-
-
 def load_tables(
     paths: Sequence[Path],
     columns: Mapping[str, str] | None = None,
     terrain: str | None = None,
     stones: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
 ) -> dict[str, list[TractionSeries]]:
     """Return the trials in `paths` by terrain, in the order of the files.
 
@@ -89,12 +70,14 @@ def load_tables(
         terrain: terrain of every CSV; by default "table". An npz names its own.
         stones: size of the stones by terrain: "small", "big" or "none"; where it is
             not given, see `analysis.data.terrain_kinds.terrain_kind`.
+        units: unit of each column where its header gives none, e.g. {"v_t": "mm/s"};
+            s, m/s and N by default.
 
     Raises:
         SettingsError: a file that is missing, too large, or not what it should be.
     """
     columns = {name: name for name in COLUMNS} | dict(columns or {})
-    form = _TableForm(columns, terrain or DEFAULT_TERRAIN, stones or {})
+    form = _TableForm(columns, terrain or DEFAULT_TERRAIN, stones or {}, units or {})
     trials: dict[str, list[TractionSeries]] = {}
     for path in paths:
         for series in _load(path, form):
@@ -112,11 +95,29 @@ class _TableForm:
         columns: name of each column of the analysis in a CSV.
         terrain: terrain of every CSV.
         stones: size of the stones by terrain, where it is given.
+        units: unit by column, where it is given.
     """
 
     columns: Mapping[str, str]
     terrain: str
     stones: Mapping[str, str]
+    units: Mapping[str, str]
+
+    def factors(self, path: Path, stated: Mapping[str, str]) -> Array:
+        """Return what turns the columns of a table into s, m/s and N, shape (4,).
+
+        Raises:
+            SettingsError: a unit is not known, or is stated otherwise.
+        """
+        try:
+            return np.array(
+                [
+                    factor(name, stated.get(name, ""), self.units.get(name, ""))
+                    for name in COLUMNS
+                ]
+            )
+        except SettingsError as error:
+            raise SettingsError(f"{path}: {error.message}", hint=error.hint) from error
 
     def series(self, terrain: str, name: str, table: Array) -> TractionSeries:
         """Return a table (n, 4) of t, v_t, F_n, F_t as a trial."""
@@ -196,21 +197,23 @@ def _from_array(
             f"array {key} has shape {array.shape} and type {array.dtype}",
             _FORM,
         )
-    table = np.asarray(array, dtype=np.float64)
+    table = np.asarray(array, dtype=np.float64) * form.factors(path, {})
     return form.series(key.rpartition("/")[0], f"{path.name}:{key}", table)
 
 
 def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
-            places = _places(path, header, form.columns)
+            line = file.readline()
+            delimiter = _delimiter(line)
+            header = next(csv.reader([line], delimiter=delimiter), [])
+            places, stated = _places(path, [name.strip() for name in header], form)
             rows = (line for line in file if line.strip())
             first = next(rows, None)
             if first is None:
                 hint = "Check that it was copied whole."
                 raise _refusal(path, "a header but no rows", hint)
-            table = _numbers(path, chain([first], rows), places)
+            table = _numbers(path, chain([first], rows), places, delimiter)
     except UnicodeDecodeError as error:
         raise _refusal(
             path, "neither a text table nor an npz", "Give CSV files in UTF-8."
@@ -219,25 +222,58 @@ def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
         raise _refusal(
             path, f"its header cannot be read ({error})", "Give a CSV table."
         ) from error
-    return form.series(form.terrain, path.name, table)
+    return form.series(form.terrain, path.name, table * form.factors(path, stated))
 
 
-def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[int]:
-    missing = [column for column in columns.values() if column not in header]
+def _delimiter(header: str) -> str:
+    """Return what parts the columns: the most frequent of comma, semicolon and tab."""
+    return max(",;\t", key=header.count)
+
+
+def _places(
+    path: Path, header: list[str], form: _TableForm
+) -> tuple[list[int], dict[str, str]]:
+    """Return (place of each column, unit of each that states one).
+
+    A header `v_t [mm/s]` is the column v_t, or a column of that whole name.
+    """
+    bare = [split_header(name) for name in header]
+    names = [name for name, _ in bare]
+    places: list[int] = []
+    stated: dict[str, str] = {}
+    missing: list[str] = []
+    for name in COLUMNS:
+        column = form.columns[name]
+        if column in header or column in names:
+            place = (header if column in header else names).index(column)
+            places.append(place)
+            stated[name] = bare[place][1]
+        else:
+            missing.append(column)
     if missing:
-        present = ", ".join(header)
         raise _refusal(
             path,
-            f"no column {', '.join(missing)}; it has {present[:300] or 'none'}",
+            f"no column {', '.join(missing)}; it has "
+            f"{', '.join(header)[:300] or 'none'}",
             "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
         )
-    return [header.index(columns[name]) for name in COLUMNS]
+    return places, stated
 
 
-def _numbers(path: Path, rows: Iterable[str], places: list[int]) -> Array:
+def _numbers(
+    path: Path, rows: Iterable[str], places: list[int], delimiter: str
+) -> Array:
+    """Read the columns at `places`; beside semicolons and tabs a comma is a point."""
+    if delimiter != ",":
+        rows = (row.replace(",", ".") for row in rows)
     try:
         return np.loadtxt(
-            rows, delimiter=",", usecols=places, ndmin=2, comments=None, quotechar='"'
+            rows,
+            delimiter=delimiter,
+            usecols=places,
+            ndmin=2,
+            comments=None,
+            quotechar='"',
         )
     except UnicodeDecodeError:
         raise

@@ -8,6 +8,8 @@ Any other terrain of unknown stones is a kind of its own, under its own name.
 
 from collections.abc import Iterable, Mapping
 
+from acquisition import SettingsError
+
 SMALL, BIG, FLAT = "small", "big", "flat"
 STONE_SIZES: Mapping[str, str] = {"small": SMALL, "big": BIG, "none": FLAT}
 PAPER_KINDS: Mapping[str, str] = {
@@ -57,3 +59,22 @@ def groups_of(kinds: Mapping[str, str]) -> dict[str, dict[str, str]]:
         "stones": dict(kinds),
         "surface": {name: surface_of(kind) for name, kind in kinds.items()},
     }
+
+
+def parse_stones(text: str) -> dict[str, str]:
+    """Return the size of the stones by terrain from `Sand=none,Beach=small`.
+
+    Raises:
+        SettingsError: a part is not TERRAIN=SIZE, or there is no such size.
+    """
+    stones: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        terrain, equals, size = (piece.strip() for piece in part.rpartition("="))
+        if not (equals and terrain) or size not in STONE_SIZES:
+            raise SettingsError(
+                f"--stones {text}: {part!r} does not give the stones of a terrain.",
+                hint=f"The sizes are {', '.join(STONE_SIZES)}; write e.g. "
+                "--stones Sand=none,Beach=small",
+            )
+        stones[terrain] = size
+    return stones

@@ -1,6 +1,6 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,9 +13,11 @@ from analysis.data import (
     SampleTable,
     Slip,
     TractionSeries,
+    doubts_of,
     find_slips,
     kind_title,
     prepare_trial,
+    summed_up,
     terrain_kind,
 )
 from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
@@ -198,7 +200,7 @@ def run_study(
     }
     is_bounded = options.prepare.container_travel is not None
     warnings = [w for result in results.values() for w in _warnings(result, is_bounded)]
-    warnings = (*_contradictions(trials), *warnings)
+    warnings = (*_contradictions(trials), *_doubts(prepared.values()), *warnings)
     return Study(simulated, options, results, tuple(notes), warnings)
 
 
@@ -249,6 +251,11 @@ def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
         for terrain, sizes in stated.items()
         if len(sizes) > 1
     ]
+
+
+def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
+    """Return why trials cannot be what they say they are, a line for each reason."""
+    return summed_up((t.name, doubts_of(t)) for trials in terrains for t in trials)
 
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:

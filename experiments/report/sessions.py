@@ -5,7 +5,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock, TrialFileError
-from analysis.data import PrepareOptions, RecordedTrial, load_trial
+from analysis.data import (
+    PrepareOptions,
+    RecordedTrial,
+    doubts_of_record,
+    load_trial,
+    summed_up,
+)
 from analysis.findings import summarise_rig
 from analysis.report import (
     ReportContext,
@@ -141,7 +147,8 @@ def _load_trials(
                     hint="Put the file back where it came from.",
                 )
             trials.setdefault(trial.terrain, []).append(trial)
-    return trials, problems
+    judged = ((t.name, doubts_of_record(t)) for ts in trials.values() for t in ts)
+    return trials, problems + summed_up(judged)
 
 
 @dataclass(frozen=True, slots=True)

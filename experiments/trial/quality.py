@@ -11,14 +11,17 @@ from acquisition import Flag
 from analysis.data import (
     JOINT7_WARNING,
     MINIMUM_KEPT,
+    Doubt,
     PrepareOptions,
     coverage,
+    doubts_of,
+    doubts_of_record,
     find_slips,
     load_trial,
     prepare_trial,
     quick_ratio,
 )
-from experiments.operator import GOOD, WARNING
+from experiments.operator import BAD, GOOD, WARNING
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd
@@ -41,6 +44,7 @@ class Review:
         slips: number of slips.
         ratio: slope of F_t over F_n of the kept samples; NaN without load.
         counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
+        doubts: why velocity and forces cannot be right; empty if they can.
     """
 
     worst_gap: float
@@ -53,6 +57,7 @@ class Review:
     slips: int
     ratio: float
     counts: NDArray[np.int64]
+    doubts: tuple[Doubt, ...] = ()
 
     @property
     def known_ratio(self) -> float | None:
@@ -83,6 +88,7 @@ class Review:
                 f"slips {self.slips}",
             ),
             (fit, words),
+            *((BAD, doubt.text) for doubt in self.doubts),
         ]
 
     def _sensor_words(self) -> str:
@@ -131,4 +137,5 @@ def review_trial(path: Path) -> Review:
         slips=len(find_slips(prepared.smooth)),
         ratio=quick_ratio(prepared),
         counts=covered.counts,
+        doubts=(*doubts_of(prepared), *doubts_of_record(trial)),
     )

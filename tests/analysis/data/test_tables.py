@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data import tables
-from analysis.data.tables import load_tables, parse_columns, parse_stones
+from analysis.data.tables import load_tables, parse_columns
+from analysis.data.terrain_kinds import parse_stones
+from analysis.data.units import parse_units
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
 
@@ -42,6 +44,53 @@ def test_csv_is_read_with_renamed_columns_in_any_order(tmp_path):
 
 def test_csv_without_a_terrain_is_called_table(tmp_path):
     assert list(load_tables([write(tmp_path, GOOD)])) == ["table"]
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_semicolons_and_tabs_are_read_with_decimal_commas(tmp_path, delimiter):
+    text = GOOD.replace(",", delimiter).replace(".", ",")
+    (series,) = load_tables([write(tmp_path, text)])["table"]
+    assert series.v_t[0] == 0.1
+    assert series.t[-1] == 0.2
+
+
+@pytest.mark.parametrize("header", ["v_t [mm/s]", "v_t (mm/s)", "v_t[mm/s]"])
+def test_a_unit_in_the_header_is_converted(tmp_path, header):
+    text = GOOD.replace("v_t", header).replace("0.1,2", "100,2")
+    assert load_tables([write(tmp_path, text)])["table"][0].v_t[0] == 0.1
+
+
+def test_the_programs_own_headers_are_read(tmp_path):
+    text = GOOD.replace("t,v_t,F_n,F_t", "t [s],v_t [m/s],F_n [N],F_t [N]")
+    assert load_tables([write(tmp_path, text)])["table"][0].F_n[0] == 2.0
+
+
+def test_a_unit_can_be_given_for_a_csv_and_an_npz(tmp_path):
+    np.savez(tmp_path / "a.npz", **{"TF/00": rows()})
+    paths = [write(tmp_path, GOOD), tmp_path / "a.npz"]
+    units = parse_units("F_t=mN,t=ms")
+    trials = load_tables(paths, units=units)
+    assert trials["table"][0].F_t[0] == trials["TF"][0].F_t[0] == 1e-3
+    assert trials["TF"][0].t[1] == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("header", "units", "reason"),
+    [
+        ("v_t [km/h]", {}, "km/h"),
+        ("v_t [mm/s]", {"v_t": "m/s"}, "mm/s.*m/s"),
+    ],
+)
+def test_units_unknown_or_contradicted_are_refused(tmp_path, header, units, reason):
+    path = write(tmp_path, GOOD.replace("v_t", header))
+    with pytest.raises(SettingsError, match=reason):
+        load_tables([path], units=units)
+
+
+@pytest.mark.parametrize("text", ["v_t", "v_t=km/h", "x=m", "v_t=N"])
+def test_a_unit_that_a_column_cannot_have_is_refused(text):
+    with pytest.raises(SettingsError, match=text):
+        parse_units(text)
 
 
 def test_byte_order_mark_and_quotes_do_no_harm(tmp_path):

@@ -1,0 +1,185 @@
+"""Whether a trial can be what it says it is: signs, directions, units; pure.
+
+A foot that slips is slowed by the ground, pressed by it along the normal, and pushed
+aside less than along its way. A sensor that is mounted or calibrated otherwise, a
+swapped column or a wrong unit breaks one of these, and no fit notices.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data.load import RecordedTrial
+from analysis.data.prepare import PreparedTrial, Smoothed
+from analysis.data.series import Array
+
+SLOWEST = 0.005  # m/s; a slower foot sticks, and its forces may point anywhere
+PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
+FEWEST = 20  # moving samples below which nothing is judged
+FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
+FREE_MOMENT = 0.03  # moment along the force over the force [m]
+# Medians beyond which a column is in another unit than its own.
+_FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
+
+_TURNED = "the sensor is turned by 180 degrees about z, or F_t has the other sign"
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """One reason why a trial cannot be what it says it is.
+
+    Attributes:
+        name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment"
+            or "unit".
+        seen: what was measured, with the number.
+        cause: the likely cause.
+        remedy: what to do.
+    """
+
+    name: str
+    seen: str
+    cause: str
+    remedy: str = "traction calibrate sensor"
+
+    @property
+    def text(self) -> str:
+        """The doubt in one sentence and a half."""
+        return f"{self.seen}; likely: {self.cause}: {self.remedy}"
+
+
+def doubts_of(trial: PreparedTrial) -> list[Doubt]:
+    """Return why velocity and forces of a trial cannot be right; empty if they can."""
+    smooth = trial.smooth
+    units = list(_units(smooth))
+    if units:
+        return units
+    moving = np.abs(smooth.v_t) > SLOWEST
+    if np.count_nonzero(moving) < FEWEST:
+        return []
+    v, load, along = smooth.v_t[moving], smooth.F_n[moving], smooth.F_t[moving]
+    return [*_normal(load), *_signs(v, load, along)]
+
+
+def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
+    """Return why a recording cannot be that of a foot that is pushed along x_T.
+
+    It sees what velocity and two forces do not show: the force across the way, and the
+    moment.
+    """
+    v_t, F_t, F_n = recorded.traction.T
+    moving = (np.abs(v_t) > SLOWEST) & (F_n > PRESSED)
+    if np.count_nonzero(moving) < FEWEST:
+        return []
+    raw = np.ascontiguousarray(recorded.cycles["wrench_raw"][moving])
+    wrench = recorded.payload.contact(raw, recorded.rotation[moving])
+    return [
+        *_sideways(recorded.lateral[moving], F_t[moving]),
+        *_free_moment(wrench[:, :3], wrench[:, 3:]),
+    ]
+
+
+def summed_up(judged: Iterable[tuple[str, Sequence[Doubt]]]) -> list[str]:
+    """Return one line for every kind of doubt.
+
+    Args:
+        judged: (name of the trial, its doubts), in the order of the trials.
+    """
+    by_name: dict[str, list[tuple[str, Doubt]]] = {}
+    for trial, doubts in judged:
+        for doubt in doubts:
+            by_name.setdefault(doubt.name, []).append((trial, doubt))
+    return [
+        f"{', '.join(trial for trial, _ in entries[:5])}"
+        f"{' and others' if len(entries) > 5 else ''}: {entries[0][1].text}."
+        for entries in by_name.values()
+    ]
+
+
+def _units(smooth: Smoothed) -> Iterator[Doubt]:
+    fastest = float(np.quantile(np.abs(smooth.v_t), 0.9))
+    strongest = float(np.quantile(np.abs(smooth.F_n), 0.9))
+    step = float(np.median(np.diff(smooth.t)))
+    for name, value, limit, unit, looks in (
+        ("v_t", fastest, _FASTEST, "m/s", "mm/s"),
+        ("F_n", strongest, _STRONGEST, "N", "mN"),
+        ("t", step, _RAREST, "s between samples", "ms"),
+    ):
+        if value > limit:
+            yield _unit(name, value, unit, looks)
+    if 0.0 < strongest < _WEAKEST:
+        yield _unit("F_n", strongest, "N", "kN")
+
+
+def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
+    return Doubt(
+        "unit",
+        f"{name} of {value:.3g} {unit}",
+        f"these look like {looks}",
+        f"--unit {name}={looks}",
+    )
+
+
+def _normal(load: Array) -> Iterator[Doubt]:
+    median = float(np.median(load))
+    if median <= 0.0:
+        yield Doubt(
+            "normal",
+            f"the ground pulls at the moving foot: median F_n {median:.1f} N",
+            "the sensor's sign is wrong, or it was tared with the foot on the ground",
+        )
+
+
+def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
+    travel = float(v.sum()) / float(np.abs(v).sum())
+    if travel < 0.0:
+        yield Doubt(
+            "direction",
+            f"the foot goes backward in {0.5 - travel / 2:.0%} of its way",
+            "the heading of the container is turned by 180 degrees",
+            "traction calibrate terrain",
+        )
+    pressed = np.abs(load) > PRESSED
+    if np.count_nonzero(pressed) < FEWEST:
+        return
+    power = float(np.mean(along[pressed] * v[pressed]))
+    if power < 0.0:
+        mean = power / float(np.mean(np.abs(along * v)))
+        yield Doubt("power", f"the ground drives the foot ({mean:+.0%})", _TURNED)
+    ratios = along[pressed] * np.sign(v[pressed]) / np.abs(load[pressed])
+    ratio = float(np.median(ratios))
+    if ratio <= 0.0:
+        yield Doubt("ratio", f"median F_t/F_n {ratio:.2f}", _TURNED)
+    elif not FRICTION[0] <= ratio <= FRICTION[1]:
+        yield Doubt(
+            "friction",
+            f"median F_t/F_n {ratio:.2g} is outside {FRICTION[0]:g} to {FRICTION[1]:g}",
+            "F_t and F_n are swapped, or the tare or a calibration is wrong",
+        )
+
+
+def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:
+    aside, forward = float(np.median(np.abs(lateral))), float(np.median(np.abs(along)))
+    if aside > forward:
+        yield Doubt(
+            "lateral",
+            f"{aside:.1f} N across the way, {forward:.1f} N along it",
+            "the sensor is turned by 90 degrees about z, or the heading is wrong",
+        )
+
+
+def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
+    """Judge the part of the moment along the force, which no point of action gives.
+
+    A force at a point has no moment along itself; what a rubbing sole adds about the
+    normal is small against the force times the sole's radius.
+    """
+    along = np.einsum("ni,ni->n", force, moment)
+    pitch = float(np.median(np.abs(along) / np.einsum("ni,ni->n", force, force)))
+    if pitch > FREE_MOMENT:
+        yield Doubt(
+            "moment",
+            f"moment along the force {pitch * 1e3:.0f} mm times the force "
+            f"(limit {FREE_MOMENT * 1e3:.0f})",
+            "axes of the moment are swapped, or the sensor's calibration is another's",
+        )

@@ -1,0 +1,132 @@
+"""Trials that cannot be what they say: each disturbance is named with its cause."""
+
+import tarfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.data.load import load_trial
+from analysis.data.plausibility import doubts_of, doubts_of_record, summed_up
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.series import TractionSeries
+
+RECORDED = Path(__file__).parents[2] / "data" / "recorded" / "session-0.1.tar.xz"
+TIME, SPEED, LOAD, ALONG = range(4)
+
+
+def pushed(seconds=3.0):
+    """Return t, v_t, F_n, F_t of a foot that sticks and slips, shape (n, 4)."""
+    t = np.arange(0.0, seconds, 0.002)
+    phase = np.sin(2 * np.pi * 1.5 * t)
+    v_t = np.where(phase > 0.0, 0.1 * phase, -0.002)
+    F_n = 5.0 + 2.0 * np.sin(2 * np.pi * 0.7 * t)
+    F_t = np.where(phase > 0.0, 0.8 * F_n, 0.3 * F_n)
+    return np.column_stack([t, v_t, F_n, F_t])
+
+
+def names(table):
+    series = TractionSeries("S0", "T01", *table.T)
+    return {doubt.name for doubt in doubts_of(prepare_trial(series, PrepareOptions()))}
+
+
+def times(column, factor):
+    def disturb(table):
+        table[:, column] *= factor
+        return table
+
+    return disturb
+
+
+def test_a_push_as_it_should_be_raises_no_doubt():
+    assert names(pushed()) == set()
+
+
+def test_a_foot_that_never_moves_is_not_judged():
+    table = pushed()
+    table[:, SPEED] = 0.0
+    assert names(table) == set()
+
+
+@pytest.mark.parametrize(
+    ("disturb", "expected"),
+    [
+        (times(ALONG, -1), {"power", "ratio"}),
+        (times(LOAD, -1), {"normal"}),
+        (times(SPEED, -1), {"direction", "power", "ratio"}),
+        (times(SPEED, 1e3), {"unit"}),
+        (times(TIME, 1e3), {"unit"}),
+        (times(LOAD, 1e3), {"unit"}),
+        (times(LOAD, 1e-3), {"unit"}),
+        (times(ALONG, 1e3), {"friction"}),
+        (times(ALONG, 0.1), {"friction"}),
+    ],
+    ids=[
+        *("sign of F_t", "sign of F_n", "heading by 180 degrees"),
+        *("mm/s", "ms", "mN", "kN", "F_t in mN", "friction of ice"),
+    ],
+)
+def test_a_disturbed_table_is_doubted_for_what_was_done_to_it(disturb, expected):
+    assert names(disturb(pushed())) == expected
+
+
+def test_a_unit_that_looks_wrong_is_named_with_the_option_that_mends_it():
+    series = TractionSeries("S0", "T01", *times(SPEED, 1e3)(pushed()).T)
+    (doubt,) = doubts_of(prepare_trial(series, PrepareOptions()))
+    assert doubt.remedy == "--unit v_t=mm/s"
+
+
+def test_doubts_of_one_kind_are_one_line_with_their_trials():
+    series = TractionSeries("S0", "T01", *times(ALONG, 1e3)(pushed()).T)
+    doubts = doubts_of(prepare_trial(series, PrepareOptions()))
+    (line,) = summed_up([("T01", doubts), ("T02", doubts)])
+    assert line.startswith("T01, T02: ")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """Return a trial of the session that version 0.1 recorded."""
+    folder = tmp_path_factory.mktemp("recorded")
+    with tarfile.open(RECORDED) as archive:
+        archive.extractall(folder, filter="data")
+    path = min(p for p in folder.rglob("trials/T*.mcap") if "truth" not in p.name)
+    return load_trial(path)
+
+
+def kinds(recorded):
+    return {doubt.name for doubt in doubts_of_record(recorded)}
+
+
+def turned(recorded, degrees):
+    """Return the trial as a sensor that is turned about z would have shown it."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    v_t, F_t, F_n = recorded.traction.T
+    along, across = c * F_t - s * recorded.lateral, s * F_t + c * recorded.lateral
+    return replace(
+        recorded, traction=np.column_stack([v_t, along, F_n]), lateral=across
+    )
+
+
+def test_a_recorded_trial_raises_no_doubt(recorded):
+    prepared = prepare_trial(recorded.series(), PrepareOptions())
+    assert kinds(recorded) == set()
+    assert doubts_of(prepared) == []
+
+
+def test_a_sensor_turned_by_90_degrees_shows_more_force_across_than_along(recorded):
+    assert kinds(turned(recorded, 90)) == {"lateral"}
+
+
+def test_a_sensor_turned_by_180_degrees_shows_a_ground_that_drives_the_foot(recorded):
+    half = turned(recorded, 180)
+    prepared = prepare_trial(half.series(), PrepareOptions())
+    assert {doubt.name for doubt in doubts_of(prepared)} == {"power", "ratio"}
+
+
+def test_swapped_axes_of_the_moment_do_not_belong_to_the_force(recorded):
+    cycles = recorded.cycles.copy()
+    raw = cycles["wrench_raw"]
+    raw[:, [3, 4]] = raw[:, [4, 3]]
+    swapped = replace(recorded, cycles=cycles)
+    assert kinds(swapped) == {"moment"}
