@@ -85,8 +85,16 @@ class RigBackend(Protocol):
         ...
 
 
-def measure_exchange(arm: WamArm, clock: Clock) -> list[int]:
+def measure_exchange(
+    arm: WamArm, clock: Clock, on_cycle: Callable[[int], object] | None = None
+) -> list[int]:
     """Ask `arm` 100 times for its positions, one period apart, without torque.
+
+    Args:
+        arm: the arm.
+        clock: the time of the loop.
+        on_cycle: called with the time [ns] after every exchange, for what must not
+            wait meanwhile.
 
     Returns:
         From request to seventh position [ns]; incomplete exchanges are left out.
@@ -98,6 +106,8 @@ def measure_exchange(arm: WamArm, clock: Clock) -> list[int]:
         reading = arm.read(clock.now_ns())
         if reading.is_complete:
             times.append(reading.arm_ns - reading.host_ns)
+        if on_cycle is not None:
+            on_cycle(clock.now_ns())
         next_ns = max(next_ns + PERIOD_NS, clock.now_ns())
     return times
 
@@ -160,8 +170,12 @@ class InProcessBackend:
         return self.arm.start()
 
     def measure_exchange(self) -> list[int]:
-        """Ask 100 times for the positions, without torque."""
-        return measure_exchange(self.arm, self._clock)
+        """Ask 100 times for the positions, without torque.
+
+        The sensor's port is read meanwhile, or its buffer overflows before the loop.
+        """
+        poll = self._sensor.poll if self._sensor is not None else None
+        return measure_exchange(self.arm, self._clock, poll)
 
     def open_sensor(self) -> dict[str, str]:
         """Open the wrist sensor; return what it says about itself."""

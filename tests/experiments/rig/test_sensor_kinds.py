@@ -1,5 +1,7 @@
 """Whole sessions with each of the serial wrist sensors."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -47,6 +49,7 @@ def test_a_session_runs_with_a_sensor_of_each_kind(
     done = run_short(configured(kind), data)
     assert done.code == 0, done.err
     assert NAMES[kind] in done.out
+    assert re.search(r"F/T stream .* 0 of [0-9]+ lost, 0 damaged", done.out)
     trial = only_session(data) / "trials" / "T01.mcap"
     assert sidecar(trial)["status"] == "complete"
     cycles = TrialReader(trial).cycles().data
