@@ -24,7 +24,7 @@ COMMANDS = {
     "replay": "show a trial again, or a bus log in words",
     "export": "trials as CSV tables with units and checksums",
     "init": "write rig.toml and matrix.toml to be edited",
-    "verify": "are the kept trials still what the journal says?",
+    "verify": "hold kept trials against the checksums of the journal",
     "recover": "save what is sound of trials that were not ended",
     "rehearse": "the whole study simulated, held against what it has to show",
     "report": "fit and compare models of recorded sessions, write the report",

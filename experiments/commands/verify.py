@@ -1,4 +1,4 @@
-"""traction verify: are the kept trials still what the journal says?"""
+"""traction verify: hold kept trials against the checksums of the journal."""
 
 import argparse
 
