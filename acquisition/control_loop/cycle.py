@@ -117,12 +117,13 @@ class Cycle:
         are there when the pendant activates the arm, or it would fall for a moment.
         """
         self._requested = REQUESTS[state]
-        self.status.verdict = None
+        self._move = self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
         """Ask for a move to joint positions `goal` [rad], seven; only in hold.
 
-        No joint is faster than `speed` [rad/s] on the way.
+        No joint is faster than `speed` [rad/s] on the way. While a verdict stands no
+        move begins: hold has to be asked for before.
         """
         self._move = np.array(goal), speed
 
@@ -151,7 +152,9 @@ class Cycle:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0 and status.state not in _UNPOWERED:
+        # Without all replies the motors keep their torques; a false one is taken back.
+        is_known = reading.is_complete or reading.jump is not None
+        if is_known and status.state not in _UNPOWERED:
             bounded = bounded_torque(tau, sent, self.limits.torque)
             sent = self._arm.send(bounded, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
@@ -202,6 +205,8 @@ class Cycle:
         if move is None or reading.missing_cycles:
             return
         self._move = None
+        if self.status.verdict is not None:
+            return
         try:
             self.law.move_to(*move, reading)
         except ValueError:

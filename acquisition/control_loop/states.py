@@ -9,13 +9,20 @@ from acquisition.devices import SafetyMode
 
 
 class ArmState(IntEnum):
-    """What the arm is doing (architecture: safety states)."""
+    """What the arm is doing.
+
+    IDLE: pucks off and braked, confirmed. FLOAT: gravity compensation and the virtual
+    mass, as in a trial. HOLD: it stands still where it is. DAMP: the same after a
+    fault of motion. UNKNOWN: idle was asked for and is not confirmed. GUIDE: gravity
+    compensation and damping, for a hand that carries it between two trials.
+    """
 
     IDLE = 0
     FLOAT = 1
     HOLD = 2
     DAMP = 3
     UNKNOWN = 4
+    GUIDE = 5
 
 
 class ArmEvent(Enum):
@@ -25,6 +32,7 @@ class ArmEvent(Enum):
     REQUEST_FLOAT = "float requested"
     REQUEST_HOLD = "hold requested"
     REQUEST_DAMP = "damp requested"
+    REQUEST_GUIDE = "guide requested"
     VERDICT_HOLD = "verdict: hold"
     VERDICT_DAMP = "verdict: damp"
     VERDICT_IDLE = "verdict: idle"
@@ -38,6 +46,7 @@ REQUESTS: Mapping[ArmState, ArmEvent] = {
     ArmState.FLOAT: ArmEvent.REQUEST_FLOAT,
     ArmState.HOLD: ArmEvent.REQUEST_HOLD,
     ArmState.DAMP: ArmEvent.REQUEST_DAMP,
+    ArmState.GUIDE: ArmEvent.REQUEST_GUIDE,
 }
 VERDICTS: Mapping[Action, ArmEvent] = {
     Action.HOLD: ArmEvent.VERDICT_HOLD,
@@ -61,6 +70,7 @@ class Transition:
 
 
 _STAY = Transition()
+_MOVABLE = (ArmState.FLOAT, ArmState.HOLD, ArmState.GUIDE)
 _BRAKE = Transition(brakes=True)
 
 
@@ -79,9 +89,11 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.REQUEST_FLOAT: _always(Transition(ArmState.FLOAT)),
     ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
     ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
+    ArmEvent.REQUEST_GUIDE: _always(Transition(ArmState.GUIDE)),
     # No verdict makes an earlier fault milder, and none gives a braked arm torques.
-    ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, ArmState.FLOAT),
-    ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, ArmState.FLOAT, ArmState.HOLD),
+    # Hold is entered from hold too: the arm may be moving by itself in it.
+    ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),
+    ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, *_MOVABLE),
     ArmEvent.VERDICT_IDLE: _always(_BRAKE),
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),

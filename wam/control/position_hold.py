@@ -1,0 +1,68 @@
+"""Joints that stand still: a spring to where they stood, of bounded torque, damped."""
+
+import numpy as np
+
+from acquisition import ArmReading
+from wam.control.joint_lock import LOCKED_JOINT
+from wam.model import ArmConstants, Array
+
+# Shares of the vendor's gains of joint PD. With them no pose of the arm has a motion
+# damped by less than 0.18 of critical, drives without friction, and all of it stays
+# stable at twice both gains: python -m pytest tests/wam/control/test_hold_stability.py
+_STIFFNESS, _DAMPING = 0.5, 2.0
+# Of the springs, joints 1 to 7; the lock holds joint 7. At joint 2 it is three times
+# the 4 N m that a foot of 0.6 kg forgotten in rig.toml weighs, and a person who moves
+# the arm away at 0.7 m needs 17 N.
+TORQUE_LIMIT = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m
+
+
+class PositionHold:
+    """Springs and dampers of joints 1 to 6.
+
+        tau = clip(k (q_ref - q), -limit, limit) - d qd
+
+    The reference follows a joint that goes further than limit / k from it (10 to 40
+    mrad): a moving arm is braked by `limit` and the damper, and an arm that is pushed
+    away stays where it is left instead of springing back.
+    """
+
+    def __init__(self, constants: ArmConstants) -> None:
+        self._k = _STIFFNESS * constants.kp
+        self._d = _DAMPING * constants.kd
+        self._k[LOCKED_JOINT] = self._d[LOCKED_JOINT] = 0.0
+        self._reach = TORQUE_LIMIT / np.maximum(self._k, 1.0)
+        self._reference: Array | None = None
+
+    def begin(self, q: Array, spring: Array | None = None) -> None:
+        """Hold where the joints are; arms that are held stay where they are held.
+
+        Args:
+            q: joint positions [rad], shape (7,).
+            spring: torques that the springs give at first [N m], shape (7,); None = 0.
+        """
+        if self._reference is not None:
+            return
+        self._reference = q.copy()
+        if spring is not None:
+            self._reference += np.clip(spring / np.maximum(self._k, 1.0), *self._span)
+
+    def release(self) -> None:
+        """Let the joints go."""
+        self._reference = None
+
+    def spring(self, reading: ArmReading) -> Array:
+        """Return the torques of the springs alone [N m], shape (7,)."""
+        if self._reference is None:
+            return np.zeros(7)
+        error = np.clip(self._reference - reading.q, *self._span)
+        if reading.is_complete:  # an extrapolated position drags no reference along
+            self._reference = reading.q + error
+        return self._k * error
+
+    def torque(self, reading: ArmReading) -> Array:
+        """Return the torques that keep joints 1 to 6 where they are [N m], (7,)."""
+        return self.spring(reading) - self._d * reading.qd
+
+    @property
+    def _span(self) -> tuple[Array, Array]:
+        return -self._reach, self._reach
