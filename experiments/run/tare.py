@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from acquisition import PreflightError, TractionError
-from acquisition.ipc import unpack_wrenches
 from acquisition.control_loop import ArmState
+from acquisition.ipc import unpack_wrenches
 from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
 from experiments.operator import Prompt

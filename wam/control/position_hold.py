@@ -24,13 +24,17 @@ class PositionHold:
     The reference follows a joint that goes further than limit / k from it (10 to 40
     mrad): a moving arm is braked by `limit` and the damper, and an arm that is pushed
     away stays where it is left instead of springing back.
+
+    Attributes:
+        stiffness: of the springs [N m/rad], shape (7,).
+        damping: of the dampers [N m s/rad], shape (7,).
     """
 
     def __init__(self, constants: ArmConstants) -> None:
-        self._k = _STIFFNESS * constants.kp
-        self._d = _DAMPING * constants.kd
-        self._k[LOCKED_JOINT] = self._d[LOCKED_JOINT] = 0.0
-        self._reach = TORQUE_LIMIT / np.maximum(self._k, 1.0)
+        self.stiffness = _STIFFNESS * constants.kp
+        self.damping = _DAMPING * constants.kd
+        self.stiffness[LOCKED_JOINT] = self.damping[LOCKED_JOINT] = 0.0
+        self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0)
         self._reference: Array | None = None
 
     def begin(self, q: Array, spring: Array | None = None) -> None:
@@ -44,7 +48,9 @@ class PositionHold:
             return
         self._reference = q.copy()
         if spring is not None:
-            self._reference += np.clip(spring / np.maximum(self._k, 1.0), *self._span)
+            self._reference += np.clip(
+                spring / np.maximum(self.stiffness, 1.0), *self._span
+            )
 
     def release(self) -> None:
         """Let the joints go."""
@@ -57,11 +63,11 @@ class PositionHold:
         error = np.clip(self._reference - reading.q, *self._span)
         if reading.is_complete:  # an extrapolated position drags no reference along
             self._reference = reading.q + error
-        return self._k * error
+        return self.stiffness * error
 
     def torque(self, reading: ArmReading) -> Array:
         """Return the torques that keep joints 1 to 6 where they are [N m], (7,)."""
-        return self.spring(reading) - self._d * reading.qd
+        return self.spring(reading) - self.damping * reading.qd
 
     @property
     def _span(self) -> tuple[Array, Array]:

@@ -10,7 +10,8 @@ from acquisition.control_loop.states import (
     transition_lines,
 )
 
-# Rows: events; columns: idle, float, hold, damp, unknown, guide. "b" = brakes, "." = nothing.
+# Rows: events; columns: idle, float, hold, damp, unknown, guide.
+# "b" = brakes, "." = nothing.
 TABLE = """
 idle requested            b b b b b b
 float requested           F F F F F F
