@@ -3,13 +3,14 @@
 import numpy as np
 
 from acquisition import ArmReading
-from wam.control.joint_lock import LOCKED_JOINT
 from wam.model import ArmConstants, Array
 
-# Shares of the vendor's gains of joint PD. With them no pose of the arm has a motion
-# damped by less than 0.18 of critical, drives without friction, and all of it stays
-# stable at twice both gains: python -m pytest tests/wam/control/test_hold_stability.py
-_STIFFNESS, _DAMPING = 0.5, 2.0
+# Shares of the vendor's gains of joint PD, which are made to follow moves: softer, and
+# damped the more the heavier the joint is. In no pose a swing of the arm is damped by
+# less than 0.29 of critical, its drives without friction, and all of it stays stable at
+# twice both gains: tests/wam/control/test_hold_stability.py.
+_STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0])
+_DAMPING = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0])
 # Of the springs, joints 1 to 7; the lock holds joint 7. At joint 2 it is three times
 # the 4 N m that a foot of 0.6 kg forgotten in rig.toml weighs, and a person who moves
 # the arm away at 0.7 m needs 17 N.
@@ -33,7 +34,6 @@ class PositionHold:
     def __init__(self, constants: ArmConstants) -> None:
         self.stiffness = _STIFFNESS * constants.kp
         self.damping = _DAMPING * constants.kd
-        self.stiffness[LOCKED_JOINT] = self.damping[LOCKED_JOINT] = 0.0
         self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0)
         self._reference: Array | None = None
 

@@ -19,7 +19,8 @@ from wam.model.arm_model import drive_inertia_matrix
 
 T, DELAY = 0.002, 0.5  # s; share of a cycle
 LOCK = LockGains()
-DAMPED = 0.15  # of critical, the worst motion of all poses
+# Of critical, in the worst of all poses. Joint 7 has a lock of its own, which is fast.
+DAMPED, DAMPED_FAST, FAST = 0.28, 0.18, 60.0  # FAST: rad/s
 pin = importlib.import_module("pinocchio")
 
 
@@ -83,7 +84,9 @@ def test_every_motion_in_every_pose_is_damped():
         s = modes(q, 1.0)
         swinging = s[np.abs(s.imag) > 1.0]
         assert s.real.max() < 0.0
-        assert (-swinging.real / np.abs(swinging)).min() > DAMPED
+        damped = -swinging.real / np.abs(swinging)
+        assert damped.min() > DAMPED_FAST
+        assert damped[np.abs(swinging) < FAST].min(initial=1.0) > DAMPED
 
 
 def test_twice_the_gains_of_the_hold_are_stable_and_six_times_are_not():
