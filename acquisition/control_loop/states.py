@@ -33,6 +33,7 @@ class ArmEvent(Enum):
     REQUEST_HOLD = "hold requested"
     REQUEST_DAMP = "damp requested"
     REQUEST_GUIDE = "guide requested"
+    VERDICT_END_TRIAL = "verdict: end trial"
     VERDICT_HOLD = "verdict: hold"
     VERDICT_DAMP = "verdict: damp"
     VERDICT_IDLE = "verdict: idle"
@@ -49,6 +50,7 @@ REQUESTS: Mapping[ArmState, ArmEvent] = {
     ArmState.GUIDE: ArmEvent.REQUEST_GUIDE,
 }
 VERDICTS: Mapping[Action, ArmEvent] = {
+    Action.END_TRIAL: ArmEvent.VERDICT_END_TRIAL,
     Action.HOLD: ArmEvent.VERDICT_HOLD,
     Action.DAMP: ArmEvent.VERDICT_DAMP,
     Action.IDLE: ArmEvent.VERDICT_IDLE,
@@ -90,6 +92,7 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
     ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
     ArmEvent.REQUEST_GUIDE: _always(Transition(ArmState.GUIDE)),
+    ArmEvent.VERDICT_END_TRIAL: _always(_STAY),
     # No verdict makes an earlier fault milder, and none gives a braked arm torques.
     # Hold is entered from hold too: the arm may be moving by itself in it.
     ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),

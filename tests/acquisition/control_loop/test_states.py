@@ -18,6 +18,7 @@ float requested           F F F F F F
 hold requested            H H H H H H
 damp requested            D D D D D D
 guide requested           G G G G G G
+verdict: end trial        . . . . . .
 verdict: hold             . H H . . H
 verdict: damp             . D D . . D
 verdict: idle             b b b b b b
