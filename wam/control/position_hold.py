@@ -11,6 +11,7 @@ from wam.model import ArmConstants, Array
 # twice both gains: tests/wam/control/test_hold_stability.py.
 _STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0])
 _DAMPING = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0])
+_SLOW = 0.05  # rad/s
 # Of the springs, joints 1 to 7; the lock holds joint 7. At joint 2 it is three times
 # the 4 N m that a foot of 0.6 kg forgotten in rig.toml weighs, and a person who moves
 # the arm away at 0.7 m needs 17 N.
@@ -23,8 +24,9 @@ class PositionHold:
         tau = clip(k (q_ref - q), -limit, limit) - d qd
 
     The reference follows a joint that goes further than limit / k from it (10 to 40
-    mrad): a moving arm is braked by `limit` and the damper, and an arm that is pushed
-    away stays where it is left instead of springing back.
+    mrad): a moving arm is braked by `limit` and the damper. A spring drives no joint
+    faster than 0.05 rad/s: beyond, the reference follows it, too. So an arm that is
+    pushed away stays where it is left, and one that was stopped does not swing back.
 
     Attributes:
         stiffness: of the springs [N m/rad], shape (7,).
@@ -61,6 +63,7 @@ class PositionHold:
         if self._reference is None:
             return np.zeros(7)
         error = np.clip(self._reference - reading.q, *self._span)
+        error[(error * reading.qd > 0.0) & (np.abs(reading.qd) > _SLOW)] = 0.0
         if reading.is_complete:  # an extrapolated position drags no reference along
             self._reference = reading.q + error
         return self.stiffness * error
