@@ -268,6 +268,17 @@ def _narrow(scene):
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
+def _tender(scene):
+    """Let the weight of a push be too much moment."""
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, contact_moment=0.001)
+
+
+def _lean(scene):
+    """Press on a standing foot more than a push does."""
+    scene.rig.plant.finger = (0.0, 0.0, 60.0)
+
+
 def _saturate(scene):
     scene.rig.faults()["ft-saturated"]()
 
@@ -391,6 +402,10 @@ CASES = {
     "not-ready": found_at_once("puck-silent", words="Puck 3 has not answered for "),
     # what ends a trial and not the session: the second attempt is not begun here
     "ft-stale": fault("ft-stale@T2+0.1s", words="T02 stopped at 0.1 s"),
+    "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
+    "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
+    "contact-moment": acted(Prompt.RECORDING, _tender, words="N m on the foot (limit"),
+    "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),
