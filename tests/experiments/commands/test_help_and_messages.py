@@ -13,6 +13,7 @@ from string import Formatter
 import numpy as np
 import pytest
 
+from acquisition.control_loop import contact
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
 from experiments import settings
@@ -275,7 +276,8 @@ def _tender(scene):
 
 
 def _lean(scene):
-    """Press on a standing foot more than a push does."""
+    """Press more than a push does on a foot that stands, as this one is not yet."""
+    scene.patch.setattr(contact, "STANDING", 1.0)
     scene.rig.plant.finger = (0.0, 0.0, 60.0)
 
 
