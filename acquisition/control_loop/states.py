@@ -13,8 +13,8 @@ class ArmState(IntEnum):
 
     IDLE: pucks off and braked, confirmed. FLOAT: gravity compensation and the virtual
     mass, as in a trial. HOLD: it stands still where it is. DAMP: the same after a
-    fault of motion. UNKNOWN: idle was asked for and is not confirmed. GUIDE: gravity
-    compensation and damping, for a hand that carries it between two trials.
+    fault of motion. UNKNOWN: idle was asked for and is not confirmed. GUIDE: it
+    stands still with half the torque, for a hand that carries it to the next trial.
     """
 
     IDLE = 0

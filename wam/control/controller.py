@@ -11,19 +11,20 @@ from wam.control.soft_walls import SoftWalls
 from wam.model import ArmModel, VirtualMass, compensation
 
 TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
-_STANDING = frozenset({ArmState.HOLD, ArmState.DAMP})
-_POWERED = frozenset({ArmState.FLOAT, ArmState.GUIDE, *_STANDING})
+_STANDING = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
+_POWERED = frozenset({ArmState.FLOAT, *_STANDING})
 
 
 class FootController:
     """Torques of float, guide, hold and damp (implements ControlLaw).
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
-    their bounce. guide: gravity and joint damping. hold and damp: gravity, joint
-    damping and springs of bounded torque that keep the joints where they are. The
-    virtual mass is ramped to 0 in all but float. Joint 7 is locked in all four, and
-    soft walls stand before the stops. In hold the arm can be sent somewhere; joint PD
-    then follows the move and keeps the goal until a state is entered, hold included.
+    their bounce. hold and damp: gravity, joint damping and springs of bounded torque
+    that keep the joints where they are. guide: the same, weak enough for a hand that
+    carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
+    locked in all four, and soft walls stand before the stops. In hold the arm can be
+    sent somewhere; joint PD then follows the move and keeps the goal until a state is
+    entered, hold included.
     """
 
     def __init__(
@@ -135,10 +136,8 @@ class FootController:
         """
         if self._state is ArmState.FLOAT:
             return np.zeros(7)
-        if self._state is ArmState.GUIDE:
-            tau = -self._model.constants.kd * reading.qd
-        else:
-            tau = self._hold.torque(reading)
+        is_guided = self._state is ArmState.GUIDE
+        tau = self._hold.torque(reading, is_guided=is_guided)
         lowest = np.minimum(-self._largest - gravity, 0.0)
         return np.clip(tau, lowest, np.maximum(self._largest - gravity, 0.0))
 

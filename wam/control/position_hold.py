@@ -11,6 +11,9 @@ from wam.model import ArmConstants, Array
 # twice both gains: tests/wam/control/test_hold_stability.py.
 _STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0])
 _DAMPING = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0])
+# In guide the springs have this share of it, and the dampers the vendor's gains: a hand
+# carries the arm (joint 2 with 9 N at 0.7 m), and left alone it stands still.
+GUIDE_SHARE = 0.5
 _SLOW = 0.05  # rad/s
 # Of the springs, joints 1 to 7; the lock holds joint 7. At joint 2 it is three times
 # the 4 N m that a foot of 0.6 kg forgotten in rig.toml weighs, and a person who moves
@@ -31,11 +34,13 @@ class PositionHold:
     Attributes:
         stiffness: of the springs [N m/rad], shape (7,).
         damping: of the dampers [N m s/rad], shape (7,).
+        guide_damping: of those of a guided arm [N m s/rad], shape (7,).
     """
 
     def __init__(self, constants: ArmConstants) -> None:
         self.stiffness = _STIFFNESS * constants.kp
         self.damping = _DAMPING * constants.kd
+        self.guide_damping = np.sign(_DAMPING) * constants.kd
         self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0)
         self._reference: Array | None = None
 
@@ -51,27 +56,33 @@ class PositionHold:
         self._reference = q.copy()
         if spring is not None:
             self._reference += np.clip(
-                spring / np.maximum(self.stiffness, 1.0), *self._span
+                spring / np.maximum(self.stiffness, 1.0), -self._reach, self._reach
             )
 
     def release(self) -> None:
         """Let the joints go."""
         self._reference = None
 
-    def spring(self, reading: ArmReading) -> Array:
-        """Return the torques of the springs alone [N m], shape (7,)."""
+    def spring(self, reading: ArmReading, share: float = 1.0) -> Array:
+        """Return the torques of the springs alone [N m], shape (7,).
+
+        They have `share` of their largest torques.
+        """
         if self._reference is None:
             return np.zeros(7)
-        error = np.clip(self._reference - reading.q, *self._span)
+        reach = share * self._reach
+        error = np.clip(self._reference - reading.q, -reach, reach)
         error[(error * reading.qd > 0.0) & (np.abs(reading.qd) > _SLOW)] = 0.0
         if reading.is_complete:  # an extrapolated position drags no reference along
             self._reference = reading.q + error
         return self.stiffness * error
 
-    def torque(self, reading: ArmReading) -> Array:
-        """Return the torques that keep joints 1 to 6 where they are [N m], (7,)."""
-        return self.spring(reading) - self.damping * reading.qd
+    def torque(self, reading: ArmReading, *, is_guided: bool = False) -> Array:
+        """Return the torques that keep joints 1 to 6 where they are [N m], (7,).
 
-    @property
-    def _span(self) -> tuple[Array, Array]:
-        return -self._reach, self._reach
+        A guided arm is kept with half of them only, and damped less.
+        """
+        if is_guided:
+            spring = self.spring(reading, GUIDE_SHARE)
+            return spring - self.guide_damping * reading.qd
+        return self.spring(reading) - self.damping * reading.qd

@@ -13,6 +13,7 @@ from wam.model.gravity import compensation
 S = 1_000_000_000
 DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])
 MASS = 0.3
+POWERED = [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE]
 
 
 def reading(seconds, *, q=DOWN, qd=None, qd7_raw=0.0):
@@ -54,7 +55,7 @@ def test_the_virtual_mass_comes_in_two_seconds(law, foot_model, seconds, mass):
     assert np.allclose(gravity, compensation(foot_model, DOWN, mass), atol=1e-12)
 
 
-@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE])
 def test_the_virtual_mass_leaves_in_two_seconds(law, foot_model, state):
     law.enter(ArmState.FLOAT, reading(0.0))
     law.enter(state, reading(10.0))
@@ -70,7 +71,7 @@ def test_floating_has_no_damping_but_at_joint_7(law):
     assert np.array_equal(tau[:6], gravity[:6])
 
 
-@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE])
 def test_holding_and_damping_brake_every_joint(law, foot_model, state):
     law.enter(state, reading(0.0))
     qd = np.linspace(-1.0, 1.0, 7) + 0.1
@@ -89,7 +90,7 @@ def test_torques_do_not_jump_from_float_to_hold_at_rest(law):
     assert np.allclose(before, after, atol=1e-12)
 
 
-@pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", POWERED)
 def test_joint_7_is_locked_where_it_was(law, state):
     law.enter(state, reading(0.0))
     tau, gravity = law.torque(reading(5.0, q=moved(0.01)))
@@ -154,7 +155,7 @@ def folded(depth):
     return q
 
 
-@pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", POWERED)
 def test_a_wall_pushes_back_in_every_powered_state(foot_model, state):
     law = with_walls(foot_model)
     law.enter(ArmState.FLOAT, reading(0.5, q=folded(0.05)))  # held nowhere else

@@ -21,6 +21,7 @@ T, DELAY = 0.002, 0.5  # s; share of a cycle
 LOCK = LockGains()
 # Of critical, in the worst of all poses. Joint 7 has a lock of its own, which is fast.
 DAMPED, DAMPED_FAST, FAST = 0.28, 0.18, 60.0  # FAST: rad/s
+DAMPED_GUIDE = 0.07
 pin = importlib.import_module("pinocchio")
 
 
@@ -32,19 +33,21 @@ def inertia(q):
     return upper + np.triu(upper, 1).T + drive_inertia_matrix(CONSTANTS)
 
 
-def gains(scale):
+HOLD = PositionHold(CONSTANTS)
+
+
+def gains(scale, damping):
     """Return (stiffness, damping, damping on the raw velocity), shape (7, 7) each."""
-    hold = PositionHold(CONSTANTS)
-    k, d = (np.diag(scale * g) for g in (hold.stiffness, hold.damping))
+    k, d = (np.diag(scale * g) for g in (HOLD.stiffness, damping))
     raw = np.zeros((7, 7))
     k[6, 6], raw[6, 6] = LOCK.kp, LOCK.kd
     return k, d, raw
 
 
-def modes(q, scale):
+def modes(q, scale, damping=HOLD.damping):
     """Return the logarithms of the cycle's eigenvalues over time [1/s]."""
     one, none = np.eye(7), np.zeros((7, 7))
-    k, d, raw = gains(scale)
+    k, d, raw = gains(scale, damping)
     share = ArmSettings().velocity_pole * T
     share /= 1.0 + share
     # State: q, qd, q before, filtered velocity before, torque before.
@@ -87,6 +90,13 @@ def test_every_motion_in_every_pose_is_damped():
         damped = -swinging.real / np.abs(swinging)
         assert damped.min() > DAMPED_FAST
         assert damped[np.abs(swinging) < FAST].min(initial=1.0) > DAMPED
+
+
+def test_an_arm_that_is_guided_is_stable_in_every_pose():
+    for q in poses():
+        s = modes(q, 1.0, HOLD.guide_damping)
+        swinging = s[np.abs(s.imag) > 1.0]
+        assert (-swinging.real / np.abs(swinging)).min() > DAMPED_GUIDE
 
 
 def test_twice_the_gains_of_the_hold_are_stable_and_six_times_are_not():
