@@ -1,5 +1,7 @@
 """Too much load on the foot ends a trial, and beyond a second limit the arm holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,10 @@ from acquisition.control_loop.faults import (
     Fault,
     ForceGrowth,
 )
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import PositionJump
 from acquisition.sample import Sample
+from tests.acquisition.control_loop.test_cycle import Bench, Observer
 from tests.acquisition.control_loop.test_guard import LIMITS
 
 START_NS = 10**10
@@ -137,3 +142,64 @@ def test_the_load_of_a_sample_is_that_of_its_wrench_and_sole():
 def test_a_sample_without_a_force_has_no_load():
     nothing = contact_of(Sample(), 0)
     assert follow([nothing] * 400)[0] is OK
+
+
+class FootUnderLoad(Observer):
+    """Shows the force of the wrench as that on the foot."""
+
+    def observe(self, reading, wrench, sample):
+        if wrench is not None:
+            sample.wrench[:] = wrench.wrench
+        return super().observe(reading, wrench, sample)
+
+    def set_bias(self, bias):
+        """Have no bias."""
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    bench.observer = FootUnderLoad()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    return bench
+
+
+def test_a_load_ends_the_trial_and_leaves_the_arm_as_it_is(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.run(10, force=120.0)
+    assert bench.reason == "contact-force"
+    assert bench.state is ArmState.FLOAT
+    assert not bench.cycle.is_recording
+
+
+def test_a_load_beyond_the_second_limit_makes_the_arm_hold(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.cycle.is_recording = False
+    bench.run(10, force=160.0)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "contact-force")
+
+
+def test_a_load_that_grows_while_the_trial_ends_makes_the_arm_hold_after_all(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.run(10, force=120.0)
+    bench.run(10, force=160.0)
+    assert bench.state is ArmState.HOLD
+
+
+def test_before_the_first_tare_nothing_is_known_of_the_load(bench):
+    bench.run(10, force=160.0)
+    assert bench.reason == ""
+
+
+def test_a_false_position_gets_torques_and_a_missing_one_keeps_the_last(bench):
+    bench.arm.missing = 1
+    sent = len(bench.arm.sent)
+    bench.run()
+    assert len(bench.arm.sent) == sent
+    usual = bench.arm.reading
+    jump = PositionJump(motor=3, counts=900, speed=20.0)
+    bench.arm.reading = lambda now_ns: replace(usual(now_ns), jump=jump)
+    bench.run()
+    assert len(bench.arm.sent) == sent + 1

@@ -1,10 +1,11 @@
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading
+from acquisition.devices import ArmReading, PositionJump
 from wam.control.controller import FootController
 from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
@@ -209,6 +210,15 @@ def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
     after = law.torque(reading(1.0, q=sagged))[0]
     assert after == pytest.approx(before, abs=1e-9)
     assert before[1] - law.torque(reading(1.0))[0][1] == pytest.approx(-2.5, abs=0.1)
+
+
+@pytest.mark.parametrize("state", POWERED)
+def test_a_false_position_is_given_the_weight_alone(law, foot_model, state):
+    law.enter(state, reading(0.0))
+    jump = PositionJump(motor=7, counts=400, speed=12.0)
+    false = replace(reading(5.0, q=moved(0.03), qd7_raw=8.0), jump=jump)
+    tau, gravity = law.torque(false)
+    assert np.array_equal(tau, gravity)
 
 
 def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
