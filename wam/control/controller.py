@@ -138,8 +138,9 @@ class FootController:
             return np.zeros(7)
         is_guided = self._state is ArmState.GUIDE
         tau = self._hold.torque(reading, is_guided=is_guided)
-        lowest = np.minimum(-self._largest - gravity, 0.0)
-        return np.clip(tau, lowest, np.maximum(self._largest - gravity, 0.0))
+        # Plain numbers: seven of them are bounded faster than numpy looks at an array.
+        rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
+        return np.array([_within(*row) for row in rows])
 
     def _move_torque(self, move: JointMove, reading: ArmReading) -> Vector:
         """Return what the PD of `move` adds to gravity [N m], shape (7,)."""
@@ -155,3 +156,8 @@ class FootController:
         q, _ = self._move.at((reading.host_ns - self._move_ns) * 1e-9)
         constants = self._model.constants
         return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
+
+
+def _within(tau: float, gravity: float, most: float) -> float:
+    """Return what of `tau` keeps the sum with `gravity` within `most` [N m]."""
+    return min(max(tau, min(-most - gravity, 0.0)), max(most - gravity, 0.0))
