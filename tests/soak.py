@@ -77,6 +77,7 @@ FAULTS = (
     "ft-reboot",
     "overspeed",
     "joint7-slip",
+    "contact-force",
 )
 
 

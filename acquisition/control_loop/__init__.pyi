@@ -1,5 +1,6 @@
 from .cycle import Cycle, CycleOutputs
 from .faults import (
+    Action,
     CircuitCauses,
     Fault,
     GuardVerdict,
@@ -8,7 +9,7 @@ from .faults import (
     to_plain,
     verdict_for,
 )
-from .guard import GuardLimits
+from .limits import GuardLimits
 from .loop import Loop, LoopStats, Tick
 from .realtime import Grant, RealtimeRequest, choose_cores, die_with_parent, request
 from .states import ArmState, ControlStatus, transition_lines
@@ -16,6 +17,7 @@ from .timing import SLOW_EXCHANGE_NS, LoopReport, loop_report, pack_timing
 
 __all__ = [
     "SLOW_EXCHANGE_NS",
+    "Action",
     "ArmState",
     "CircuitCauses",
     "ControlStatus",

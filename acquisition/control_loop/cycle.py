@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.clock import NS_PER_MS
+from acquisition.control_loop.contact import Contact, contact_of
 from acquisition.control_loop.faults import (
     Action,
     CircuitCauses,
@@ -13,8 +13,9 @@ from acquisition.control_loop.faults import (
     GuardVerdict,
     verdict_for,
 )
-from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
+from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver
+from acquisition.control_loop.limits import GuardLimits
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import (
     REQUESTS,
@@ -25,6 +26,7 @@ from acquisition.control_loop.states import (
     ControlStatus,
 )
 from acquisition.control_loop.torque_limiter import bounded_torque
+from acquisition.control_loop.wrench_feed import WrenchFeed
 from acquisition.devices import (
     Arm,
     ArmReading,
@@ -33,7 +35,6 @@ from acquisition.devices import (
     WrenchSample,
     WrenchSensor,
 )
-from acquisition.errors import LinkError
 from acquisition.sample import (
     Sample,
     control_bits,
@@ -91,17 +92,16 @@ class Cycle:
         outputs: CycleOutputs,
     ) -> None:
         self._arm = arm
-        self._sensor = sensor
+        self._feed = WrenchFeed(sensor, outputs.on_wrenches)
         self.law = law
         self._observer = observer
         self.limits = limits
         self._on_sample = outputs.on_sample
-        self._on_wrenches = outputs.on_wrenches
         self._extra_flags = int(outputs.extra_flags)
         self._guard = GuardState()
         self._sample = Sample()
-        self._wrench: WrenchSample | None = None
-        self._wrench_ns = 0
+        self._contact: Contact | None = None
+        self._is_tared = False
         self._speed = 0.0
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
@@ -117,18 +117,20 @@ class Cycle:
         are there when the pendant activates the arm, or it would fall for a moment.
         """
         self._requested = REQUESTS[state]
-        self.status.verdict = None
+        self._move = self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
         """Ask for a move to joint positions `goal` [rad], seven; only in hold.
 
-        No joint is faster than `speed` [rad/s] on the way.
+        No joint is faster than `speed` [rad/s] on the way. While a verdict stands no
+        move begins: hold has to be asked for before.
         """
         self._move = np.array(goal), speed
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
         self._observer.set_bias(bias)
+        self._is_tared = True
 
     def report(self, verdict: GuardVerdict) -> None:
         """Let the next cycle obey a verdict of the processes around it."""
@@ -151,14 +153,14 @@ class Cycle:
             self._obey(verdict, reading)
             tau, tau_gravity = self._torque(reading)
         sent = sample.torque_command
-        if reading.missing_cycles == 0 and status.state not in _UNPOWERED:
+        # Without all replies the motors keep their torques; a false one is taken back.
+        is_known = reading.is_complete or reading.jump is not None
+        if is_known and status.state not in _UNPOWERED:
             bounded = bounded_torque(tau, sent, self.limits.torque)
             sent = self._arm.send(bounded, tau_gravity)
         # The torque has left; what follows is looked at by the next cycle's guard.
-        is_new = self._take_wrench(tick.now_ns)
-        self._speed = self._observer.observe(
-            reading, self._wrench if is_new else None, sample
-        )
+        is_new = self._feed.poll(tick.now_ns, self.limits.ft_stale_ms)
+        self._observe(reading, self._feed.newest if is_new else None)
         self._fill(tick, reading, sent, tau_gravity, tau, is_new)
         self._on_sample(sample.payload())
 
@@ -168,26 +170,13 @@ class Cycle:
         is_starved = self.status.state is _UNKNOWN and not is_wanted
         return self._arm.listen(now_ns) if is_starved else self._arm.read(now_ns)
 
-    def _take_wrench(self, now_ns: int) -> bool:
-        """Drain the sensor; return whether the used sample is fresh.
-
-        A port that is gone is a sensor that is silent: its last sample grows old.
-        """
-        try:
-            samples = self._sensor.poll(now_ns)
-        except LinkError:
-            samples = []
-        if samples:
-            self._on_wrenches(samples)
-            for newest in reversed(samples):
-                if newest.is_valid:
-                    self._wrench = newest
-                    self._wrench_ns = newest.t_ns
-                    break
-        if self._wrench_ns == 0:
-            self._wrench_ns = now_ns
-        age = now_ns - self._wrench_ns
-        return self._wrench is not None and age <= self.limits.ft_stale_ms * NS_PER_MS
+    def _observe(self, reading: ArmReading, wrench: WrenchSample | None) -> None:
+        """See what the foot does; without a tare its load is not known."""
+        sample = self._sample
+        self._speed = self._observer.observe(reading, wrench, sample)
+        self._contact = None
+        if wrench is not None and self._is_tared:
+            self._contact = contact_of(sample, wrench.saturated)
 
     def _enter_requested(self, reading: ArmReading) -> None:
         """Obey a request: torques need all seven positions, the brakes need none."""
@@ -202,6 +191,8 @@ class Cycle:
         if move is None or reading.missing_cycles:
             return
         self._move = None
+        if self.status.verdict is not None:
+            return
         try:
             self.law.move_to(*move, reading)
         except ValueError:
@@ -235,8 +226,8 @@ class Cycle:
 
     def _judge(self, tick: Tick, reading: ArmReading, tau: Vector) -> GuardVerdict:
         status = self.status
-        if self._wrench_ns:
-            status.ft_age_ns = tick.now_ns - self._wrench_ns
+        if self._feed.since_ns:
+            status.ft_age_ns = tick.now_ns - self._feed.since_ns
         seen = Observation(
             reading=reading,
             safety=status.safety,
@@ -248,6 +239,7 @@ class Cycle:
             is_recording=self.is_recording,
             is_commanded=status.state not in _UNPOWERED,
             is_late=tick.is_late,
+            contact=self._contact,
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
         reported, self._reported = self._reported, None
@@ -276,7 +268,7 @@ class Cycle:
         tau: Vector,
         is_new: bool,
     ) -> None:
-        sample, wrench = self._sample, self._wrench
+        sample, wrench = self._sample, self._feed.newest
         if wrench is not None:
             sample.ft_ns[0] = wrench.t_ns
             sample.ft_counter[0] = wrench.counter & 0xFFFFFFFF

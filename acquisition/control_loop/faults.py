@@ -13,15 +13,19 @@ from acquisition.devices import PositionJump
 
 
 class Action(Enum):
-    """What the arm has to do."""
+    """What has to be done, from the mildest to the most severe.
+
+    END_TRIAL ends a trial and leaves the arm as it is; the console asks for hold.
+    """
 
     NONE = "none"
+    END_TRIAL = "end-trial"
     HOLD = "hold"
     DAMP = "damp"
     IDLE = "idle"
 
 
-_SEVERITY = {Action.NONE: 0, Action.HOLD: 1, Action.DAMP: 2, Action.IDLE: 3}
+_SEVERITY = {action: severity for severity, action in enumerate(Action)}
 
 
 class Fault(StrEnum):
@@ -39,6 +43,10 @@ class Fault(StrEnum):
     TORQUE_LIMIT = "torque-limit"
     JOINT7_SLIP = "joint7-slip"
     FT_STALE = "ft-stale"
+    FT_SATURATED = "ft-saturated"
+    CONTACT_FORCE = "contact-force"
+    CONTACT_MOMENT = "contact-moment"
+    CONTACT_GROWTH = "contact-growth"
     LOOP_LATE = "loop-late"
     MOVE_REFUSED = "move-refused"
     CONSOLE_SILENT = "console-silent"
@@ -118,6 +126,30 @@ class ForceAge:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactExcess:
+    """Force [N] or moment [N m] of the ground on the foot, and its limit."""
+
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class Saturation:
+    """How long the sensor has been beyond its range, and its limit [ms]."""
+
+    ms: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
+class ForceGrowth:
+    """By how much the force grew within 0.5 s, and its limit [N]."""
+
+    value: float
+    limit: float
+
+
+@dataclass(frozen=True, slots=True)
 class LateCycles:
     """Late cycles within a second, and how many are tolerated."""
 
@@ -135,6 +167,9 @@ FaultDetail = (
     | FootSpeedExcess
     | Joint7Slip
     | ForceAge
+    | ContactExcess
+    | Saturation
+    | ForceGrowth
     | LateCycles
 )
 
@@ -144,7 +179,8 @@ class FaultSpec:
     """What holds for every occurrence of a fault.
 
     Attributes:
-        actions: what the arm does; of two, the second when the fault lasts.
+        actions: what the arm does; of two, the second when the fault lasts or goes
+            beyond a second limit.
         detail: the type of its numbers.
         needs_trial: it is a fault only while a trial is recorded.
         ends_session: no trial can follow, the arm has to be activated anew.
@@ -157,6 +193,7 @@ class FaultSpec:
 
 
 _HOLD, _DAMP, _IDLE = (Action.HOLD,), (Action.DAMP,), (Action.IDLE,)
+_END_TRIAL = (Action.END_TRIAL,)
 FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.E_STOP: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
     Fault.PENDANT_IDLE: FaultSpec(_IDLE, CircuitCauses, ends_session=True),
@@ -176,6 +213,10 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.TORQUE_LIMIT: FaultSpec(_DAMP, JointExcess),
     Fault.JOINT7_SLIP: FaultSpec(_HOLD, Joint7Slip, needs_trial=True),
     Fault.FT_STALE: FaultSpec(_HOLD, ForceAge, needs_trial=True),
+    Fault.FT_SATURATED: FaultSpec(_END_TRIAL, Saturation, needs_trial=True),
+    Fault.CONTACT_FORCE: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
+    Fault.CONTACT_MOMENT: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
+    Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth, needs_trial=True),
     Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
     Fault.MOVE_REFUSED: FaultSpec(_HOLD),
     Fault.CONSOLE_SILENT: FaultSpec(_HOLD),
@@ -201,7 +242,7 @@ class GuardVerdict:
 
     @property
     def severity(self) -> int:
-        """How much is taken from the arm: 0 nothing, 1 hold, 2 damp, 3 idle."""
+        """How much is taken: 0 nothing, 1 the trial, 2 hold, 3 damp, 4 idle."""
         return _SEVERITY[self.action]
 
     @property

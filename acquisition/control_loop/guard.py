@@ -1,12 +1,13 @@
 """The guard: limits and the state of the arm in, a verdict out. Pure."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
+from acquisition.control_loop.contact import Contact, ContactState, check_contact
 from acquisition.control_loop.faults import (
     OK,
     CircuitCauses,
@@ -21,49 +22,11 @@ from acquisition.control_loop.faults import (
     SafetySilence,
     verdict_for,
 )
+from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
-
-
-@dataclass(frozen=True, slots=True)
-class GuardLimits:
-    """Where the guard steps in.
-
-    What `[limits]` of rig.toml sets has the same name and unit there, and no default
-    here; the rest follows from the arm and from the protocol.
-
-    Attributes:
-        q_lower: lower joint limits [rad], seven.
-        q_upper: upper joint limits [rad], seven.
-        speed: joint speed limits [rad/s], seven.
-        torque: joint torque limits [N m], seven.
-        foot_speed: largest speed of the sole [m/s].
-        joint7_mrad: largest displacement of the locked joint 7 [mrad].
-        ft_stale_ms: age at which a force sample is flagged [ms].
-        ft_stop_ms: age at which a trial is stopped [ms].
-        late_per_second: late cycles in a second that end in hold.
-        hold_after_missing: incomplete cycles in a row that end in hold.
-        idle_after_missing: incomplete cycles in a row that end in idle.
-        idle_after_safety_ms: age of the safety module's last answer that ends in idle
-            [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
-        armed_inside: a joint's position limit counts after it was this far inside
-            [rad]: the home position lies on two stops.
-    """
-
-    q_lower: Sequence[float]
-    q_upper: Sequence[float]
-    speed: Sequence[float]
-    torque: Sequence[float]
-    foot_speed: float
-    joint7_mrad: float
-    ft_stale_ms: float
-    ft_stop_ms: float
-    late_per_second: int
-    hold_after_missing: int = 5
-    idle_after_missing: int = 25
-    idle_after_safety_ms: float = 400.0
-    armed_inside: float = 0.1
+_NO_LOAD = ContactState()
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,11 +39,13 @@ class GuardState:
         may_drive: since torques are commanded the brakes were not confirmed once:
             from then on a braked arm is a stop, and no longer the state before
             activation.
+        contact: what is remembered of the load on the foot.
     """
 
     armed: int = 0
     late: tuple[int, ...] = ()
     may_drive: bool = False
+    contact: ContactState = _NO_LOAD
 
 
 class Observation(NamedTuple):
@@ -97,6 +62,7 @@ class Observation(NamedTuple):
         is_recording: a trial is being recorded.
         is_commanded: the state of the arm commands torques (not idle).
         is_late: this cycle began after its deadline.
+        contact: the load on the foot; None = it is not known.
     """
 
     reading: ArmReading
@@ -109,6 +75,7 @@ class Observation(NamedTuple):
     is_recording: bool
     is_commanded: bool
     is_late: bool
+    contact: Contact | None = None
 
 
 def check(
@@ -127,6 +94,11 @@ def check(
     is_stopped = seen.is_commanded and seen.safety is SafetyMode.E_STOP
     if not (state.may_drive or is_stopped):
         return state, OK
+    contact, load = check_contact(
+        limits, state.contact, now, seen.contact, is_recording=seen.is_recording
+    )
+    if contact is not state.contact:
+        state = replace(state, contact=contact)
     # Plain numbers: seven of them are compared faster than numpy looks at an array.
     q, qd, tau = seen.reading.q.tolist(), seen.reading.qd.tolist(), seen.tau.tolist()
     verdicts = (
@@ -137,6 +109,7 @@ def check(
         _check_speed(limits, seen, qd),
         _check_torque(limits, tau),
         _check_trial(limits, seen),
+        load,
         _check_cadence(limits, state, now),
     )
     worst = OK
@@ -164,7 +137,7 @@ def _remember(
     is_same = armed == state.armed and late is state.late
     if is_same and may_drive is state.may_drive:
         return state
-    return GuardState(armed, late, may_drive)
+    return GuardState(armed, late, may_drive, state.contact)
 
 
 def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:

@@ -9,13 +9,20 @@ from acquisition.devices import SafetyMode
 
 
 class ArmState(IntEnum):
-    """What the arm is doing (architecture: safety states)."""
+    """What the arm is doing.
+
+    IDLE: pucks off and braked, confirmed. FLOAT: gravity compensation and the virtual
+    mass, as in a trial. HOLD: it stands still where it is. DAMP: the same after a
+    fault of motion. UNKNOWN: idle was asked for and is not confirmed. GUIDE: it
+    stands still with half the torque, for a hand that carries it to the next trial.
+    """
 
     IDLE = 0
     FLOAT = 1
     HOLD = 2
     DAMP = 3
     UNKNOWN = 4
+    GUIDE = 5
 
 
 class ArmEvent(Enum):
@@ -25,6 +32,8 @@ class ArmEvent(Enum):
     REQUEST_FLOAT = "float requested"
     REQUEST_HOLD = "hold requested"
     REQUEST_DAMP = "damp requested"
+    REQUEST_GUIDE = "guide requested"
+    VERDICT_END_TRIAL = "verdict: end trial"
     VERDICT_HOLD = "verdict: hold"
     VERDICT_DAMP = "verdict: damp"
     VERDICT_IDLE = "verdict: idle"
@@ -38,8 +47,10 @@ REQUESTS: Mapping[ArmState, ArmEvent] = {
     ArmState.FLOAT: ArmEvent.REQUEST_FLOAT,
     ArmState.HOLD: ArmEvent.REQUEST_HOLD,
     ArmState.DAMP: ArmEvent.REQUEST_DAMP,
+    ArmState.GUIDE: ArmEvent.REQUEST_GUIDE,
 }
 VERDICTS: Mapping[Action, ArmEvent] = {
+    Action.END_TRIAL: ArmEvent.VERDICT_END_TRIAL,
     Action.HOLD: ArmEvent.VERDICT_HOLD,
     Action.DAMP: ArmEvent.VERDICT_DAMP,
     Action.IDLE: ArmEvent.VERDICT_IDLE,
@@ -61,6 +72,7 @@ class Transition:
 
 
 _STAY = Transition()
+_MOVABLE = (ArmState.FLOAT, ArmState.HOLD, ArmState.GUIDE)
 _BRAKE = Transition(brakes=True)
 
 
@@ -79,9 +91,12 @@ _ROWS: Mapping[ArmEvent, Mapping[ArmState, Transition]] = {
     ArmEvent.REQUEST_FLOAT: _always(Transition(ArmState.FLOAT)),
     ArmEvent.REQUEST_HOLD: _always(Transition(ArmState.HOLD)),
     ArmEvent.REQUEST_DAMP: _always(Transition(ArmState.DAMP)),
+    ArmEvent.REQUEST_GUIDE: _always(Transition(ArmState.GUIDE)),
+    ArmEvent.VERDICT_END_TRIAL: _always(_STAY),
     # No verdict makes an earlier fault milder, and none gives a braked arm torques.
-    ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, ArmState.FLOAT),
-    ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, ArmState.FLOAT, ArmState.HOLD),
+    # Hold is entered from hold too: the arm may be moving by itself in it.
+    ArmEvent.VERDICT_HOLD: _only(ArmState.HOLD, *_MOVABLE),
+    ArmEvent.VERDICT_DAMP: _only(ArmState.DAMP, *_MOVABLE),
     ArmEvent.VERDICT_IDLE: _always(_BRAKE),
     ArmEvent.IDLE_CONFIRMED: _always(Transition(ArmState.IDLE)),
     ArmEvent.IDLE_UNCONFIRMED: _always(Transition(ArmState.UNKNOWN)),

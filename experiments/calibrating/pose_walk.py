@@ -20,7 +20,12 @@ from wam.model import Array
 
 INTERRUPTED = 130
 _NOTHING = "Nothing was written."
+_STOPPED = "The move was stopped; it goes on when it is asked for anew only."
 _HOLD = 0.2  # s between a stop and the brakes
+
+
+class MoveStoppedError(ArmFaultError):
+    """The guard stopped the arm in a move that it made by itself."""
 
 
 def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
@@ -41,7 +46,9 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
         place = FaultContext(
             "The calibration", is_bus_down=console_loop.loop_client.loop.is_bus_down
         )
-        console.problem(fault_text(fault.verdict, place, _NOTHING))
+        was_moving = isinstance(fault, MoveStoppedError)
+        result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
+        console.problem(fault_text(fault.verdict, place, result))
         return 4
     except TractionError as error:
         console.problem(f"{error} {_NOTHING}")
@@ -108,9 +115,17 @@ class PoseWalk:
         return halts
 
     def go_to(self, halt: MeasurementPose) -> None:
-        """Move to a halt and wait until the arm has settled."""
+        """Move to a halt and wait until the arm has settled.
+
+        Raises:
+            MoveStoppedError: the guard stopped the move.
+            StopRequestedError: as `ConsoleLoop.tick`.
+        """
         self._rig.backend.loop_client.move_to(halt.q.tolist(), halt.speed)
-        self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
+        try:
+            self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
+        except ArmFaultError as fault:
+            raise MoveStoppedError(fault.verdict) from fault
         self._here = halt.q
 
     def end(self) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from acquisition import MOTOR_FRESH_SHIFT, RATE_HZ, Flag, TractionError, TrialFileError
-from acquisition.control_loop import ArmState
+from acquisition.control_loop import Action, ArmState
 from acquisition.ipc import ProcessLostError
 from acquisition.trial_file import TrialHeader
 from experiments.fault_injection import FaultTrigger
@@ -81,6 +81,8 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
     try:
         _record(context, name, header, outcome)
     except ArmFaultError as fault:
+        if fault.verdict.action is Action.END_TRIAL:  # the arm still floats
+            context.loop_client.request(ArmState.HOLD)
         outcome.reason = fault.verdict.reason
         _end(context, name, header, outcome)
         raise

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from acquisition import PreflightError, TractionError
+from acquisition.control_loop import ArmState
 from acquisition.ipc import unpack_wrenches
 from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
@@ -92,12 +93,14 @@ def known_bias(
 
 
 def _measure(context: RunContext, name: TrialName) -> TareResult:
-    """Return the tare of one second.
+    """Return the tare of one second, in which the arm stands by itself.
 
     Raises:
         PreflightError: the force varied, or samples were lost or flagged.
     """
+    context.loop_client.request(ArmState.GUIDE)
     _wait_still(context, name)
+    context.loop_client.request(ArmState.HOLD)
     console_loop, rig = context.console_loop, context.rig
     reader = context.loop_client.wrenches()
     for tick in range(round(TARE_SECONDS / TICK) + 1):

@@ -1,8 +1,8 @@
 """What may stand in rig.toml."""
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from acquisition import (
     RATE_HZ,
@@ -85,7 +85,10 @@ class GravitySection(SettingsSection):
 class LimitSection(SettingsSection):
     """Where the guard steps in, with the names and units of `GuardLimits`; and others.
 
-    `tare_spread`, `residual` and `free_disk_gb` are looked at between trials.
+    `tare_spread`, `residual` and `free_disk_gb` are looked at between trials. The
+    contact of a push: up to 60 N along the ground, 30 N across it. A trial ends at 100
+    N and the arm holds at 150 N, and at their moments with the foot's 0.1 m between
+    sole and sensor; forces that are left out have these values.
     """
 
     speed: _SevenPositive = Field(examples=[[1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0]])
@@ -94,10 +97,26 @@ class LimitSection(SettingsSection):
     joint7_mrad: Positive = Field(examples=[50.0])
     ft_stale_ms: Positive = Field(examples=[6.0])
     ft_stop_ms: Positive = Field(examples=[20.0])
+    ft_saturated_ms: Positive = Field(default=100.0, examples=[100.0])
+    contact_force: Positive = Field(default=100.0, examples=[100.0])
+    contact_force_hold: Positive = Field(default=150.0, examples=[150.0])
+    contact_moment: Positive = Field(default=10.0, examples=[10.0])
+    contact_moment_hold: Positive = Field(default=15.0, examples=[15.0])
+    contact_growth: Positive = Field(default=40.0, examples=[40.0])
     late_per_second: Whole = Field(ge=1, le=RATE_HZ, examples=[10])
     tare_spread: Positive = Field(examples=[0.5])
     residual: Positive = Field(default=1.0, examples=[1.0])
     free_disk_gb: Number = Field(ge=0, examples=[5.0])
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        pairs = (
+            (self.contact_force, self.contact_force_hold),
+            (self.contact_moment, self.contact_moment_hold),
+        )
+        if any(end > hold for end, hold in pairs):
+            raise ValueError("a contact limit that ends a trial is above that of hold")
+        return self
 
     def of_guard(self) -> dict[str, Any]:
         """Return the values of those fields that the guard has."""

@@ -111,6 +111,7 @@ _BLOW = 12.0
 # The lock of 20 N m/rad lets go of 50 mrad at 1 N m; the joint may have 1.3 N m. A
 # sudden twist would swing beyond that, so it grows.
 _TWIST, _TWIST_STEP = 1.2, 0.02  # N m
+_LOAD = (0.0, 0.0, 120.0)  # on the foot, more than a trial may have [N]
 _FINGER = (0.0, 0.0, 3.2)  # below the sole while it hangs free, terrain frame [N]
 
 Later = Callable[[int, Callable[[], None]], None]  # (delay [ns], action)
@@ -131,6 +132,7 @@ class BodyFaults:
             "joint7-slip": self._begin_twist,
             "residual": self._touch,
             "tare-moved": self._touch,
+            "contact-force": self._load_foot,
         }
 
     def clear_faults(self) -> None:
@@ -144,6 +146,9 @@ class BodyFaults:
 
     def _touch(self) -> None:
         self._plant.finger = _FINGER
+
+    def _load_foot(self) -> None:
+        self._plant.finger = _LOAD
 
     def _begin_twist(self) -> None:
         self._is_twisting = True

@@ -187,6 +187,19 @@ _SLIP = Cell(
     ("interrupted: joint7-slip",),
     Arm(100, "driven", HOLD, "holding"),
 )
+# What ends a trial leaves the arm to the console, which asks for hold 20 ms later.
+_BEYOND = Cell(
+    End.REDONE,
+    "the F/T sensor was beyond its range for ",
+    ("interrupted: ft-saturated",),
+    Arm(120, "driven", HOLD, "holding"),
+)
+_LOADED = Cell(
+    End.REDONE,
+    " N on the foot (limit 100)",
+    ("interrupted: contact-force",),
+    Arm(30, "driven", HOLD, "holding"),
+)
 _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
@@ -271,7 +284,7 @@ TABLE: dict[str, Row] = {
     ),
     "position-jump": _ending(
         "The position of motor 3 jumped by ",
-        replace(_SILENT, text="UNKNOWN - support it"),
+        replace(_SILENT, seen="driven", text="UNKNOWN - support it"),
         "position-jump",
         preflight=Cell(End.ABSENT, why="positions are judged by those before them"),
         idle=_not_ready("Puck 3 has not answered for 100 ms."),
@@ -295,8 +308,14 @@ TABLE: dict[str, Row] = {
         0,
         _FLAGGED,
         Cell(End.TOLD, _FLAGGED),
-        ready=Cell(End.TOLD, _FLAGGED, why="the review says so, the last tare too"),
-        recording=Cell(End.TOLD, _FLAGGED, why="the review says so, the last tare too"),
+        ready=replace(_BEYOND, arm=None, why="stops as soon as it is recorded"),
+        recording=_BEYOND,
+    ),
+    "contact-force": _row(
+        Cell(End.TOLD, "Known-pose residual"),
+        tare=Cell(End.TOLD, "Force varied "),
+        ready=replace(_LOADED, arm=None, why="stops as soon as it is recorded"),
+        recording=_LOADED,
     ),
     "ft-not-a-number": _sensor(
         20, _FLAGGED, _refused("The F/T sensor sends raw gauge data or absurd forces")

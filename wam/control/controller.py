@@ -1,26 +1,30 @@
-"""The control law: gravity, virtual mass, joint-7 lock, damping in hold."""
+"""The control law: gravity, virtual mass, joint-7 lock, position hold, moves."""
 
 import numpy as np
 
 from acquisition import ArmReading, Vector
 from acquisition.control_loop import ArmState
-from wam.control.joint_lock import JointLock, LockGains
+from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
 from wam.control.joint_move import TOP_SPEED, JointMove, joint_pd
+from wam.control.position_hold import PositionHold
 from wam.control.soft_walls import SoftWalls
 from wam.model import ArmModel, VirtualMass, compensation
 
-_JOINT7 = 6
-MOVE_SHARE = 0.9  # of the torque limits that a move may use, gravity included
+TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
+_STANDING = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
+_POWERED = frozenset({ArmState.FLOAT, *_STANDING})
 
 
 class FootController:
-    """Torques of float, hold and damp (implements ControlLaw).
+    """Torques of float, guide, hold and damp (implements ControlLaw).
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
-    their bounce. hold and damp: gravity plus joint damping, virtual mass ramped to 0.
-    Joint 7 is locked in all three, and soft walls stand before the stops. In hold the
-    arm can be sent somewhere; joint PD then follows the move and keeps the goal until
-    another state is entered.
+    their bounce. hold and damp: gravity, joint damping and springs of bounded torque
+    that keep the joints where they are. guide: the same, weak enough for a hand that
+    carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
+    locked in all four, and soft walls stand before the stops. In hold the arm can be
+    sent somewhere; joint PD then follows the move and keeps the goal until a state is
+    entered, hold included.
     """
 
     def __init__(
@@ -34,21 +38,31 @@ class FootController:
         self._target_mass = virtual_mass
         self._mass = VirtualMass()
         self._lock = JointLock(gains)
+        self._hold = PositionHold(model.constants)
         self._walls = walls
-        self._largest = MOVE_SHARE * np.array(walls.limits) if walls else np.inf
-        self._damping = model.constants.kd
-        self._is_damped = True
+        limits = np.array(walls.limits) if walls else np.full(7, np.inf)
+        self._largest = TORQUE_SHARE * limits
+        self._state = ArmState.IDLE
         self._move: JointMove | None = None
         self._move_ns = 0
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
-        """Begin `state`; torques change continuously except for the damping."""
+        """Begin `state`; torques change continuously except for the damping.
+
+        A move ends. An arm that stands still already goes on to, where it is.
+        """
         now = reading.host_ns
+        if state not in _STANDING:
+            self._hold.release()
+        elif state is self._state and self._move is None:
+            return
+        else:
+            self._hold.begin(reading.q, self._move_spring(reading))
         self._move = None
-        self._is_damped = state is not ArmState.FLOAT
-        self._mass.aim(0.0 if self._is_damped else self._target_mass, now)
-        if state in {ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP}:
-            self._lock.engage(float(reading.q[_JOINT7]), now)
+        self._state = state
+        self._mass.aim(self._target_mass if state is ArmState.FLOAT else 0.0, now)
+        if state in _POWERED:
+            self._lock.engage(float(reading.q[LOCKED_JOINT]), now)
         else:
             self._lock.release(now)
 
@@ -59,11 +73,11 @@ class FootController:
         in hold.
 
         Raises:
-            ValueError: the arm floats, `goal` is beyond a stop or not finite, or
+            ValueError: the arm does not hold, `goal` is beyond a stop or not finite, or
                 `speed` is not within 0..0.5 rad/s.
         """
         constants = self._model.constants
-        if not self._is_damped:
+        if self._state is not ArmState.HOLD:
             raise ValueError("the arm moves in hold only")
         is_inside = goal.shape == (7,) and bool(
             ((goal >= constants.q_lower) & (goal <= constants.q_upper)).all()
@@ -73,36 +87,77 @@ class FootController:
         if not 0.0 < speed <= TOP_SPEED:
             raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
         now = reading.host_ns
-        start = reading.q.copy()
-        if self._move is not None:  # from where it is held, or the torque would jump
+        # From where the arm is held, or the torque would jump.
+        if self._move is not None:
             start = self._move.at((now - self._move_ns) * 1e-9)[0]
+        else:
+            start = reading.q + self._hold.spring(reading) / constants.kp
+        self._hold.release()
         self._lock.release(now)
         self._move = JointMove(start, goal.copy(), speed)
         self._move_ns = now
         return self._move.duration
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
-        """Return (tau, gravity part) [N m], shapes (7,)."""
+        """Return (tau, gravity part) [N m], shapes (7,).
+
+        A position that cannot be true, or that follows one that was not, moves no
+        joint: the weight alone is borne until positions are believed again.
+        """
         now = reading.host_ns
+        q7 = float(reading.q[LOCKED_JOINT])
         gravity = compensation(self._model, reading.q, self._mass.at(now))
-        lock = self._lock.torque(float(reading.q[_JOINT7]), reading.qd7_raw, now)
+        if reading.jump is not None:
+            return gravity.copy(), gravity
+        if self._state in _STANDING:
+            self._lock.follow(q7, now)
+        lock = self._lock.torque(q7, reading.qd7_raw, now)
         if self._move is not None:
-            q, qd = self._move.at((now - self._move_ns) * 1e-9)
-            constants = self._model.constants
-            rate = qd - reading.qd
-            pd = joint_pd(constants.kp, constants.kd, q - reading.q, rate)
-            pd[_JOINT7] += lock  # fades from the moment of its release
+            tau = gravity + self._move_torque(self._move, reading)
+            tau[LOCKED_JOINT] += lock  # fades from the moment of its release
             # A move never asks for what the guard would stop it for.
-            tau = np.clip(gravity + pd, -self._largest, self._largest)
+            tau = np.clip(tau, -self._largest, self._largest)
         else:
-            tau = gravity.copy()
-            if self._is_damped:
-                tau -= self._damping * reading.qd
-            tau[_JOINT7] = gravity[_JOINT7] + lock
+            tau = gravity + self._standing_torque(reading, gravity)
+            tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         if self._walls is not None:
             self._walls.apply(tau, reading)
         return tau, gravity
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
-        return self._lock.offset(float(reading.q[_JOINT7]), reading.host_ns)
+        return self._lock.offset(float(reading.q[LOCKED_JOINT]), reading.host_ns)
+
+    def _standing_torque(self, reading: ArmReading, gravity: Vector) -> Vector:
+        """Return what is added to `gravity` in a state without a move [N m], (7,).
+
+        It never makes a torque larger than its share of the limit: a fast arm that is
+        to hold would be stopped for its torques instead.
+        """
+        if self._state is ArmState.FLOAT:
+            return np.zeros(7)
+        is_guided = self._state is ArmState.GUIDE
+        tau = self._hold.torque(reading, is_guided=is_guided)
+        # Plain numbers: seven of them are bounded faster than numpy looks at an array.
+        rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
+        return np.array([_within(*row) for row in rows])
+
+    def _move_torque(self, move: JointMove, reading: ArmReading) -> Vector:
+        """Return what the PD of `move` adds to gravity [N m], shape (7,)."""
+        q, qd = move.at((reading.host_ns - self._move_ns) * 1e-9)
+        constants = self._model.constants
+        rate = qd - reading.qd
+        return joint_pd(constants.kp, constants.kd, q - reading.q, rate)
+
+    def _move_spring(self, reading: ArmReading) -> Vector | None:
+        """Return the spring's part of a move's torque [N m]; None without a move."""
+        if self._move is None:
+            return None
+        q, _ = self._move.at((reading.host_ns - self._move_ns) * 1e-9)
+        constants = self._model.constants
+        return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
+
+
+def _within(tau: float, gravity: float, most: float) -> float:
+    """Return what of `tau` keeps the sum with `gravity` within `most` [N m]."""
+    return min(max(tau, min(-most - gravity, 0.0)), max(most - gravity, 0.0))

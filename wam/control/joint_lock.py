@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+LOCKED_JOINT = 6  # joint 7
 RAMP = 0.5  # the lock takes hold and lets go within this time [s]
 
 
@@ -21,6 +22,11 @@ class LockGains:
     kd: float = 0.2
     limit: float = 1.3
     speed: float = 0.3
+
+    @property
+    def reach(self) -> float:
+        """Displacement at which the spring gives the largest torque [rad]."""
+        return self.limit / self.kp if self.kp > 0.0 else float("inf")
 
 
 class JointLock:
@@ -60,6 +66,16 @@ class JointLock:
         if self._is_engaged:
             self._from = self.reference(now_ns)
             self._goal = q7
+            self._moved_ns = now_ns
+
+    def follow(self, q7: float, now_ns: int) -> None:
+        """Keep the reference where the largest torque reaches joint 7 at `q7` [rad].
+
+        A joint that is turned further stays where it is left.
+        """
+        reference, reach = self.reference(now_ns), self._gains.reach
+        if self._is_engaged and abs(q7 - reference) > reach:
+            self._goal = self._from = min(max(reference, q7 - reach), q7 + reach)
             self._moved_ns = now_ns
 
     def release(self, now_ns: int) -> None:

@@ -30,6 +30,12 @@ LIMITS = GuardLimits(
     joint7_mrad=50.0,
     ft_stale_ms=6.0,
     ft_stop_ms=20.0,
+    ft_saturated_ms=100.0,
+    contact_force=100.0,
+    contact_force_hold=150.0,
+    contact_moment=10.0,
+    contact_moment_hold=15.0,
+    contact_growth=40.0,
     late_per_second=10,
 )
 
@@ -228,7 +234,7 @@ def test_no_fault_hides_a_more_severe_one():
 def test_damping_is_worse_than_holding_and_better_than_idle():
     severities = [GuardVerdict(action).severity for action in Action]
     assert severities == sorted(severities)
-    assert len(set(severities)) == 4
+    assert len(set(severities)) == len(Action)
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -345,9 +351,10 @@ def test_details_are_in_the_units_of_the_message():
 def test_severity_counts_what_is_taken_from_the_arm():
     assert {action: GuardVerdict(action).severity for action in Action} == {
         Action.NONE: 0,
-        Action.HOLD: 1,
-        Action.DAMP: 2,
-        Action.IDLE: 3,
+        Action.END_TRIAL: 1,
+        Action.HOLD: 2,
+        Action.DAMP: 3,
+        Action.IDLE: 4,
     }
 
 

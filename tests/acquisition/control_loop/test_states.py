@@ -10,18 +10,21 @@ from acquisition.control_loop.states import (
     transition_lines,
 )
 
-# Rows: events; columns: idle, float, hold, damp, unknown. "b" = brakes, "." = nothing.
+# Rows: events; columns: idle, float, hold, damp, unknown, guide.
+# "b" = brakes, "." = nothing.
 TABLE = """
-idle requested            b b b b b
-float requested           F F F F F
-hold requested            H H H H H
-damp requested            D D D D D
-verdict: hold             . H . . .
-verdict: damp             . D D . .
-verdict: idle             b b b b b
-idle confirmed            I I I I I
-idle not confirmed        U U U U U
-safety circuit is braked  . . . . b
+idle requested            b b b b b b
+float requested           F F F F F F
+hold requested            H H H H H H
+damp requested            D D D D D D
+guide requested           G G G G G G
+verdict: end trial        . . . . . .
+verdict: hold             . H H . . H
+verdict: damp             . D D . . D
+verdict: idle             b b b b b b
+idle confirmed            I I I I I I
+idle not confirmed        U U U U U U
+safety circuit is braked  . . . . b .
 """
 LETTERS = {state: state.name[0] for state in ArmState}
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from acquisition.control_loop import contact
 from acquisition.devices import SafetyMode
 from acquisition.ipc.child import ProcessLostError
 from experiments import settings
@@ -269,6 +270,18 @@ def _narrow(scene):
     cycle.limits = replace(cycle.limits, q_upper=upper)
 
 
+def _tender(scene):
+    """Let the weight of a push be too much moment."""
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, contact_moment=0.001)
+
+
+def _lean(scene):
+    """Press more than a push does on a foot that stands, as this one is not yet."""
+    scene.patch.setattr(contact, "STANDING", 1.0)
+    scene.rig.plant.finger = (0.0, 0.0, 60.0)
+
+
 def _saturate(scene):
     scene.rig.faults()["ft-saturated"]()
 
@@ -392,6 +405,10 @@ CASES = {
     "not-ready": found_at_once("puck-silent", words="Puck 3 has not answered for "),
     # what ends a trial and not the session: the second attempt is not begun here
     "ft-stale": fault("ft-stale@T2+0.1s", words="T02 stopped at 0.1 s"),
+    "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
+    "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
+    "contact-moment": acted(Prompt.RECORDING, _tender, words="N m on the foot (limit"),
+    "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
     "joint7-slip": fault("joint7-slip@T2+0.1s", words="(limit 50)"),

@@ -30,6 +30,12 @@ LIMITS = GuardLimits(
     joint7_mrad=50.0,
     ft_stale_ms=6.0,
     ft_stop_ms=20.0,
+    ft_saturated_ms=100.0,
+    contact_force=100.0,
+    contact_force_hold=150.0,
+    contact_moment=10.0,
+    contact_moment_hold=15.0,
+    contact_growth=40.0,
     late_per_second=10,
 )
 

@@ -1,10 +1,11 @@
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import ArmReading
+from acquisition.devices import ArmReading, PositionJump
 from wam.control.controller import FootController
 from wam.control.joint_lock import LockGains
 from wam.control.soft_walls import SoftWalls, Walls
@@ -13,6 +14,7 @@ from wam.model.gravity import compensation
 S = 1_000_000_000
 DOWN = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])
 MASS = 0.3
+POWERED = [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE]
 
 
 def reading(seconds, *, q=DOWN, qd=None, qd7_raw=0.0):
@@ -54,7 +56,7 @@ def test_the_virtual_mass_comes_in_two_seconds(law, foot_model, seconds, mass):
     assert np.allclose(gravity, compensation(foot_model, DOWN, mass), atol=1e-12)
 
 
-@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE])
 def test_the_virtual_mass_leaves_in_two_seconds(law, foot_model, state):
     law.enter(ArmState.FLOAT, reading(0.0))
     law.enter(state, reading(10.0))
@@ -70,13 +72,14 @@ def test_floating_has_no_damping_but_at_joint_7(law):
     assert np.array_equal(tau[:6], gravity[:6])
 
 
-@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE])
 def test_holding_and_damping_brake_every_joint(law, foot_model, state):
     law.enter(state, reading(0.0))
     qd = np.linspace(-1.0, 1.0, 7) + 0.1
     tau, gravity = law.torque(reading(5.0, qd=qd))
+    # At least as much as the vendor's: there are springs to be damped as well.
     kd = foot_model.constants.kd
-    assert np.allclose(tau[:6] - gravity[:6], -kd[:6] * qd[:6], atol=1e-12)
+    assert (np.abs(tau[:6] - gravity[:6]) >= np.abs(kd[:6] * qd[:6])).all()
     assert ((tau[:6] - gravity[:6]) * qd[:6] < 0.0).all()
 
 
@@ -88,7 +91,7 @@ def test_torques_do_not_jump_from_float_to_hold_at_rest(law):
     assert np.allclose(before, after, atol=1e-12)
 
 
-@pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", POWERED)
 def test_joint_7_is_locked_where_it_was(law, state):
     law.enter(state, reading(0.0))
     tau, gravity = law.torque(reading(5.0, q=moved(0.01)))
@@ -153,10 +156,11 @@ def folded(depth):
     return q
 
 
-@pytest.mark.parametrize("state", [ArmState.FLOAT, ArmState.HOLD, ArmState.DAMP])
+@pytest.mark.parametrize("state", POWERED)
 def test_a_wall_pushes_back_in_every_powered_state(foot_model, state):
     law = with_walls(foot_model)
-    law.enter(state, reading(1.0))
+    law.enter(ArmState.FLOAT, reading(0.5, q=folded(0.05)))  # held nowhere else
+    law.enter(state, reading(1.0, q=folded(0.05)))
     tau, gravity = law.torque(reading(9.0, q=folded(0.05)))
     assert tau[3] - gravity[3] == pytest.approx(-40.0 / 0.2 * 0.05)
     assert np.delete(tau - gravity, 3) == pytest.approx(np.zeros(6), abs=1e-12)
@@ -206,6 +210,15 @@ def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
     after = law.torque(reading(1.0, q=sagged))[0]
     assert after == pytest.approx(before, abs=1e-9)
     assert before[1] - law.torque(reading(1.0))[0][1] == pytest.approx(-2.5, abs=0.1)
+
+
+@pytest.mark.parametrize("state", POWERED)
+def test_a_false_position_is_given_the_weight_alone(law, foot_model, state):
+    law.enter(state, reading(0.0))
+    jump = PositionJump(motor=7, counts=400, speed=12.0)
+    false = replace(reading(5.0, q=moved(0.03), qd7_raw=8.0), jump=jump)
+    tau, gravity = law.torque(false)
+    assert np.array_equal(tau, gravity)
 
 
 def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):

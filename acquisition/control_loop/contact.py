@@ -1,0 +1,178 @@
+"""The load on the foot: what the sensor shows of it, and where it is too much. Pure."""
+
+from dataclasses import dataclass
+from math import dist, hypot
+from typing import NamedTuple
+
+from acquisition.clock import NS_PER_MS
+from acquisition.control_loop.faults import (
+    OK,
+    ContactExcess,
+    Fault,
+    ForceGrowth,
+    GuardVerdict,
+    Saturation,
+    verdict_for,
+)
+from acquisition.control_loop.limits import GuardLimits
+from acquisition.sample import Sample
+
+# A load counts when it lasts: a stone that strikes the foot is over within 5 ms.
+LASTING_NS = 10 * NS_PER_MS
+GROWTH_NS = 500 * NS_PER_MS  # a force grows within this time
+STANDING = 0.002  # m, a foot that moves less within that time stands
+_STEP_NS = 50 * NS_PER_MS  # between two points that are remembered
+_POINTS = GROWTH_NS // _STEP_NS  # of a whole window
+
+
+class Contact(NamedTuple):
+    """What the ground does to the foot, in one cycle with a fresh force.
+
+    Attributes:
+        force: its magnitude [N].
+        moment: its magnitude about the sensor's origin [N m].
+        is_saturated: an axis of the sensor is beyond its range.
+        sole: centre of the sole in the base frame [m].
+    """
+
+    force: float
+    moment: float
+    is_saturated: bool
+    sole: tuple[float, float, float]
+
+
+class ForcePoint(NamedTuple):
+    """Force [N] and place of the sole [m] at a time [ns]."""
+
+    t_ns: int
+    force: float
+    sole: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class ContactState:
+    """What is remembered of the load.
+
+    Attributes:
+        since_ns: since when force and moment are beyond the limits of a trial and
+            those of hold, and the sensor is saturated [ns]; 0 = it is not.
+        points: of the last 0.5 s, oldest first.
+    """
+
+    since_ns: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)
+    points: tuple[ForcePoint, ...] = ()
+
+
+def contact_of(sample: Sample, saturated: int) -> Contact:
+    """Return the load that a sample shows; `saturated`: bits of the sensor's axes."""
+    fx, fy, fz, tx, ty, tz = sample.wrench.tolist()
+    x, y, z = sample.foot_position.tolist()
+    force, moment = hypot(fx, fy, fz), hypot(tx, ty, tz)
+    return Contact(force, moment, saturated != 0, (x, y, z))
+
+
+def check_contact(
+    limits: GuardLimits,
+    state: ContactState,
+    now_ns: int,
+    seen: Contact | None,
+    *,
+    is_recording: bool,
+) -> tuple[ContactState, GuardVerdict]:
+    """Return the next state and the verdict on the load of this cycle.
+
+    What is beyond the limits of hold is judged whenever it is known, the rest in a
+    trial. Without a fresh force (None) nothing is known.
+    """
+    if seen is None:
+        return state, OK
+    state = _remember(limits, state, now_ns, seen, is_recording=is_recording)
+    verdict = _check_hold(limits, state, now_ns, seen)
+    if verdict is None and is_recording:
+        verdict = _check_trial(limits, state, now_ns, seen)
+    return state, verdict or OK
+
+
+def _check_hold(
+    limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
+) -> GuardVerdict | None:
+    """Return the verdict of the limits that end in hold."""
+    _, _, force_ns, moment_ns, _ = state.since_ns
+    if _lasts(force_ns, now_ns):
+        detail = ContactExcess(seen.force, limits.contact_force_hold)
+        return verdict_for(Fault.CONTACT_FORCE, detail, is_lasting=True)
+    if _lasts(moment_ns, now_ns):
+        detail = ContactExcess(seen.moment, limits.contact_moment_hold)
+        return verdict_for(Fault.CONTACT_MOMENT, detail, is_lasting=True)
+    return None
+
+
+def _check_trial(
+    limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
+) -> GuardVerdict | None:
+    """Return the verdict of the limits that end a trial."""
+    force_ns, moment_ns, _, _, saturated_ns = state.since_ns
+    if _lasts(force_ns, now_ns):
+        detail = ContactExcess(seen.force, limits.contact_force)
+        return verdict_for(Fault.CONTACT_FORCE, detail)
+    if _lasts(moment_ns, now_ns):
+        detail = ContactExcess(seen.moment, limits.contact_moment)
+        return verdict_for(Fault.CONTACT_MOMENT, detail)
+    saturated_ms = (now_ns - saturated_ns) / NS_PER_MS if saturated_ns else 0.0
+    if saturated_ms > limits.ft_saturated_ms:
+        saturation = Saturation(saturated_ms, limits.ft_saturated_ms)
+        return verdict_for(Fault.FT_SATURATED, saturation)
+    growth = _growth(state.points, seen)
+    if growth > limits.contact_growth:
+        return verdict_for(
+            Fault.CONTACT_GROWTH, ForceGrowth(growth, limits.contact_growth)
+        )
+    return None
+
+
+def _lasts(since_ns: int, now_ns: int) -> bool:
+    return 0 < since_ns <= now_ns - LASTING_NS
+
+
+def _remember(
+    limits: GuardLimits,
+    state: ContactState,
+    now_ns: int,
+    seen: Contact,
+    *,
+    is_recording: bool,
+) -> ContactState:
+    force, moment, force_hold, moment_hold, saturated = state.since_ns
+    since_ns = (
+        _since(force, now_ns, is_beyond=seen.force > limits.contact_force),
+        _since(moment, now_ns, is_beyond=seen.moment > limits.contact_moment),
+        _since(force_hold, now_ns, is_beyond=seen.force > limits.contact_force_hold),
+        _since(moment_hold, now_ns, is_beyond=seen.moment > limits.contact_moment_hold),
+        _since(saturated, now_ns, is_beyond=seen.is_saturated),
+    )
+    points = state.points
+    if not is_recording:
+        points = ()
+    elif not points or now_ns - points[-1].t_ns >= _STEP_NS:
+        kept = [p for p in points if p.t_ns >= now_ns - GROWTH_NS]
+        points = (*kept, ForcePoint(now_ns, seen.force, seen.sole))
+    if since_ns == state.since_ns and points is state.points:
+        return state
+    return ContactState(since_ns, points)
+
+
+def _since(before_ns: int, now_ns: int, *, is_beyond: bool) -> int:
+    return (before_ns or now_ns) if is_beyond else 0
+
+
+def _growth(points: tuple[ForcePoint, ...], seen: Contact) -> float:
+    """Return by how much the force grew while the sole stood [N]; 0 if it moved.
+
+    The least force of the last 50 ms counts: a knock is no growth.
+    """
+    if len(points) < _POINTS:
+        return 0.0
+    if max(dist(point.sole, seen.sole) for point in points) >= STANDING:
+        return 0.0
+    newest = min(seen.force, points[-1].force, points[-2].force)
+    return newest - points[0].force

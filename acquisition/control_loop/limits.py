@@ -1,0 +1,57 @@
+"""Where the guard steps in."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class GuardLimits:
+    """Where the guard steps in.
+
+    What `[limits]` of rig.toml sets has the same name and unit there, and no default
+    here; the rest follows from the arm and from the protocol.
+
+    Attributes:
+        q_lower: lower joint limits [rad], seven.
+        q_upper: upper joint limits [rad], seven.
+        speed: joint speed limits [rad/s], seven.
+        torque: joint torque limits [N m], seven.
+        foot_speed: largest speed of the sole [m/s].
+        joint7_mrad: largest displacement of the locked joint 7 [mrad].
+        ft_stale_ms: age at which a force sample is flagged [ms].
+        ft_stop_ms: age at which a trial is stopped [ms].
+        ft_saturated_ms: how long the sensor may be beyond its range in a trial [ms].
+        contact_force: of the ground on the foot, ends a trial [N].
+        contact_force_hold: of the ground on the foot, ends in hold [N].
+        contact_moment: of it about the sensor's origin, ends a trial [N m].
+        contact_moment_hold: of it about the sensor's origin, ends in hold [N m].
+        contact_growth: of the force within 0.5 s of a foot that stands, ends a trial
+            [N].
+        late_per_second: late cycles in a second that end in hold.
+        hold_after_missing: incomplete cycles in a row that end in hold.
+        idle_after_missing: incomplete cycles in a row that end in idle.
+        idle_after_safety_ms: age of the safety module's last answer that ends in idle
+            [ms]; its questions leave every 50 ms, so the mode is unknown after 250.
+        armed_inside: a joint's position limit counts after it was this far inside
+            [rad]: the home position lies on two stops.
+    """
+
+    q_lower: Sequence[float]
+    q_upper: Sequence[float]
+    speed: Sequence[float]
+    torque: Sequence[float]
+    foot_speed: float
+    joint7_mrad: float
+    ft_stale_ms: float
+    ft_stop_ms: float
+    ft_saturated_ms: float
+    contact_force: float
+    contact_force_hold: float
+    contact_moment: float
+    contact_moment_hold: float
+    contact_growth: float
+    late_per_second: int
+    hold_after_missing: int = 5
+    idle_after_missing: int = 25
+    idle_after_safety_ms: float = 400.0
+    armed_inside: float = 0.1

@@ -1,0 +1,205 @@
+"""Too much load on the foot ends a trial, and beyond a second limit the arm holds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.clock import NS_PER_MS, PERIOD_NS
+from acquisition.control_loop.contact import (
+    Contact,
+    ContactState,
+    check_contact,
+    contact_of,
+)
+from acquisition.control_loop.faults import (
+    OK,
+    Action,
+    ContactExcess,
+    Fault,
+    ForceGrowth,
+)
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import PositionJump
+from acquisition.sample import Sample
+from tests.acquisition.control_loop.test_cycle import Bench, Observer
+from tests.acquisition.control_loop.test_guard import LIMITS
+
+START_NS = 10**10
+HERE = (0.7, 0.0, 0.1)
+CYCLES = 5  # 10 ms
+
+
+def load(force=0.0, moment=0.0, sole=HERE, *, is_saturated=False):
+    return Contact(force, moment, is_saturated, sole)
+
+
+def follow(loads, *, is_recording=True, state=None):
+    """Return the first verdict that is none of nothing, and its cycle."""
+    state = state or ContactState()
+    for cycle, seen in enumerate(loads):
+        now_ns = START_NS + cycle * PERIOD_NS
+        state, verdict = check_contact(
+            LIMITS, state, now_ns, seen, is_recording=is_recording
+        )
+        if verdict is not OK:
+            return verdict, cycle
+    return OK, len(loads)
+
+
+OVER = [
+    (load(force=100.1), Fault.CONTACT_FORCE, Action.END_TRIAL, 100.0),
+    (load(force=150.1), Fault.CONTACT_FORCE, Action.HOLD, 150.0),
+    (load(moment=10.1), Fault.CONTACT_MOMENT, Action.END_TRIAL, 10.0),
+    (load(moment=15.1), Fault.CONTACT_MOMENT, Action.HOLD, 15.0),
+]
+
+
+@pytest.mark.parametrize(("seen", "fault", "action", "limit"), OVER)
+def test_a_load_beyond_a_limit_is_a_fault_after_ten_milliseconds(
+    seen, fault, action, limit
+):
+    verdict, cycle = follow([seen] * 20)
+    assert (verdict.fault, verdict.action, cycle) == (fault, action, CYCLES)
+    assert verdict.detail == ContactExcess(max(seen.force, seen.moment), limit)
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [load(force=100.0, moment=10.0), load(force=60.0, moment=9.9)],
+)
+def test_a_load_at_its_limit_is_none(seen):
+    assert follow([seen] * 500)[0] is OK
+
+
+def test_a_blow_that_is_over_at_once_is_no_fault():
+    blow = [load(force=400.0, moment=30.0)] * CYCLES + [load(force=20.0)]
+    assert follow(blow * 5)[0] is OK
+
+
+@pytest.mark.parametrize(("seen", "fault", "action", "limit"), OVER)
+def test_outside_of_a_trial_only_the_second_limit_counts(seen, fault, action, limit):
+    verdict, _ = follow([seen] * 20, is_recording=False)
+    assert verdict.action is (action if action is Action.HOLD else Action.NONE)
+
+
+def test_a_saturated_sensor_ends_a_trial_after_a_tenth_of_a_second():
+    beyond = load(is_saturated=True)
+    verdict, cycle = follow([beyond] * 100)
+    assert (verdict.fault, verdict.action) == (Fault.FT_SATURATED, Action.END_TRIAL)
+    assert cycle * PERIOD_NS == pytest.approx(100 * NS_PER_MS, abs=PERIOD_NS)
+    assert follow([beyond] * 100, is_recording=False)[0] is OK
+    assert follow(([beyond] * 50 + [load()]) * 4)[0] is OK
+
+
+def ramp(slope, seconds=2.0, speed=0.0, least=10.0):
+    """Return the loads of a force that grows by `slope` [N/s] on a moving foot."""
+    x, y, z = HERE
+    return [
+        load(least + slope * t, sole=(x - speed * t, y, z))
+        for t in np.arange(0.0, seconds, 0.002).tolist()
+    ]
+
+
+def test_a_force_that_grows_while_the_foot_stands_ends_a_trial():
+    verdict, cycle = follow(ramp(95.0, 0.9))
+    assert (verdict.fault, verdict.action) == (Fault.CONTACT_GROWTH, Action.END_TRIAL)
+    assert cycle * 0.002 < 0.7
+    assert verdict.detail == ForceGrowth(pytest.approx(41.0, abs=5.0), 40.0)
+
+
+def test_a_force_that_grows_slowly_or_with_motion_is_a_push():
+    assert follow(ramp(60.0, 1.4))[0] is OK
+    assert follow(ramp(95.0, 0.9, speed=0.01))[0] is OK
+    assert follow(ramp(95.0, 0.9), is_recording=False)[0] is OK
+
+
+def test_a_knock_on_a_standing_foot_is_no_growth():
+    quiet, knock = [load(20.0)] * 300, [load(90.0)] * 4
+    assert follow((quiet + knock) * 4)[0] is OK
+
+
+def test_without_a_fresh_force_nothing_is_known():
+    assert follow([load(force=200.0)] * 4 + [None] * 50)[0] is OK
+
+
+def test_what_is_remembered_does_not_grow():
+    state = ContactState()
+    for cycle, seen in enumerate(ramp(0.0, 5.0)):
+        now_ns = START_NS + cycle * PERIOD_NS
+        state, _ = check_contact(LIMITS, state, now_ns, seen, is_recording=True)
+    assert len(state.points) <= 11
+
+
+def test_the_load_of_a_sample_is_that_of_its_wrench_and_sole():
+    sample = Sample()
+    sample.wrench[:] = (3.0, 0.0, 4.0, 0.0, 1.0, 0.0)
+    sample.foot_position[:] = (0.1, 0.2, 0.3)
+    assert contact_of(sample, 0) == Contact(5.0, 1.0, False, (0.1, 0.2, 0.3))
+    assert contact_of(sample, 0b100).is_saturated
+
+
+def test_a_sample_without_a_force_has_no_load():
+    nothing = contact_of(Sample(), 0)
+    assert follow([nothing] * 400)[0] is OK
+
+
+class FootUnderLoad(Observer):
+    """Shows the force of the wrench as that on the foot."""
+
+    def observe(self, reading, wrench, sample):
+        if wrench is not None:
+            sample.wrench[:] = wrench.wrench
+        return super().observe(reading, wrench, sample)
+
+    def set_bias(self, bias):
+        """Have no bias."""
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    bench.observer = FootUnderLoad()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    return bench
+
+
+def test_a_load_ends_the_trial_and_leaves_the_arm_as_it_is(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.run(10, force=120.0)
+    assert bench.reason == "contact-force"
+    assert bench.state is ArmState.FLOAT
+    assert not bench.cycle.is_recording
+
+
+def test_a_load_beyond_the_second_limit_makes_the_arm_hold(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.cycle.is_recording = False
+    bench.run(10, force=160.0)
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "contact-force")
+
+
+def test_a_load_that_grows_while_the_trial_ends_makes_the_arm_hold_after_all(bench):
+    bench.cycle.set_bias([0.0] * 6)
+    bench.run(10, force=120.0)
+    bench.run(10, force=160.0)
+    assert bench.state is ArmState.HOLD
+
+
+def test_before_the_first_tare_nothing_is_known_of_the_load(bench):
+    bench.run(10, force=160.0)
+    assert bench.reason == ""
+
+
+def test_a_false_position_gets_torques_and_a_missing_one_keeps_the_last(bench):
+    bench.arm.missing = 1
+    sent = len(bench.arm.sent)
+    bench.run()
+    assert len(bench.arm.sent) == sent
+    usual = bench.arm.reading
+    jump = PositionJump(motor=3, counts=900, speed=20.0)
+    bench.arm.reading = lambda now_ns: replace(usual(now_ns), jump=jump)
+    bench.run()
+    assert len(bench.arm.sent) == sent + 1

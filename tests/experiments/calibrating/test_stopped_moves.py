@@ -1,0 +1,81 @@
+"""A calibration whose console freezes while the arm moves by itself."""
+
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.ipc.loop_client import LoopClient
+from acquisition.ipc.loop_server import SILENT_NS
+from experiments.operator.prompts import AutoOperator, Prompt
+from tests.experiments.built import watch_builds
+from tests.experiments.program import traction
+
+TOP_SPEED = 0.5  # rad/s
+STOPPING = 0.08  # rad, from that speed to a stop
+FROZEN_FOR = 3.7  # s
+
+
+class FrozenConsole:
+    """Beats no more from the middle of a move on; the arm is watched meanwhile."""
+
+    def __init__(self, patch):
+        self.built = watch_builds(patch)
+        self.q = []
+        self.speed = 0.0
+        self.is_frozen = False
+        usual_beat, usual_answer = LoopClient.beat, AutoOperator.answer
+
+        def beat(client):
+            if not self.is_frozen:
+                usual_beat(client)
+
+        def answer(operator, asked):
+            if asked.prompt is Prompt.MOVING and asked.since > 3.0:
+                self.freeze()
+            return usual_answer(operator, asked)
+
+        patch.setattr(LoopClient, "beat", beat)
+        patch.setattr(AutoOperator, "answer", answer)
+
+    def freeze(self):
+        """Let time pass without the console."""
+        if self.is_frozen:
+            return
+        self.is_frozen = True
+        plant = self.built.rigs[-1].plant
+        self.speed = float(np.abs(plant.qd).max())
+        client = self.built.backends[-1].loop_client
+        for _ in range(round(FROZEN_FOR / 0.02)):
+            client.advance_cycles(10)
+            self.q.append(plant.q.copy())
+        self.is_frozen = False
+
+
+@pytest.fixture(scope="module")
+def frozen(tmp_path_factory):
+    """Return (console, how the calibration ended)."""
+    out = tmp_path_factory.mktemp("frozen") / "gravity.toml"
+    with pytest.MonkeyPatch.context() as patch:
+        console = FrozenConsole(patch)
+        done = traction("calibrate", "gravity", "--fake", "--fast", "--out", out)
+    return console, done
+
+
+def test_the_arm_stands_as_soon_as_the_console_counts_as_silent(frozen):
+    console, _ = frozen
+    assert console.speed > 0.1  # it was moving
+    q = np.array(console.q)
+    silent = round(SILENT_NS * 1e-9 / 0.02)
+    travel = np.abs(q - q[0]).max()
+    assert travel < TOP_SPEED * SILENT_NS * 1e-9 + STOPPING
+    assert np.abs(q[silent:] - q[silent]).max() < STOPPING
+    assert np.ptp(q[-50:], axis=0).max() < 2e-3
+
+
+def test_whoever_asked_for_the_move_hears_that_it_was_stopped_and_why(frozen):
+    console, done = frozen
+    assert done.code == 4
+    assert "0.5 s" in done.err
+    assert "move was stopped" in done.err
+    assert done.out.rstrip().endswith("ARM: idle, braked.")
+    assert console.built.rigs[-1].network.safety_mode is SafetyMode.IDLE

@@ -1,0 +1,129 @@
+"""An active simulated arm in the loop, whose true joint state the tests look at."""
+
+from dataclasses import replace
+from weakref import finalize
+
+import numpy as np
+
+from acquisition.control_loop.cycle import Cycle, CycleOutputs
+from acquisition.control_loop.guard import GuardLimits
+from acquisition.control_loop.loop import Loop
+from acquisition.control_loop.states import ArmState
+from fakes.clock import SteppedClock
+from fakes.plant.plant import PlantOptions
+from fakes.world.rig import FakeRig, SimulatedScene
+from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
+from wam.bus.link import CanLink
+from wam.control.controller import FootController
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.driver.arm import WamArm
+from wam.driver.settings import ArmSettings
+from wam.model.arm_model import ArmModel
+from wam.model.constants import Body
+
+SPEED = ArmSettings().speed_limits
+TORQUE = (20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3)
+LIMITS = GuardLimits(
+    q_lower=tuple(CONSTANTS.q_lower.tolist()),
+    q_upper=tuple(CONSTANTS.q_upper.tolist()),
+    speed=SPEED,
+    torque=TORQUE,
+    foot_speed=0.8,
+    joint7_mrad=50.0,
+    ft_stale_ms=6.0,
+    ft_stop_ms=20.0,
+    ft_saturated_ms=100.0,
+    contact_force=100.0,
+    contact_force_hold=150.0,
+    contact_moment=10.0,
+    contact_moment_hold=15.0,
+    contact_growth=40.0,
+    late_per_second=10,
+)
+RATE = 500
+
+
+class NoSensor:
+    def poll(self, now_ns):
+        return []
+
+
+class NoFoot:
+    def observe(self, reading, wrench, sample):
+        return 0.0
+
+
+def heavier(kg):
+    """Return the model of an arm whose foot weighs so much more than the real one."""
+    foot = TOOL.foot
+    return ArmModel(
+        CONSTANTS, replace(TOOL, foot=Body(foot.mass + kg, foot.com, foot.inertia))
+    )
+
+
+class HoldBench:
+    """An arm without a hand on it, in hold.
+
+    `error`: by how much rig.toml makes the foot too heavy [kg]. `sent`: the torques
+    beside gravity's [N m], cycle by cycle.
+    """
+
+    def __init__(self, *, friction=0.02, error=0.0):
+        self.clock = SteppedClock()
+        scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
+        options = PlantOptions(friction)
+        self.rig = FakeRig(scene, CONSTANTS, TOOL, self.clock, options)
+        self.clock.attach(self.rig)
+        finalize(self, self.rig.bus.shutdown)
+        self.plant = self.rig.plant
+        self.plant.terrain = None
+        self.plant.hand.let_go()
+        self.braked_q = self.plant.q.copy()
+        self.arm = WamArm(CanLink(self.rig.bus), self.clock)
+        self.arm.start()
+        self.sent = []
+        usual = self.arm.send
+
+        def send(tau, tau_gravity):
+            sent = usual(tau, tau_gravity)
+            self.sent.append(sent - tau_gravity)
+            return sent
+
+        self.arm.send = send
+        kd = tuple(CONSTANTS.kd.tolist())
+        walls = Walls(tuple(LIMITS.q_lower), tuple(LIMITS.q_upper), TORQUE, kd)
+        self.law = FootController(heavier(error), 0.0, walls=SoftWalls(walls))
+        outputs = CycleOutputs(lambda payload: None, lambda samples: None)
+        self.cycle = Cycle(self.arm, NoSensor(), self.law, NoFoot(), LIMITS, outputs)
+        self.loop = Loop(self.cycle, self.clock)
+        self.run(0.01)
+        self.enter(ArmState.HOLD)
+        self.run(0.04)
+        self.rig.network.pendant("activate")
+        self.run(0.1)
+
+    def enter(self, state):
+        self.cycle.request(state)
+        self.run(0.002)
+
+    def run(self, seconds):
+        """Let time pass; return the true positions of every cycle, shape (n, 7)."""
+        return np.array([self.step() for _ in range(round(seconds * RATE))])
+
+    def step(self):
+        self.loop.step()
+        return self.plant.q.copy()
+
+    def throw(self, joint, speed):
+        """Bring a floating arm's joint to `speed` [rad/s] within 0.12 s."""
+        self.enter(ArmState.FLOAT)
+        for cycle in range(60):
+            self.plant.qd[joint] = speed * (cycle + 1) / 60
+            self.step()
+
+    def push(self, joint, torque, seconds):
+        """Let somebody push a joint so hard [N m]; return the true positions."""
+        self.plant.disturbance[joint] = torque
+        q = self.run(seconds)
+        self.plant.disturbance[joint] = 0.0
+        return q

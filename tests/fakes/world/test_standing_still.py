@@ -1,0 +1,137 @@
+"""Hold means standing still: the true joints of the simulated arm in the loop."""
+
+import numpy as np
+import pytest
+
+from acquisition.control_loop.states import ArmState
+from acquisition.control_loop.torque_limiter import TORQUE_STEP
+from tests.fakes.scenes import CONSTANTS
+from tests.fakes.world.holding import SPEED, TORQUE, HoldBench
+from wam.control.position_hold import TORQUE_LIMIT
+
+FRICTION = (0.02, 1.0)
+DRIFT = 0.02  # rad
+STILL = 5e-4  # rad in a second: wrist joints go on creeping by encoder counts
+# What the spring gives back when a person lets go: limit / k; and some swing.
+REACH = np.array([0.018, 0.010, 0.020, 0.024, 0.040, 0.040, 0.065])
+# From nine tenths of the speed limit; joints 2 and 1 carry the whole arm.
+STOPPING = (0.15, 0.25, 0.05, 0.13, 0.08, 0.06)  # rad
+
+
+@pytest.mark.parametrize("friction", FRICTION)
+@pytest.mark.parametrize("error", [0.6, -0.4])
+def test_a_wrong_mass_of_the_foot_moves_no_joint_far_and_none_for_long(friction, error):
+    bench = HoldBench(friction=friction, error=error)
+    q = bench.run(3.0)
+    assert np.abs(q - bench.braked_q).max() < DRIFT
+    assert np.ptp(q[-500:], axis=0).max() < STILL
+
+
+@pytest.mark.parametrize("friction", FRICTION)
+@pytest.mark.parametrize("torque", [4.0, -4.0])
+def test_four_newton_metres_at_joint_2_are_held(friction, torque):
+    bench = HoldBench(friction=friction)
+    q = bench.push(1, torque, 3.0)
+    assert np.abs(q - bench.braked_q).max() < DRIFT
+    assert np.ptp(q[-500:], axis=0).max() < STILL
+
+
+@pytest.mark.parametrize("friction", FRICTION)
+@pytest.mark.parametrize("joint", range(6))
+def test_an_arm_that_is_pushed_away_stays_where_it_is_left(friction, joint):
+    bench = HoldBench(friction=friction)
+    dry = friction * CONSTANTS.coulomb[joint]
+    pushed = bench.push(joint, 1.15 * TORQUE_LIMIT[joint] + dry, 1.5)[:, joint]
+    left = bench.run(2.0)[:, joint]
+    assert pushed[-1] - bench.braked_q[joint] > 2.0 * REACH[joint]  # it gave way
+    assert pushed[-1] - left.min() < 0.7 * REACH[joint]
+    assert np.ptp(left[-500:]) < 0.2 * REACH[joint]  # simulated dry friction creeps
+    assert bench.cycle.status.verdict is None
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_who_pushes_slowly_meets_no_more_than_the_limit(joint):
+    bench = HoldBench()
+    bench.sent.clear()
+    bench.push(joint, 1.15 * TORQUE_LIMIT[joint], 1.0)
+    most = np.abs(bench.sent).max(axis=0)[joint]
+    assert 0.8 * TORQUE_LIMIT[joint] < most < 1.6 * TORQUE_LIMIT[joint]
+
+
+def test_a_foot_that_is_twisted_far_stays_where_it_is_left():
+    bench = HoldBench()
+    twisted = bench.push(6, 1.4, 0.5)[:, 6]
+    left = bench.run(1.5)[:, 6]
+    assert twisted[-1] > 0.1
+    assert twisted[-1] - left.min() < 1.5 * REACH[6]
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_joint_at_its_speed_limit_is_stopped_within_bounds(joint):
+    bench = HoldBench()
+    bench.throw(joint, 0.9 * SPEED[joint])
+    begin = bench.plant.q.copy()
+    bench.sent.clear()
+    bench.cycle.request(ArmState.HOLD)
+    q = bench.run(2.0)
+    assert bench.cycle.status.verdict is None  # torques and speeds stayed in limits
+    assert np.abs(q - begin).max() < STOPPING[joint]
+    assert np.ptp(q[-250:], axis=0).max() < 2.0 * STILL
+    steps = np.abs(np.diff(bench.sent, axis=0)).max(axis=0)
+    assert (steps <= 1.05 * np.array(TORQUE_STEP) * TORQUE).all()
+
+
+def test_hold_begins_without_a_step_of_torque_in_an_arm_that_stands():
+    bench = HoldBench(friction=1.0)
+    bench.enter(ArmState.FLOAT)
+    bench.run(0.5)
+    bench.sent.clear()
+    bench.enter(ArmState.HOLD)
+    bench.run(0.02)
+    assert np.abs(bench.sent)[:, :4].max() < 0.2
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_what_a_blow_leaves_behind_decays_in_drives_without_friction(joint):
+    bench = HoldBench(friction=0.0)
+    bench.run(0.5)
+    bench.plant.qd[joint] = 0.1 if joint < 4 else 0.5
+    q = bench.run(2.0)
+    first, last = np.ptp(q[:250], axis=0), np.ptp(q[-250:], axis=0)
+    assert first[joint] > 1e-3
+    assert last.max() < 0.1 * first[joint]
+
+
+def test_hold_that_is_asked_for_again_and_again_lets_nothing_creep():
+    bench = HoldBench(error=0.6)
+    for _ in range(50):
+        bench.enter(ArmState.HOLD)
+        q = bench.run(0.04)
+    assert np.abs(q[-1] - bench.braked_q).max() < DRIFT
+
+
+def test_damp_after_hold_keeps_the_place():
+    bench = HoldBench(error=0.6)
+    bench.enter(ArmState.DAMP)
+    q = bench.run(2.0)
+    assert np.abs(q - bench.braked_q).max() < DRIFT
+
+
+def test_an_arm_that_is_guided_follows_a_hand_and_stays_where_it_is_left():
+    bench = HoldBench()
+    bench.enter(ArmState.GUIDE)
+    carried = bench.push(1, -9.0, 1.0)[:, 1]
+    left = bench.run(2.0)[:, 1]
+    assert bench.braked_q[1] - carried[-1] > 0.05
+    assert left.max() - carried[-1] < REACH[1]
+    assert np.ptp(left[-500:]) < STILL
+
+
+@pytest.mark.parametrize("friction", FRICTION)
+@pytest.mark.parametrize("error", [0.6, -0.4])
+def test_an_arm_that_is_guided_by_nobody_stands(friction, error):
+    bench = HoldBench(friction=friction, error=error)
+    bench.enter(ArmState.GUIDE)
+    q = bench.run(3.0)
+    assert np.abs(q - bench.braked_q).max() < DRIFT
+    assert np.ptp(q[-500:], axis=0).max() < STILL

@@ -1,0 +1,171 @@
+"""Whatever the guard finds stops an arm that moves by itself: its true joints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.control_loop.faults import FAULTS, Fault, verdict_for
+from acquisition.control_loop.states import ArmState
+from fakes.world.rig import LocalSimulation
+from tests.fakes.world.holding import LIMITS, HoldBench
+
+SPEED = 0.5  # rad/s, the fastest a move is
+WAY = np.array([0.6, -0.45, 0.3, 0.6, 0.45, -0.6, 0.3])  # rad
+MIDDLE = 1.0  # s after the start; the arm moves at full speed
+STOP = 0.75  # s within which it stands, the last swing included
+# 0.5 rad/s for as long as the guard takes to see it, and the way to a stop [rad].
+TRAVEL = 0.08
+STILL = 3e-3  # rad in half a second
+
+
+def move(bench):
+    """Send the arm off and return it in the middle of its way."""
+    goal = bench.plant.q + WAY
+    bench.cycle.move_to(goal.tolist(), SPEED)
+    bench.run(MIDDLE)
+    assert np.abs(bench.plant.qd).max() > 0.8 * SPEED
+    return goal
+
+
+def check_stopped(bench, begin, *, travel=TRAVEL):
+    """Hold the arm against `begin`, where it was when something went wrong."""
+    q = bench.run(STOP + 0.5)
+    assert np.abs(q - begin).max() < travel
+    assert np.ptp(q[-250:], axis=0).max() < STILL
+
+
+def tighten(**limits):
+    def strike(bench):
+        bench.cycle.limits = replace(LIMITS, **limits)
+
+    return strike
+
+
+def too_weak(bench):
+    """Let the weight be too much in one cycle; with less for long the arm falls."""
+    bench.cycle.limits = replace(LIMITS, torque=(20.0, 0.5, 15.0, 15.0, 2.5, 2.5, 1.3))
+    bench.step()
+    bench.cycle.limits = LIMITS
+
+
+def at_the_stop(bench):
+    upper = list(LIMITS.q_upper)
+    upper[3] = float(bench.plant.q[3]) - 0.01
+    bench.cycle.limits = replace(LIMITS, q_upper=tuple(upper))
+
+
+def inject(name):
+    return lambda bench: LocalSimulation(bench.rig).inject(name)
+
+
+def report(fault):
+    return lambda bench: bench.cycle.report(verdict_for(fault, FAULTS[fault].detail()))
+
+
+HOLDING = {
+    "joint-limit": at_the_stop,
+    "torque-limit": too_weak,
+    "overspeed": tighten(speed=(0.3,) * 7),
+    "loop-late": inject("loop-late"),
+}
+BRAKED = (
+    "reply-lost-10",
+    "puck-silent",
+    "puck-reboot",
+    "can-silence",
+    "bus-off",
+    "pendant-idle",
+    "safety-speed",
+    "safety-torque",
+    "safety-heartbeat",
+    "safety-silent",
+    "position-jump",
+)
+WITHOUT_DETAIL = [f for f in Fault if len(FAULTS[f].detail.__dataclass_fields__) == 0]
+
+
+@pytest.mark.parametrize("name", HOLDING)
+def test_a_fault_of_motion_or_cadence_stops_a_move(name):
+    bench = HoldBench()
+    move(bench)
+    begin = bench.plant.q.copy()
+    HOLDING[name](bench)
+    check_stopped(bench, begin)
+    assert bench.cycle.status.verdict.reason == name
+    assert bench.cycle.status.state in {ArmState.HOLD, ArmState.DAMP}
+
+
+@pytest.mark.parametrize("name", BRAKED)
+def test_a_fault_that_takes_the_arm_away_stops_a_move(name):
+    bench = HoldBench()
+    move(bench)
+    begin = bench.plant.q.copy()
+    inject(name)(bench)
+    # 0.4 s until a silent safety module is a silent one; holding since 0.25 s.
+    check_stopped(bench, begin, travel=0.2 if name == "safety-silent" else TRAVEL)
+    assert bench.plant.is_held or bench.cycle.status.state is ArmState.HOLD
+
+
+def test_the_stop_button_ends_a_move_for_good():
+    bench = HoldBench()
+    move(bench)
+    inject("estop")(bench)
+    bench.run(0.1)
+    assert bench.cycle.status.state is ArmState.IDLE
+    bench.enter(ArmState.HOLD)  # a new hold is no old move
+    assert np.abs(bench.law.torque(bench.arm.read(bench.clock.now_ns()))[0]).max() < 46
+
+
+@pytest.mark.parametrize("fault", WITHOUT_DETAIL)
+def test_a_verdict_of_those_around_the_loop_stops_a_move(fault):
+    bench = HoldBench()
+    move(bench)
+    begin = bench.plant.q.copy()
+    report(fault)(bench)
+    check_stopped(bench, begin)
+    assert bench.cycle.status.verdict.fault is fault
+
+
+def test_a_move_that_was_stopped_does_not_go_on_when_the_fault_is_over():
+    bench = HoldBench()
+    goal = move(bench)
+    bench.cycle.limits = replace(LIMITS, speed=(0.3,) * 7)
+    bench.run(0.5)
+    bench.cycle.limits = LIMITS
+    bench.enter(ArmState.HOLD)
+    q = bench.run(1.0)
+    assert np.ptp(q, axis=0).max() < STILL
+    assert np.abs(q[-1] - goal).max() > 0.1
+
+
+def test_no_move_begins_while_a_verdict_stands():
+    bench = HoldBench()
+    goal = move(bench)
+    report(Fault.CONSOLE_SILENT)(bench)
+    bench.run(0.5)
+    bench.cycle.move_to(goal.tolist(), SPEED)
+    q = bench.run(0.5)
+    assert np.ptp(q, axis=0).max() < STILL
+    bench.enter(ArmState.HOLD)
+    bench.cycle.move_to(goal.tolist(), SPEED)
+    bench.run(2.5)
+    assert np.abs(bench.plant.q - goal).max() < 0.02
+
+
+def test_a_move_that_was_not_begun_is_forgotten_when_hold_is_asked_for():
+    bench = HoldBench()
+    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    bench.cycle.request(ArmState.HOLD)
+    assert np.ptp(bench.run(0.5), axis=0).max() < STILL
+
+
+def test_the_torque_makes_no_step_when_a_person_stops_a_move_at_rest():
+    bench = HoldBench(error=0.6)
+    bench.cycle.move_to((bench.plant.q + 0.02).tolist(), 0.1)
+    bench.run(1.5)  # there, and held against a wrong weight
+    bench.sent.clear()
+    bench.run(0.01)
+    bench.enter(ArmState.HOLD)
+    bench.run(0.01)
+    assert np.abs(np.array(bench.sent[-1]) - bench.sent[0])[:4].max() < 0.5

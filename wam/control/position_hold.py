@@ -1,0 +1,98 @@
+"""Joints that stand still: a spring to where they stood, of bounded torque, damped."""
+
+import numpy as np
+
+from acquisition import ArmReading
+from wam.model import ArmConstants, Array
+
+# Shares of the vendor's gains of joint PD, which are made to follow moves: softer, and
+# damped the more the heavier the joint is. In no pose a swing of the arm is damped by
+# less than 0.29 of critical, its drives without friction, and all of it stays stable at
+# twice both gains: tests/wam/control/test_hold_stability.py.
+_STIFFNESS = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0])
+_DAMPING = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0])
+# In guide the springs have this share of it, and the dampers the vendor's gains: a hand
+# carries the arm (joint 2 with 9 N at 0.7 m), and left alone it stands still.
+GUIDE_SHARE = 0.5
+_SLOW = 0.05  # rad/s
+# Of the springs, joints 1 to 7; the lock holds joint 7. At joint 2 it is three times
+# the 4 N m that a foot of 0.6 kg forgotten in rig.toml weighs, and a person who moves
+# the arm away at 0.7 m needs 17 N.
+TORQUE_LIMIT = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m
+
+
+class PositionHold:
+    """Springs and dampers of joints 1 to 6.
+
+        tau = clip(k (q_ref - q), -limit, limit) - d qd
+
+    The reference follows a joint that goes further than limit / k from it (10 to 40
+    mrad): a moving arm is braked by `limit` and the damper. A spring drives no joint
+    faster than 0.05 rad/s: beyond, the reference follows it, too. So an arm that is
+    pushed away stays where it is left, and one that was stopped does not swing back.
+
+    Attributes:
+        stiffness: of the springs [N m/rad], shape (7,).
+        damping: of the dampers [N m s/rad], shape (7,).
+        guide_damping: of those of a guided arm [N m s/rad], shape (7,).
+    """
+
+    def __init__(self, constants: ArmConstants) -> None:
+        self.stiffness = _STIFFNESS * constants.kp
+        self.damping = _DAMPING * constants.kd
+        self.guide_damping = np.sign(_DAMPING) * constants.kd
+        # What a spring reaches; and in plain numbers, which is faster in every cycle.
+        self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0)
+        self._springs: list[tuple[float, float]] = list(
+            zip(self.stiffness.tolist(), self._reach.tolist(), strict=True)
+        )
+        self._reference: list[float] | None = None
+
+    def begin(self, q: Array, spring: Array | None = None) -> None:
+        """Hold where the joints are; arms that are held stay where they are held.
+
+        Args:
+            q: joint positions [rad], shape (7,).
+            spring: torques that the springs give at first [N m], shape (7,); None = 0.
+        """
+        if self._reference is not None:
+            return
+        reference = q
+        if spring is not None:
+            error = spring / np.maximum(self.stiffness, 1.0)
+            reference = q + np.clip(error, -self._reach, self._reach)
+        self._reference = reference.tolist()
+
+    def release(self) -> None:
+        """Let the joints go."""
+        self._reference = None
+
+    def spring(self, reading: ArmReading, share: float = 1.0) -> Array:
+        """Return the torques of the springs alone [N m], shape (7,).
+
+        They have `share` of their largest torques.
+        """
+        if self._reference is None:
+            return np.zeros(7)
+        held, torques = list[float](), list[float]()
+        q, qd = reading.q.tolist(), reading.qd.tolist()
+        rows = zip(self._reference, q, qd, self._springs, strict=True)
+        for reference, angle, rate, (stiffness, reach) in rows:
+            error = min(max(reference - angle, -share * reach), share * reach)
+            if error * rate > 0.0 and not -_SLOW <= rate <= _SLOW:
+                error = 0.0
+            held.append(angle + error)
+            torques.append(stiffness * error)
+        if reading.is_complete:  # an extrapolated position drags no reference along
+            self._reference = held
+        return np.array(torques)
+
+    def torque(self, reading: ArmReading, *, is_guided: bool = False) -> Array:
+        """Return the torques that keep joints 1 to 6 where they are [N m], (7,).
+
+        A guided arm is kept with half of them only, and damped less.
+        """
+        if is_guided:
+            spring = self.spring(reading, GUIDE_SHARE)
+            return spring - self.guide_damping * reading.qd
+        return self.spring(reading) - self.damping * reading.qd
