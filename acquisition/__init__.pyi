@@ -40,6 +40,7 @@ from .settings import (
     Whole,
 )
 from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSource
+from .temporary_folders import remove_abandoned, temporary_folder
 
 __all__ = [
     "MOTOR_FRESH_SHIFT",
@@ -83,6 +84,8 @@ __all__ = [
     "control_loop",
     "ipc",
     "recording",
+    "remove_abandoned",
+    "temporary_folder",
     "trial_file",
     "utc_offset_ns",
 ]

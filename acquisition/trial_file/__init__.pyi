@@ -6,9 +6,9 @@ from .data_files import (
     open_folder,
     read_data,
 )
-from .publishing import sync_directory
+from .publishing import make_directories, sync_directory
 from .reader import TrialReader
-from .recover import Recovery, recover_file, recovered_path
+from .recover import ROOM, Recovery, recover_file, recovered_path
 from .salvage import recorded_seconds
 from .verify import VerifiedFile, verify_file
 from .writer import (
@@ -22,6 +22,7 @@ from .writer import (
 
 __all__ = [
     "FLIGHT_TOPICS",
+    "ROOM",
     "TRIAL_TOPICS",
     "TRUTH_TOPICS",
     "Recovery",
@@ -31,6 +32,7 @@ __all__ = [
     "VerifiedFile",
     "check_folders",
     "is_there",
+    "make_directories",
     "open_data",
     "open_folder",
     "publish",

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from acquisition import TrialFileError
+from acquisition import TrialFileError, remove_abandoned
 from acquisition.trial_file import (
+    ROOM,
     VerifiedFile,
     is_there,
     recover_file,
@@ -23,6 +24,7 @@ from experiments.session.trial_files import (
 from experiments.session.trial_name import TrialName
 
 WHO = "traction"  # a verdict that nobody gave
+REPLACED = frozenset({".json", ".toml", ".patch", ".txt"})  # as a whole, atomically
 REASON = "the session ended without closing"
 
 
@@ -97,8 +99,10 @@ def _truth(partial: Path) -> Path:
 def _sweep(folder: SessionFolder) -> None:
     """Take away what a kill in the middle of a replacement has left."""
     for place in (folder.path, folder.trials, folder.rejected):
-        for path in place.glob("*.json.tmp"):
-            remove_file(path)
+        for path in place.glob("*.*.tmp"):
+            if path.with_suffix("").suffix in REPLACED:
+                remove_file(path)
+        remove_abandoned(ROOM, place)
     for path in folder.trials.glob("*.mcap.partial"):
         finished = path.with_suffix("")
         for other in (path, recovered_path(path)):

@@ -14,6 +14,7 @@ from acquisition import SessionError, SettingsError, SystemClock
 from acquisition.trial_file import (
     check_folders,
     is_there,
+    make_directories,
     open_data,
     read_data,
     sync_directory,
@@ -80,11 +81,11 @@ class SessionFolder:
             descriptor = open_data(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
             with os.fdopen(descriptor, "r+b") as file:
                 is_new = not file.seek(0, os.SEEK_END)
+                if is_new:  # a journal whose name is lost would take all with it
+                    sync_directory(self.path)
                 file.write(b"\n" + line if _is_torn(file) else line)
                 file.flush()
                 os.fsync(descriptor)
-            if is_new:
-                sync_directory(self.path)
 
     def journal_text(self) -> bytes:
         """Return the journal as it is on the disk, empty where there is none.
@@ -183,7 +184,7 @@ def create_session(
     """
     sessions = data / "sessions"
     try:
-        sessions.mkdir(parents=True, exist_ok=True)
+        make_directories(sessions)
         with _locked(sessions / ".lock"):
             numbers = [int(s.id[1:]) for s in list_sessions(data)]
             number = max(numbers, default=0) + 1
