@@ -1,6 +1,8 @@
 from .chunks import read_file
 from .data_files import (
     check_folders,
+    claimed_folder,
+    is_claimed,
     is_there,
     open_data,
     open_folder,
@@ -31,6 +33,8 @@ __all__ = [
     "TrialWriter",
     "VerifiedFile",
     "check_folders",
+    "claimed_folder",
+    "is_claimed",
     "is_there",
     "make_directories",
     "open_data",

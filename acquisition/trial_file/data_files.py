@@ -6,6 +6,7 @@ the session's is reached through a link.
 """
 
 import contextlib
+import fcntl
 import os
 import stat
 from collections.abc import Generator, Mapping
@@ -67,6 +68,37 @@ def open_folder(path: Path) -> Generator[int]:
         yield descriptor
     finally:
         os.close(descriptor)
+
+
+@contextmanager
+def claimed_folder(path: Path) -> Generator[None]:
+    """Say that a trial file in `path` is being written; a kill ends the claim too.
+
+    Raises:
+        TrialFileError: the folder is missing, or a symbolic link.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            folder = stack.enter_context(open_folder(path))
+        except OSError as error:
+            raise TrialFileError(
+                path, f"cannot be opened ({error.strerror})"
+            ) from error
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(folder, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        yield
+
+
+def is_claimed(path: Path) -> bool:
+    """Return whether a process writes a trial file in `path` now."""
+    try:
+        with open_folder(path) as folder:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
 
 
 def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
