@@ -38,6 +38,7 @@ from .settings import (
     Six,
     Vector3,
     Whole,
+    parse_toml,
 )
 from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSource
 from .temporary_folders import remove_abandoned, temporary_folder
@@ -83,6 +84,7 @@ __all__ = [
     "WrenchSensor",
     "control_loop",
     "ipc",
+    "parse_toml",
     "recording",
     "remove_abandoned",
     "temporary_folder",
