@@ -21,10 +21,10 @@ SIZE_LIMITS: Mapping[str, int] = {
     ".lock": 4 * 2**10,
     ".json": 2**20,
     ".toml": 2**20,
-    ".jsonl": 16 * 2**20,
+    ".jsonl": 4 * 2**20,
     ".patch": 16 * 2**20,
-    ".mcap": 2 * 2**30,
-    ".partial": 2 * 2**30,
+    ".mcap": 64 * 2**20,  # a trial of 30 s has 5; the file is read as a whole
+    ".partial": 64 * 2**20,
 }
 _OTHERS = 16 * 2**20
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC

@@ -5,12 +5,14 @@ is unpickled, and whatever does not fit becomes one SettingsError that names the
 """
 
 import csv
+import stat
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -22,6 +24,7 @@ COLUMNS = ("t", "v_t", "F_n", "F_t")
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 64_000_000  # bytes, also of an npz once unpacked
 MOST_TRIALS = 2000
+LONGEST_LINE = 65_536  # characters
 
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
@@ -127,7 +130,10 @@ class _TableForm:
 
 def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
     try:
-        size = path.stat().st_size
+        status = path.stat()
+        size = status.st_size
+        if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+            raise _refusal(path, "it is no regular file", "Give CSV or npz files.")
         with path.open("rb") as file:
             start = file.read(4)
     except OSError as error:
@@ -203,9 +209,10 @@ def _from_array(
 def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            header = [name.strip() for name in next(csv.reader([file.readline()]), [])]
+            lines = _lines(path, file)
+            header = [name.strip() for name in next(csv.reader(lines), [])]
             places = _places(path, header, form.columns)
-            rows = (line for line in file if line.strip())
+            rows = (line for line in lines if line.strip())
             first = next(rows, None)
             if first is None:
                 hint = "Check that it was copied whole."
@@ -220,6 +227,15 @@ def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
             path, f"its header cannot be read ({error})", "Give a CSV table."
         ) from error
     return form.series(form.terrain, path.name, table)
+
+
+def _lines(path: Path, file: TextIO) -> Iterator[str]:
+    """Give the lines of a table; one that fills the memory is none."""
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            hint = "Give a table with four columns, a row per line."
+            raise _refusal(path, f"a line exceeds {LONGEST_LINE} characters", hint)
+        yield line
 
 
 def _places(path: Path, header: list[str], columns: Mapping[str, str]) -> list[int]:

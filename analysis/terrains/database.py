@@ -14,6 +14,7 @@ edge. `load` checks everything before it believes it.
 
 import json
 import math
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,7 +28,8 @@ from analysis.study import Prediction
 from analysis.terrains.table import Table
 
 FORMAT, VERSION = "traction-terrain-db", 1
-_LARGEST = 64_000_000  # bytes
+_LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
+_MOST = 1_000_000_000  # trials or samples
 _MOST_POINTS = 400  # of an axis
 _MOST_TERRAINS = 200
 
@@ -176,7 +178,10 @@ def load(path: Path | str) -> TerrainDatabase:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > _LARGEST:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise ValueError("it is no regular file")
+        if status.st_size > _LARGEST:
             raise ValueError(f"it is larger than {_LARGEST / 1e6:.0f} MB")
         return _database(json.loads(path.read_bytes()))
     except OSError as error:
@@ -229,14 +234,21 @@ def _terrain(
     return KnownTerrain(
         name=name,
         kind=str(content["kind"]),
-        trials=int(content["trials"]),
-        samples=int(content["samples"]),
+        trials=_count(content["trials"]),
+        samples=_count(content["samples"]),
         rho=_share(content["rho"]),
         limits={int(k): float(v) for k, v in dict(content["limits"]).items()},
         tables=tables,
         parameters={str(key): model["parameters"] for key, model in models.items()},
         default=default,
     )
+
+
+def _count(value: Any) -> int:  # noqa: ANN401
+    number = int(value)
+    if not 0 <= number <= _MOST:
+        raise ValueError(f"trials or samples are not within 0..{_MOST}")
+    return number
 
 
 def _share(value: Any) -> float:  # noqa: ANN401

@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from acquisition import SessionError, SettingsError, SystemClock
+from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from acquisition.trial_file import (
     check_folders,
     is_there,
@@ -33,6 +33,7 @@ _FOLDER = re.compile(
     r"(?P<fake>\.fake)?$"
 )
 LONGEST_NAME = 64
+MOST_EVENTS = 50_000
 _TRIAL_FILE = re.compile(r"^T\d\d[a-z]*\.json$")
 
 
@@ -91,13 +92,18 @@ class SessionFolder:
         """Return the journal as it is on the disk, empty where there is none.
 
         Raises:
-            TrialFileError: it, or a folder of the session, is none of its own.
+            TrialFileError: it, or a folder of the session, is none of its own; or it is
+                too long.
         """
         check_folders(self.path)
+        path = self.path / JOURNAL_FILE
         try:
-            return read_data(self.path / JOURNAL_FILE)
+            text = read_data(path)
         except OSError:
             return b""
+        if text.count(b"\n") > MOST_EVENTS:
+            raise TrialFileError(path, f"has more than {MOST_EVENTS} lines")
+        return text
 
     def events(self) -> list[dict[str, Any]]:
         """Return the journal; torn lines and those of a wrong checksum are left out.
