@@ -1,5 +1,6 @@
 """What settings and calibrations in TOML are made of, and how they are parsed."""
 
+import re
 import tomllib
 from typing import Annotated, Any, cast
 
@@ -17,6 +18,9 @@ File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
 
 
 _DEEPEST = 20  # tables in tables; a settings file has four
+# tomllib takes memory with the square of the length of a dotted key
+_PARTS = re.compile(r"[,=\n]")
+_DOTTED = re.compile(r"""\.\s*[\w"'-]""")
 _LARGEST_WHOLE = 2**63 - 1  # of TOML
 
 
@@ -29,6 +33,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     Raises:
         ValueError: the text is no TOML, nests too deeply, or has too large an integer.
     """
+    if any(len(_DOTTED.findall(part)) > _DEEPEST for part in _PARTS.split(text)):
+        raise ValueError("it nests too deeply")
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:

@@ -11,7 +11,6 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.errors import TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
-from analysis.data import load_trial
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
@@ -162,7 +161,7 @@ def _trial(data: bytes, folder: Path) -> None:
         with contextlib.suppress(TrialFileError):
             look(TrialReader(path))
     recovery = recover_file(path)
-    load_trial(recovery.path)
+    TrialReader(recovery.path).cycles()
 
 
 def _used(name: str) -> Callable[[bytes, Path], None]:
