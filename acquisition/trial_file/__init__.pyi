@@ -1,5 +1,6 @@
 from .chunks import read_file
 from .data_files import (
+    check_absent,
     check_folders,
     claimed_folder,
     is_claimed,
@@ -32,6 +33,7 @@ __all__ = [
     "TrialReader",
     "TrialWriter",
     "VerifiedFile",
+    "check_absent",
     "check_folders",
     "claimed_folder",
     "is_claimed",

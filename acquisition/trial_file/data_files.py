@@ -6,6 +6,7 @@ the session's is reached through a link.
 """
 
 import contextlib
+import errno
 import fcntl
 import os
 import stat
@@ -37,6 +38,7 @@ _KINDS = (
     (stat.S_ISCHR, "is a device"),
     (stat.S_ISBLK, "is a device"),
 )
+_ABSENT = {errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP}
 _HINT = "Nothing in a data folder may lead out of it. The file was not opened."
 
 
@@ -132,6 +134,20 @@ def read_data(path: Path) -> bytes:
         return file.read(os.fstat(file.fileno()).st_size)  # even if it grows now
 
 
+def check_absent(path: Path, error: OSError) -> None:
+    """Return if `error` says that there is no file at `path`.
+
+    A file that cannot be read now, for want of a descriptor or of permission, is no
+    missing one: what is decided on that would be decided wrongly.
+
+    Raises:
+        TrialFileError: it says anything else.
+    """
+    if error.errno not in _ABSENT:
+        reason = f"cannot be read ({error.strerror})"
+        raise TrialFileError(path, reason, hint="Nothing was changed.") from error
+
+
 def check_folders(session: Path) -> None:
     """Refuse a session whose folders lead elsewhere.
 
@@ -148,12 +164,14 @@ def is_there(path: Path) -> bool:
     """Return whether there is a regular file at `path`.
 
     Raises:
-        TrialFileError: there is something else, or it is reached through a link.
+        TrialFileError: there is something else, or it is reached through a link; or
+            nobody can tell.
     """
     try:
         with open_folder(path.parent) as folder:
             status = _stat(path.name, folder)
-    except OSError:
+    except OSError as error:
+        check_absent(path, error)
         return False
     _check_kind(path, status)
     return True

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from acquisition.trial_file import (
+    check_absent,
     check_folders,
     is_there,
     make_directories,
@@ -99,7 +100,8 @@ class SessionFolder:
         path = self.path / JOURNAL_FILE
         try:
             text = read_data(path)
-        except OSError:
+        except OSError as error:
+            check_absent(path, error)
             return b""
         if text.count(b"\n") > MOST_EVENTS:
             raise TrialFileError(path, f"has more than {MOST_EVENTS} lines")

@@ -7,7 +7,7 @@ is complete: done again, it gives the very files that are on the disk.
 
 import io
 import os
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -100,6 +100,16 @@ Operation = (
 )
 
 
+# Gets the name of a call and how many bytes it wants to write (0 where it writes none);
+# returns how many it may, or raises what the kernel would.
+Limit = Callable[[str, int], int]
+
+
+def without_limit(_: str, size: int) -> int:
+    """Let every call through."""
+    return size
+
+
 class Recording:
     """The operations on files and folders below `root`, in their order.
 
@@ -111,8 +121,9 @@ class Recording:
         start: how many of them were done before.
     """
 
-    def __init__(self, root: Path) -> None:
+    def __init__(self, root: Path, limit: Limit) -> None:
         self.root = root.resolve()
+        self.limit = limit
         self.operations: list[Operation] = []
         self._names: dict[Path, int] = {}
         self._open: dict[int, int] = {}
@@ -215,7 +226,8 @@ class _RecordedFile(io.FileIO):
 
     def write(self, data) -> int:
         offset = self.recording.place(self.fileno())
-        count = super().write(data)
+        allowed = self.recording.limit("write", len(data))
+        count = super().write(bytes(data[:allowed]))
         self.recording.written(self.fileno(), offset, bytes(data[:count]))
         return count
 
@@ -265,6 +277,8 @@ def _recorded_calls(recording: Recording):
 
     def os_open(path, flags, mode=0o777, *, dir_fd=None):
         below = recording.below(path, dir_fd)
+        if below is not None:
+            recording.limit("create" if flags & os.O_CREAT else "open", 0)
         was_there = below is not None and (recording.root / below).exists()
         descriptor = real["open"](path, flags, mode, dir_fd=dir_fd)
         recording.closed(descriptor)
@@ -273,6 +287,9 @@ def _recorded_calls(recording: Recording):
         return descriptor
 
     def link(src, dst, *, src_dir_fd=None, dst_dir_fd=None, follow_symlinks=True):
+        target = recording.below(dst, dst_dir_fd)
+        if target is not None:
+            recording.limit("create", 0)
         real["link"](
             src,
             dst,
@@ -280,12 +297,13 @@ def _recorded_calls(recording: Recording):
             dst_dir_fd=dst_dir_fd,
             follow_symlinks=follow_symlinks,
         )
-        target = recording.below(dst, dst_dir_fd)
         if target is not None:
             recording.linked(recording.below(src, src_dir_fd), target)
 
     def replace(src, dst, *, src_dir_fd=None, dst_dir_fd=None):
         target = recording.below(dst, dst_dir_fd)
+        if target is not None:
+            recording.limit("replace", 0)
         real["replace"](src, dst, src_dir_fd=src_dir_fd, dst_dir_fd=dst_dir_fd)
         if target is not None:
             recording.replaced(recording.below(src, src_dir_fd), target)
@@ -293,6 +311,8 @@ def _recorded_calls(recording: Recording):
     def on_name(name, note):
         def called(path, *arguments, dir_fd=None):
             below = recording.below(path, dir_fd)
+            if below is not None:
+                recording.limit("create" if name == "mkdir" else name, 0)
             real[name](path, *arguments, dir_fd=dir_fd)
             if below is not None:
                 note(below)
@@ -315,6 +335,7 @@ def _recorded_calls(recording: Recording):
         recording.truncated(descriptor, size)
 
     def fsync(descriptor):
+        recording.limit("fsync", 0)
         recording.synced(descriptor)  # what is forced is the content; no need to wait
 
     def close(descriptor):
@@ -357,9 +378,14 @@ _CALLS = [
 
 
 @contextmanager
-def recorded(root: Path) -> Generator[Recording]:
-    """Give the list of what this process does to files below `root` meanwhile."""
-    recording = Recording(root)
+def recorded(root: Path, limit: Limit = without_limit) -> Generator[Recording]:
+    """Give the list of what this process does to files below `root` meanwhile.
+
+    Args:
+        root: the recorded folder.
+        limit: lets calls fail as on a full or broken disk; what fails is not recorded.
+    """
+    recording = Recording(root, limit)
     with pytest.MonkeyPatch.context() as patch:
         for name, call in _recorded_calls(recording).items():
             patch.setattr(os, name, call)
