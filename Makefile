@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint types contracts clean
+.PHONY: demo test lint types contracts sbom clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
@@ -37,5 +37,8 @@ types: $(STAMP)  ## pyright
 contracts: $(STAMP)  ## who may import whom
 	$(BIN)/lint-imports
 
+sbom: $(STAMP)  ## what is installed, as CycloneDX JSON: sbom.json
+	$(BIN)/python -m tests.sbom > sbom.json
+
 clean:
-	rm -rf $(VENV) demo *.egg-info
+	rm -rf $(VENV) demo sbom.json *.egg-info

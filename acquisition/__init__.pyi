@@ -38,8 +38,10 @@ from .settings import (
     Six,
     Vector3,
     Whole,
+    parse_toml,
 )
 from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSource
+from .temporary_folders import remove_abandoned, temporary_folder
 
 __all__ = [
     "MOTOR_FRESH_SHIFT",
@@ -82,7 +84,10 @@ __all__ = [
     "WrenchSensor",
     "control_loop",
     "ipc",
+    "parse_toml",
     "recording",
+    "remove_abandoned",
+    "temporary_folder",
     "trial_file",
     "utc_offset_ns",
 ]

@@ -1,6 +1,8 @@
-"""What the sections of a settings file in TOML are made of."""
+"""What settings and calibrations in TOML are made of, and how they are parsed."""
 
-from typing import Annotated
+import re
+import tomllib
+from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -13,6 +15,50 @@ Near = Annotated[Number, Field(ge=-10, le=10)]  # metres and radians of this roo
 Vector3 = tuple[Near, Near, Near]
 Six = tuple[Number, Number, Number, Number, Number, Number]
 File = Annotated[str, Field(min_length=1, max_length=4096)]  # beside rig.toml
+
+
+_DEEPEST = 20  # tables in tables; a settings file has four
+# tomllib takes memory with the square of the length of a dotted key
+_PARTS = re.compile(r"[,=\n]")
+_DOTTED = re.compile(r"""\.\s*[\w"'-]""")
+_LARGEST_WHOLE = 2**63 - 1  # of TOML
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the table in `text`.
+
+    Python would take integers of any size; TOML has none beyond 64 bits, and neither
+    arrays nor messages can hold them.
+
+    Raises:
+        ValueError: the text is no TOML, nests too deeply, or has too large an integer.
+    """
+    if any(len(_DOTTED.findall(part)) > _DEEPEST for part in _PARTS.split(text)):
+        raise ValueError("it nests too deeply")
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        raise
+    except (ValueError, RecursionError) as error:
+        what = "nests too deeply" if isinstance(error, RecursionError) else _TOO_LARGE
+        raise ValueError(f"it {what}") from error
+    level: list[object] = [table]
+    for _ in range(_DEEPEST):
+        level = [inner for value in level for inner in _inner(value)]
+        if any(type(v) is int and abs(v) > _LARGEST_WHOLE for v in level):
+            raise ValueError(f"it {_TOO_LARGE}")
+    if level:
+        raise ValueError("it nests too deeply")
+    return table
+
+
+_TOO_LARGE = "has an integer beyond 64 bits"
+
+
+def _inner(value: object) -> list[object]:
+    if isinstance(value, dict):
+        return list(cast("dict[str, object]", value).values())
+    return cast("list[object]", value) if isinstance(value, list) else []
 
 
 class SettingsSection(BaseModel):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 Wrench = tuple[float, float, float, float, float, float]
 
 AXES = ("Fx", "Fy", "Fz", "Tx", "Ty", "Tz")
+_BEYOND = 4.0  # times its range is more than any sensor shows
 ALL_AXES = 0x3F  # one bit an axis, Fx the lowest
 
 
@@ -59,6 +60,17 @@ def axes_beyond(wrench: Wrench, ranges: Wrench) -> int:
         1 << axis
         for axis, (value, most) in enumerate(zip(wrench, ranges, strict=True))
         if abs(value) >= most
+    )
+
+
+def is_measurable(wrench: Wrench, ranges: Wrench) -> bool:
+    """Return whether a sensor of these ranges can have measured the wrench.
+
+    Beyond its range a sensor still shows something; a multiple of it, or no number at
+    all, comes from a broken device or line, whatever the checksum says.
+    """
+    return all(
+        abs(value) <= _BEYOND * most for value, most in zip(wrench, ranges, strict=True)
     )
 
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Protocol
 
@@ -17,6 +18,7 @@ from acquisition.trial_file import (
     TrialHeader,
     TrialWriter,
     VerifiedFile,
+    claimed_folder,
     publish,
     verify_file,
 )
@@ -83,6 +85,7 @@ class Recorder:
         self._writer: TrialWriter | None = None
         self._has_frames = False
         self._flushed_ns = 0
+        self._claim = ExitStack()
         self.largest_backlog = 0
         self.failure: TrialFileError | None = None
 
@@ -97,7 +100,10 @@ class Recorder:
             raise TrialFileError(path, "another trial is being recorded")
         self._has_frames = header.has_frames
         topics = FLIGHT_TOPICS if self._has_frames else TRIAL_TOPICS
-        writer = TrialWriter(path, header, topics)
+        with ExitStack() as stack:
+            stack.enter_context(claimed_folder(path.parent))
+            writer = TrialWriter(path, header, topics)
+            self._claim = stack.pop_all()
         now_ns = self._clock.now_ns()
         earliest_ns = now_ns - int(PRE_ROLL * 1e9)
         for reader in (self._cycles, self._wrenches, self._frames):
@@ -142,8 +148,9 @@ class Recorder:
                 raise self.failure
             raise RuntimeError("no trial is being recorded")
         self._writer = None
-        self._write_new(writer)
-        return seal(writer, stop_reason)
+        with self._claim:
+            self._write_new(writer)
+            return seal(writer, stop_reason)
 
     def abandon(self) -> None:
         """Stop recording; what there is goes to the disk and stays as `.partial`."""
@@ -159,6 +166,7 @@ class Recorder:
         if self._writer is not None:
             self._writer.close_partial()
             self._writer = None
+            self._claim.close()
 
     def publish_state(self) -> None:
         """Write to the board how the recorder is doing."""

@@ -1,6 +1,7 @@
 """The recorder as a process of its own: its main loop, and the console's view of it."""
 
 import json
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ def main(context: ChildContext) -> None:
     A trial that is open then is ended properly: nothing is lost with the console.
     """
     name_process("traction-record")
+    # When the console dies, the open file still has to be ended.
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(nice=NICE, core=context.settings.get("core")))
     recorder = Recorder(context.shared, SystemClock())
     server = RpcServer(bind(TrialRecording, recorder))

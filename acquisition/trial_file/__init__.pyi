@@ -1,14 +1,17 @@
 from .chunks import read_file
 from .data_files import (
+    check_absent,
     check_folders,
+    claimed_folder,
+    is_claimed,
     is_there,
     open_data,
     open_folder,
     read_data,
 )
-from .publishing import sync_directory
+from .publishing import make_directories, sync_directory
 from .reader import TrialReader
-from .recover import Recovery, recover_file, recovered_path
+from .recover import ROOM, Recovery, recover_file, recovered_path
 from .salvage import recorded_seconds
 from .verify import VerifiedFile, verify_file
 from .writer import (
@@ -22,6 +25,7 @@ from .writer import (
 
 __all__ = [
     "FLIGHT_TOPICS",
+    "ROOM",
     "TRIAL_TOPICS",
     "TRUTH_TOPICS",
     "Recovery",
@@ -29,8 +33,12 @@ __all__ = [
     "TrialReader",
     "TrialWriter",
     "VerifiedFile",
+    "check_absent",
     "check_folders",
+    "claimed_folder",
+    "is_claimed",
     "is_there",
+    "make_directories",
     "open_data",
     "open_folder",
     "publish",

@@ -51,11 +51,24 @@ def check_sections(data: bytes, path: Path) -> Sections:
     if opcode != Opcode.DATA_END:
         raise TrialFileError(path, "has no end of data where it should be")
     whole = memoryview(data)
-    if zlib.crc32(whole[summary : footer + _FOOTER.size - 4]) != summary_crc:
-        raise TrialFileError(path, "has a summary whose checksum is wrong")
-    if zlib.crc32(whole[:end]) != data_crc:
-        raise TrialFileError(path, "has data whose checksum is wrong")
+    actual = zlib.crc32(whole[summary : footer + _FOOTER.size - 4])
+    _check_sum("a summary", actual, summary_crc, path)
+    _check_sum("data", zlib.crc32(whole[:end]), data_crc, path)
     return Sections(end, summary, footer)
+
+
+def _check_sum(part: str, actual: int, stated: int, path: Path) -> None:
+    """Refuse a section that is not what its checksum says; 0 = it has none."""
+    if actual == stated:
+        return
+    if stated:
+        raise TrialFileError(path, f"has {part} whose checksum is wrong")
+    raise TrialFileError(
+        path,
+        f"has {part} without a checksum: another program wrote it, and nothing shows "
+        "whether it is whole",
+        hint=f"Copy what is sound: traction recover {path}",
+    )
 
 
 def _check_magic(data: bytes, path: Path) -> None:

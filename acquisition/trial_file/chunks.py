@@ -18,6 +18,7 @@ from acquisition.trial_file.data_files import read_data
 RECORD_LIMIT = 16 * 2**20  # bytes of one record, and of one chunk unpacked
 _UNPACKED_FLOOR = 64 * 2**20
 _UNPACKED_RATIO = 100  # an arm at rest packs twenty times, zeros a thousand times
+_UNPACKED_MOST = 192 * 2**20  # ten minutes of cycles
 _RECORD = struct.Struct("<BQ")  # opcode, length
 _CHUNK = struct.Struct("<QQQII")  # start, end, size, crc, length of the compression
 _STORED = struct.Struct("<Q")
@@ -62,7 +63,7 @@ def read_file(path: Path) -> bytes:
 
 def unpacked_limit(file_bytes: int) -> int:
     """Return how many bytes all chunks of a file of `file_bytes` may unpack to."""
-    return _UNPACKED_FLOOR + _UNPACKED_RATIO * file_bytes
+    return min(_UNPACKED_MOST, _UNPACKED_FLOOR + _UNPACKED_RATIO * file_bytes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,8 @@ the session's is reached through a link.
 """
 
 import contextlib
+import errno
+import fcntl
 import os
 import stat
 from collections.abc import Generator, Mapping
@@ -20,10 +22,10 @@ SIZE_LIMITS: Mapping[str, int] = {
     ".lock": 4 * 2**10,
     ".json": 2**20,
     ".toml": 2**20,
-    ".jsonl": 16 * 2**20,
+    ".jsonl": 4 * 2**20,
     ".patch": 16 * 2**20,
-    ".mcap": 2 * 2**30,
-    ".partial": 2 * 2**30,
+    ".mcap": 64 * 2**20,  # a trial of 30 s has 5; the file is read as a whole
+    ".partial": 64 * 2**20,
 }
 _OTHERS = 16 * 2**20
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
@@ -36,6 +38,7 @@ _KINDS = (
     (stat.S_ISCHR, "is a device"),
     (stat.S_ISBLK, "is a device"),
 )
+_ABSENT = {errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP}
 _HINT = "Nothing in a data folder may lead out of it. The file was not opened."
 
 
@@ -69,6 +72,37 @@ def open_folder(path: Path) -> Generator[int]:
         os.close(descriptor)
 
 
+@contextmanager
+def claimed_folder(path: Path) -> Generator[None]:
+    """Say that a trial file in `path` is being written; a kill ends the claim too.
+
+    Raises:
+        TrialFileError: the folder is missing, or a symbolic link.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            folder = stack.enter_context(open_folder(path))
+        except OSError as error:
+            raise TrialFileError(
+                path, f"cannot be opened ({error.strerror})"
+            ) from error
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(folder, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        yield
+
+
+def is_claimed(path: Path) -> bool:
+    """Return whether a process writes a trial file in `path` now."""
+    try:
+        with open_folder(path) as folder:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False
+
+
 def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
     """Return a descriptor of the regular file `path`; nothing is waited for.
 
@@ -100,6 +134,20 @@ def read_data(path: Path) -> bytes:
         return file.read(os.fstat(file.fileno()).st_size)  # even if it grows now
 
 
+def check_absent(path: Path, error: OSError) -> None:
+    """Return if `error` says that there is no file at `path`.
+
+    A file that cannot be read now, for want of a descriptor or of permission, is no
+    missing one: what is decided on that would be decided wrongly.
+
+    Raises:
+        TrialFileError: it says anything else.
+    """
+    if error.errno not in _ABSENT:
+        reason = f"cannot be read ({error.strerror})"
+        raise TrialFileError(path, reason, hint="Nothing was changed.") from error
+
+
 def check_folders(session: Path) -> None:
     """Refuse a session whose folders lead elsewhere.
 
@@ -116,12 +164,14 @@ def is_there(path: Path) -> bool:
     """Return whether there is a regular file at `path`.
 
     Raises:
-        TrialFileError: there is something else, or it is reached through a link.
+        TrialFileError: there is something else, or it is reached through a link; or
+            nobody can tell.
     """
     try:
         with open_folder(path.parent) as folder:
             status = _stat(path.name, folder)
-    except OSError:
+    except OSError as error:
+        check_absent(path, error)
         return False
     _check_kind(path, status)
     return True

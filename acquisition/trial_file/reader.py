@@ -15,7 +15,7 @@ from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
 
-MAX_ROWS = 10_000_000
+MAX_ROWS = 300_000  # ten minutes
 _HEAD = np.dtype(
     [
         ("op", "u1"),

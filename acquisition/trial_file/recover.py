@@ -3,7 +3,6 @@
 import hashlib
 import os
 import struct
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +15,15 @@ from mcap.writer import CompressionType, Writer
 from acquisition.errors import TrialFileError
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
+from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
 from acquisition.trial_file.publishing import publish_file
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
+
+ROOM = ".recover"  # begins the name of a folder in which a copy grows
 
 
 class TrialCopy:
@@ -194,8 +196,8 @@ def recover_file(source: Path) -> Recovery:
     if target.exists():
         return _earlier(source, target, details)
     try:
-        with tempfile.TemporaryDirectory(prefix=".recover-", dir=source.parent) as room:
-            return _recover(data, source, details, Path(room) / target.name)
+        with temporary_folder(ROOM, source.parent) as room:
+            return _recover(data, source, details, room / target.name)
     except OSError as error:
         raise TrialFileError(
             target,

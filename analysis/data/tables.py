@@ -5,12 +5,14 @@ is unpickled, and whatever does not fit becomes one SettingsError that names the
 """
 
 import csv
+import stat
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -19,8 +21,9 @@ from analysis.data.series import Array, TractionSeries
 from analysis.data.units import COLUMNS, factor, split_header
 
 DEFAULT_TERRAIN = "table"
-LARGEST_FILE = 64_000_000  # bytes, also of an npz once unpacked
+LARGEST_FILE = 24_000_000  # bytes, also of an npz once unpacked; six times in memory
 MOST_TRIALS = 2000
+LONGEST_LINE = 65_536  # characters
 
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
@@ -110,12 +113,8 @@ class _TableForm:
             SettingsError: a unit is not known, or is stated otherwise.
         """
         try:
-            return np.array(
-                [
-                    factor(name, stated.get(name, ""), self.units.get(name, ""))
-                    for name in COLUMNS
-                ]
-            )
+            units = [(n, stated.get(n, ""), self.units.get(n, "")) for n in COLUMNS]
+            return np.array([factor(*unit) for unit in units])
         except SettingsError as error:
             raise SettingsError(f"{path}: {error.message}", hint=error.hint) from error
 
@@ -128,7 +127,10 @@ class _TableForm:
 
 def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
     try:
-        size = path.stat().st_size
+        status = path.stat()
+        size = status.st_size
+        if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
+            raise _refusal(path, "it is no regular file", "Give CSV or npz files.")
         with path.open("rb") as file:
             start = file.read(4)
     except OSError as error:
@@ -204,11 +206,12 @@ def _from_array(
 def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            line = file.readline()
+            lines = _lines(path, file)
+            line = next(lines, "")
             delimiter = _delimiter(line)
             header = next(csv.reader([line], delimiter=delimiter), [])
             places, stated = _places(path, [name.strip() for name in header], form)
-            rows = (line for line in file if line.strip())
+            rows = (line for line in lines if line.strip())
             first = next(rows, None)
             if first is None:
                 hint = "Check that it was copied whole."
@@ -223,6 +226,15 @@ def _load_csv(path: Path, form: _TableForm) -> TractionSeries:
             path, f"its header cannot be read ({error})", "Give a CSV table."
         ) from error
     return form.series(form.terrain, path.name, table * form.factors(path, stated))
+
+
+def _lines(path: Path, file: TextIO) -> Iterator[str]:
+    """Give the lines of a table; one that fills the memory is none."""
+    while line := file.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            hint = "Give a table with four columns, a row per line."
+            raise _refusal(path, f"a line exceeds {LONGEST_LINE} characters", hint)
+        yield line
 
 
 def _delimiter(header: str) -> str:

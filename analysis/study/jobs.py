@@ -4,7 +4,9 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from ipaddress import ip_address
 from typing import Any, Protocol, TypeVar
+from urllib.parse import urlsplit
 
 from joblib import Parallel, delayed, parallel_config
 
@@ -25,8 +27,9 @@ class Workers:
     Attributes:
         n_jobs: number of processes; by default one per core, and none beside this one
             for three tasks or fewer.
-        scheduler: address of a Dask scheduler, e.g. "tcp://127.0.0.1:8786"; None for
-            this machine. Its workers need the same version of this project.
+        scheduler: address of a Dask scheduler, on this machine or by TLS, e.g.
+            "tcp://127.0.0.1:8786"; None for processes of this one. Its workers need the
+            same version of this project.
     """
 
     n_jobs: int | None = None
@@ -77,7 +80,7 @@ def run_tasks(
         store: results of earlier runs; new ones are kept as soon as they are there.
 
     Raises:
-        SettingsError: the scheduler does not answer.
+        SettingsError: the scheduler does not answer, or is reached without TLS.
     """
     where = workers if isinstance(workers, Workers) else Workers(workers)
     results = {} if store is None else _stored(store, tasks)
@@ -130,11 +133,35 @@ def _one_threaded(
         return number, function(task)
 
 
+def is_guarded(address: str) -> bool:
+    """Return whether nobody can answer in the place of the scheduler at `address`.
+
+    Dask carries pickled objects: who can write into the connection can execute
+    anything here. It has to be authenticated by TLS, or stay on this machine.
+    """
+    scheme, _, place = address.rpartition("://")
+    if scheme not in {"", "tcp", "tls"}:
+        return False
+    try:
+        host = urlsplit(f"//{place}").hostname or ""
+        is_loopback = host == "localhost" or ip_address(host).is_loopback
+    except ValueError:
+        is_loopback = False
+    return scheme == "tls" or is_loopback
+
+
 @contextmanager
 def _cluster(address: str) -> Iterator[None]:
     """Send the tasks of the block to the Dask scheduler at `address`."""
     from distributed import Client
 
+    if not is_guarded(address):
+        raise SettingsError(
+            f"The Dask scheduler {address} is neither on this machine nor reached by "
+            "TLS.",
+            hint="What comes back from it is executed here. Name tls://HOST:PORT with "
+            "certificates in Dask's configuration, or leave --scheduler out.",
+        )
     try:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -1,4 +1,5 @@
 from .database import load
+from .estimates import SlipRisk, TractionEstimate, TractionEstimates
 from .export import database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .recognition import Recognition, recognise
@@ -8,6 +9,9 @@ __all__ = [
     "Confusion",
     "Identification",
     "Recognition",
+    "SlipRisk",
+    "TractionEstimate",
+    "TractionEstimates",
     "database_of",
     "identify_study",
     "load",

@@ -14,6 +14,7 @@ edge. `load` checks everything before it believes it.
 
 import json
 import math
+import stat
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,33 +25,14 @@ import numpy as np
 from acquisition import SettingsError
 from analysis.data import Array
 from analysis.study import Prediction
+from analysis.terrains.estimates import SlipRisk, TractionEstimate, TractionEstimates
 from analysis.terrains.table import Table
 
 FORMAT, VERSION = "traction-terrain-db", 1
-_LARGEST = 64_000_000  # bytes
+_LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much
+_MOST = 1_000_000_000  # trials or samples
 _MOST_POINTS = 400  # of an axis
 _MOST_TERRAINS = 200
-
-
-@dataclass(frozen=True, slots=True)
-class TractionEstimate:
-    """What is to be expected of a terrain at one point.
-
-    Attributes:
-        mean: traction [N].
-        sd: its standard deviation [N], noise included.
-        is_extrapolated: the point lies outside the table: the values are of its edge.
-    """
-
-    mean: float
-    sd: float
-    is_extrapolated: bool = False
-
-    def quantile(self, share: float) -> float:
-        """Return the traction [N] that is not reached with probability `share`."""
-        from scipy.special import ndtri
-
-        return self.mean + self.sd * float(ndtri(share))
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +76,9 @@ class KnownTerrain:
         table = self._table(model)
         return TractionEstimate(*table.at(F_n, v_t), not table.covers(F_n, v_t))
 
-    def predict_many(self, F_n: Array, v_t: Array, model: str = "") -> Prediction:
+    def predict_many(
+        self, F_n: Array, v_t: Array, model: str = ""
+    ) -> TractionEstimates:
         """Return the same for many points, shape (n,).
 
         Raises:
@@ -102,22 +86,31 @@ class KnownTerrain:
         """
         if not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
             raise SettingsError("F_n and v_t have to be finite numbers.")
-        return self._table(model).over(np.asarray(F_n), np.asarray(v_t))
+        table, loads, speeds = self._table(model), np.asarray(F_n), np.asarray(v_t)
+        mean, sd, _ = table.over(loads, speeds)
+        return TractionEstimates(mean, sd, ~table.covers_many(loads, speeds))
 
-    def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> float:
+    def prediction(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return the default model's answer as a model of the study gives it."""
+        return self._table("").over(F_n, v_t)
+
+    def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
         """Return the probability that less than `required` [N] of traction is there.
 
         What a walking controller asks before it puts its weight on: at a load F_n [N],
         is the traction that the step needs available? Velocities below the slowest one
-        that was measured count as that; whether the load lies
-        outside the table is marked by `predict(...).is_extrapolated`.
+        that was measured count as that. A load or velocity outside the table is marked
+        by `is_extrapolated` of the answer.
 
         Raises:
             SettingsError: a value is no finite number.
         """
         _check_finite(required=required, F_n=F_n, v_t=v_t)
-        mean, sd = self._table("").at(F_n, v_t)
-        return 0.5 * math.erfc((mean - required) / (math.sqrt(2.0) * max(sd, 1e-9)))
+        table = self._table("")
+        mean, sd = table.at(F_n, v_t)
+        risk = 0.5 * math.erfc((mean - required) / (math.sqrt(2.0) * max(sd, 1e-9)))
+        is_covered = table.covers(F_n, max(v_t, table.v_t[0]))
+        return SlipRisk(risk, is_extrapolated=not is_covered)
 
     def _table(self, model: str) -> Table:
         table = self.tables.get(model or self.default)
@@ -176,7 +169,10 @@ def load(path: Path | str) -> TerrainDatabase:
     """
     path = Path(path)
     try:
-        if path.stat().st_size > _LARGEST:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise ValueError("it is no regular file")
+        if status.st_size > _LARGEST:
             raise ValueError(f"it is larger than {_LARGEST / 1e6:.0f} MB")
         return _database(json.loads(path.read_bytes()))
     except OSError as error:
@@ -229,14 +225,21 @@ def _terrain(
     return KnownTerrain(
         name=name,
         kind=str(content["kind"]),
-        trials=int(content["trials"]),
-        samples=int(content["samples"]),
+        trials=_count(content["trials"]),
+        samples=_count(content["samples"]),
         rho=_share(content["rho"]),
         limits={int(k): float(v) for k, v in dict(content["limits"]).items()},
         tables=tables,
         parameters={str(key): model["parameters"] for key, model in models.items()},
         default=default,
     )
+
+
+def _count(value: Any) -> int:  # noqa: ANN401
+    number = int(value)
+    if not 0 <= number <= _MOST:
+        raise ValueError(f"trials or samples are not within 0..{_MOST}")
+    return number
 
 
 def _share(value: Any) -> float:  # noqa: ANN401

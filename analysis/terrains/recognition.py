@@ -59,7 +59,7 @@ def recognise(
     scores = score_trial(
         trial,
         {
-            name: Expert(terrain.predict_many, terrain.rho)
+            name: Expert(terrain.prediction, terrain.rho)
             for name, terrain in database.terrains.items()
         },
     )

@@ -4,6 +4,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.data import Array
 from analysis.study import Prediction
@@ -35,6 +36,11 @@ class Table:
         """Return whether a point lies between the ends of both axes."""
         is_load = self.F_n[0] <= F_n <= self.F_n[-1]
         return is_load and self.v_t[0] <= v_t <= self.v_t[-1]
+
+    def covers_many(self, F_n: Array, v_t: Array) -> NDArray[np.bool_]:
+        """Return the same of many points, shape (n,)."""
+        is_load = (self.F_n[0] <= F_n) & (F_n <= self.F_n[-1])
+        return is_load & (self.v_t[0] <= v_t) & (v_t <= self.v_t[-1])
 
     def over(self, F_n: Array, v_t: Array) -> Prediction:
         """Return mean and standard deviation [N] at many points, shape (n,)."""

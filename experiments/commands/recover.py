@@ -16,6 +16,7 @@ EXAMPLES = """\
 
 _PARTIAL = "*.mcap.partial"
 _NOTHING_SAVED = 6  # exit code
+_MOST_CYCLES = 10_000_000  # that a sidecar may state
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -102,6 +103,30 @@ def _tell(recovery: Recovery, console: Console) -> None:
     verb = "saved" if recovery.is_new else "was recovered before,"
     console.say(f"{GOOD} {source}: {verb} {held} -> {recovery.path.name}, read-only.")
     console.say(f"{WARNING} It {recovery.reason}. {lost_text(recovery)}")
+    if missing := missing_text(recovery):
+        console.say(f"{WARNING} {missing}")
+
+
+def missing_text(recovery: Recovery) -> str:
+    """Return what a file lacks of the recording in its sidecar; empty for nothing.
+
+    A copy that was cut off does not show by itself how much is missing.
+    """
+    from experiments.session import read_json
+
+    source, verified = recovery.source, recovery.verified
+    stem = source.name.removesuffix(".partial").removesuffix(".mcap")
+    sidecar = read_json(source.with_name(f"{stem}.json"))
+    cycles = sidecar.get("cycles")
+    if type(cycles) is not int or not verified.cycles < cycles <= _MOST_CYCLES:
+        return ""
+    missing = cycles - verified.cycles
+    from acquisition import RATE_HZ
+
+    return (
+        f"Its sidecar {stem}.json states {cycles} cycles: at least {missing} are "
+        f"missing, {missing / RATE_HZ:.2f} s."
+    )
 
 
 def lost_text(recovery: Recovery) -> str:

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--scheduler",
         metavar="ADDRESS",
-        help="fit on the Dask cluster there, e.g. tcp://192.168.1.5:8786",
+        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
     )
     parser.add_argument(
         "--what-if",

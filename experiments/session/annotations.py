@@ -16,7 +16,7 @@ from experiments.session.lock import session_lock
 from experiments.session.reducer import KEEP, refusal
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
-from experiments.session.trial_files import add_remark, find_sidecar
+from experiments.session.trial_files import add_remark, check_sidecar, find_sidecar
 from experiments.session.trial_name import TrialName
 
 LONGEST_TEXT = 2000  # characters
@@ -85,6 +85,7 @@ def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:
             journal.append(Event.NOTED, text=text, who=who)
             return f"Noted on {folder.id}."
         name = _find_attempt(journal, trial)
+        check_sidecar(folder, name)
         journal.append(
             Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
         )
@@ -104,6 +105,7 @@ def change_verdict(
     with session_lock(folder):
         journal = _journal(folder)
         name = _find_attempt(journal, trial)
+        check_sidecar(folder, name)
         fields: dict[str, object] = {
             "trial": name.number,
             "attempt": name.attempt,
@@ -193,7 +195,9 @@ def _check_file(journal: Journal, name: TrialName) -> list[str]:
         path = journal.folder.trials / f"{name.kept}.mcap"
     wanted = recorded_facts(journal.folder.events(), name).get("sha256")
     digest = sha256_of(path) if is_there(path) else ""
-    if not digest or {digest} != {sidecar.get("sha256"), wanted or digest}:
+    if not digest or any(
+        digest != s for s in (sidecar.get("sha256"), wanted or digest)
+    ):
         raise SessionError(
             f"{path.name} is missing or is not what was recorded.",
             hint="It cannot count. Nothing was changed.",

@@ -2,9 +2,11 @@
 
 from pathlib import Path
 
-from acquisition import TrialFileError
+from acquisition import SessionError, SystemClock, TrialFileError, remove_abandoned
 from acquisition.trial_file import (
+    ROOM,
     VerifiedFile,
+    is_claimed,
     is_there,
     recover_file,
     recovered_path,
@@ -23,6 +25,9 @@ from experiments.session.trial_files import (
 from experiments.session.trial_name import TrialName
 
 WHO = "traction"  # author of an automatic verdict
+PATIENCE_NS = 20_000_000_000  # to write and verify the longest trial takes a few s
+_PAUSE_NS = 20_000_000
+REPLACED = frozenset({".json", ".toml", ".patch", ".txt"})  # as a whole, atomically
 REASON = "the session ended without closing"
 
 
@@ -33,9 +38,11 @@ def recover_session(journal: Journal) -> str:
     that it is recorded again. A second call changes nothing.
 
     Raises:
+        SessionError: a recorder still ends the trial file of the session.
         TrialFileError: the disk is full or gone.
     """
     folder = journal.folder
+    _wait_for_recorder(folder)
     _sweep(folder)
     if journal.state.phase in OPEN:
         journal.append(Event.CRASH_FOUND)
@@ -55,6 +62,19 @@ def recover_session(journal: Journal) -> str:
         who=WHO,
     )
     return f"{name.kept} will be redone, its data are in rejected/{name.rejected}.*"
+
+
+def _wait_for_recorder(folder: SessionFolder) -> None:
+    """Wait until a recorder whose console was killed has ended its file."""
+    clock = SystemClock()
+    end_ns = clock.now_ns() + PATIENCE_NS
+    while is_claimed(folder.trials):
+        if clock.now_ns() >= end_ns:
+            raise SessionError(
+                f"The recorder still ends a trial file of {folder.id}.",
+                hint="Wait a minute and try again. Nothing was changed.",
+            )
+        clock.sleep_until(clock.now_ns() + _PAUSE_NS)
 
 
 def _gather(folder: SessionFolder, name: TrialName) -> None:
@@ -97,8 +117,10 @@ def _truth(partial: Path) -> Path:
 def _sweep(folder: SessionFolder) -> None:
     """Take away what a kill in the middle of a replacement has left."""
     for place in (folder.path, folder.trials, folder.rejected):
-        for path in place.glob("*.json.tmp"):
-            remove_file(path)
+        for path in place.glob("*.*.tmp"):
+            if path.with_suffix("").suffix in REPLACED:
+                remove_file(path)
+        remove_abandoned(ROOM, place)
     for path in folder.trials.glob("*.mcap.partial"):
         finished = path.with_suffix("")
         for other in (path, recovered_path(path)):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from acquisition import TrialFileError
-from acquisition.trial_file import open_data, open_folder, read_data
+from acquisition.trial_file import check_absent, open_data, open_folder, read_data
 
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 
@@ -21,11 +21,13 @@ def read_json(path: Path) -> dict[str, Any]:
     """Return a JSON object, an empty one where the file is missing or damaged.
 
     Raises:
-        TrialFileError: it is no regular file of this session, or too large.
+        TrialFileError: it is no regular file of this session, too large, or cannot be
+            read now.
     """
     try:
         return parse_object(read_data(path)) or {}
-    except OSError:
+    except OSError as error:
+        check_absent(path, error)
         return {}
 
 
@@ -130,10 +132,14 @@ def sha256_of(path: Path) -> str:
     """Return the hex digest of a file.
 
     Raises:
-        TrialFileError: it is no regular file of the session, or too large.
+        TrialFileError: it is no regular file of the session, too large, or cannot be
+            read.
     """
-    with os.fdopen(open_data(path), "rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    try:
+        with os.fdopen(open_data(path), "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
 
 
 def _is_same(target: Path, source: Path) -> bool:

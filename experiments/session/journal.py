@@ -6,7 +6,12 @@ from acquisition import Clock, SessionError
 from experiments.session.data_files import read_json, write_json
 from experiments.session.reducer import KEEP, SessionState, apply, refusal, replay
 from experiments.session.store import SessionFolder, iso_utc
-from experiments.session.trial_files import decision_of, find_sidecar, move_trial_files
+from experiments.session.trial_files import (
+    decision_of,
+    find_sidecar,
+    move_trial_files,
+    recorded_sum,
+)
 
 
 @dataclass(slots=True)
@@ -40,8 +45,7 @@ class Journal:
             raise SessionError(f"{self.folder.id}: {event} is refused, {reason}.")
         verdict = decision_of(entry)
         if verdict is not None and verdict.verdict == KEEP:
-            sidecar = find_sidecar(self.folder, verdict.name)
-            entry |= {key: sidecar[key] for key in ("sha256", "size") if key in sidecar}
+            entry |= recorded_sum(find_sidecar(self.folder, verdict.name))
         self.folder.append_event(entry)
         self.state = apply(self.state, entry)
         if verdict is not None:

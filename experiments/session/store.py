@@ -10,10 +10,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from acquisition import SessionError, SettingsError, SystemClock
+from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from acquisition.trial_file import (
+    check_absent,
     check_folders,
     is_there,
+    make_directories,
     open_data,
     read_data,
     sync_directory,
@@ -32,6 +34,7 @@ _FOLDER = re.compile(
     r"(?P<fake>\.fake)?$"
 )
 LONGEST_NAME = 64
+MOST_EVENTS = 50_000
 _TRIAL_FILE = re.compile(r"^T\d\d[a-z]*\.json$")
 
 
@@ -80,23 +83,29 @@ class SessionFolder:
             descriptor = open_data(path, os.O_RDWR | os.O_APPEND | os.O_CREAT)
             with os.fdopen(descriptor, "r+b") as file:
                 is_new = not file.seek(0, os.SEEK_END)
+                if is_new:  # a journal whose name is lost would take all with it
+                    sync_directory(self.path)
                 file.write(b"\n" + line if _is_torn(file) else line)
                 file.flush()
                 os.fsync(descriptor)
-            if is_new:
-                sync_directory(self.path)
 
     def journal_text(self) -> bytes:
         """Return the journal as it is on the disk, empty where there is none.
 
         Raises:
-            TrialFileError: it, or a folder of the session, is none of its own.
+            TrialFileError: it, or a folder of the session, is none of its own; or it is
+                too long.
         """
         check_folders(self.path)
+        path = self.path / JOURNAL_FILE
         try:
-            return read_data(self.path / JOURNAL_FILE)
-        except OSError:
+            text = read_data(path)
+        except OSError as error:
+            check_absent(path, error)
             return b""
+        if text.count(b"\n") > MOST_EVENTS:
+            raise TrialFileError(path, f"has more than {MOST_EVENTS} lines")
+        return text
 
     def events(self) -> list[dict[str, Any]]:
         """Return the journal; torn lines and those of a wrong checksum are left out.
@@ -183,7 +192,7 @@ def create_session(
     """
     sessions = data / "sessions"
     try:
-        sessions.mkdir(parents=True, exist_ok=True)
+        make_directories(sessions)
         with _locked(sessions / ".lock"):
             numbers = [int(s.id[1:]) for s in list_sessions(data)]
             number = max(numbers, default=0) + 1

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
+from acquisition import TrialFileError
 from acquisition.trial_file import is_there
 from experiments.session.data_files import move_file, read_json, remove_file, write_json
 from experiments.session.reducer import KEEP, REJECT
@@ -70,6 +71,31 @@ def find_sidecar(folder: SessionFolder, name: TrialName) -> dict[str, Any]:
     if kept and kept.get("attempt") == name.attempt:
         return kept
     return read_json(folder.rejected / f"{name.rejected}.json")
+
+
+def check_sidecar(folder: SessionFolder, name: TrialName) -> dict[str, Any]:
+    """Return the sidecar of an attempt that is about to be changed.
+
+    Raises:
+        TrialFileError: it is missing or damaged: what follows could not be finished.
+    """
+    sidecar = find_sidecar(folder, name)
+    if sidecar.get("attempt") == name.attempt:
+        return sidecar
+    path = folder.rejected / f"{name.rejected}.json"
+    if not is_there(path):
+        path = folder.trials / f"{name.kept}.json"
+    raise TrialFileError(
+        path,
+        "is damaged" if is_there(path) else "is missing",
+        hint="Copy it back from a backup. Nothing was changed.",
+    )
+
+
+def recorded_sum(sidecar: _Facts) -> dict[str, object]:
+    """Return checksum and size of the recording as a sidecar has them."""
+    kinds = {"sha256": str, "size": int}
+    return {key: sidecar[key] for key in kinds if type(sidecar.get(key)) is kinds[key]}
 
 
 def move_trial_files(folder: SessionFolder, decision: Verdict) -> None:

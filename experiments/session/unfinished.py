@@ -11,6 +11,7 @@ from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay
 from experiments.session.states import OPEN, RESUMABLE, SessionPhase
 from experiments.session.store import SessionFolder, list_sessions
+from experiments.session.trial_files import find_sidecar
 from experiments.session.trial_name import TrialName
 
 
@@ -21,8 +22,8 @@ class UnfinishedSession:
     Attributes:
         folder: the session on the disk.
         state: what its journal says; a crash is a phase of its own here.
-        seconds: sound recording in the `.partial` of the trial that has no verdict
-            [s], with what was recorded before the trigger; None without such a file.
+        seconds: sound recording in the file of a trial that was cut short [s], with
+            what was recorded before the trigger; None without such a file.
         last_utc: time of the last event, as the journal has it.
     """
 
@@ -85,16 +86,24 @@ def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
     state = replay(events)
     if state.phase not in OPEN | RESUMABLE or owner_of(folder) is not None:
         return None
-    partial = folder.trials / f"T{state.running or 0:02d}.mcap.partial"
     return UnfinishedSession(
-        folder, state, _seconds(partial), str(events[-1].get("utc") or "")
+        folder, state, _seconds(folder, state), str(events[-1].get("utc") or "")
     )
 
 
-def _seconds(partial: Path) -> float | None:
+def _seconds(folder: SessionFolder, state: SessionState) -> float | None:
+    """Return what there is of a trial that was cut short [s], None for nothing.
+
+    The recorder ends the file of a console that was killed: it has its final name
+    then, and no sidecar.
+    """
+    name = TrialName(state.running or 0, state.attempt(state.running or 0))
+    path = folder.trials / f"{name.kept}.mcap.partial"
     try:
-        if not is_there(partial):
+        if not is_there(path):
+            path = path.with_suffix("")
+        if not is_there(path) or find_sidecar(folder, name):
             return None
-        return recorded_seconds(read_file(partial))
+        return recorded_seconds(read_file(path))
     except TrialFileError:
         return None

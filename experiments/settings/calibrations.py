@@ -1,5 +1,6 @@
 """The settings with the calibrations that they name: sensor, feet, containers."""
 
+import stat
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -35,8 +36,9 @@ def read_calibration(path: Path, what: str, instead: str) -> str:
         SettingsError: it cannot be read.
     """
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("it is too large")
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
+            raise ValueError("it is too large, or no file")
         return path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "it is no calibration"

@@ -1,6 +1,5 @@
 """rig.toml and matrix.toml: read, checked, with an error that says what to write."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -10,7 +9,7 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from acquisition import SettingsError
+from acquisition import SettingsError, parse_toml
 from experiments.settings.matrix import MatrixSettings, TerrainRow
 from experiments.settings.rig import RigSettings
 from experiments.settings.sensor import build_device
@@ -134,8 +133,8 @@ def _read(path: Path) -> str:
 
 def _parse(model: type[_M], text: str, name: str) -> _M:
     try:
-        data = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        data = parse_toml(text)
+    except ValueError as error:
         raise SettingsError(f"{name}: {error}.", hint="Nothing was started.") from error
     try:
         return model.model_validate(data)
@@ -167,7 +166,7 @@ def explain(model: type[BaseModel], name: str, error: ValidationError) -> str:
         got = first.get("ctx", {}).get("tag")
         return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}.'
     got = first["input"]
-    shown = f'"{got}"' if isinstance(got, str) else repr(got)
+    shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
     expected = _expected(location.field, first["msg"])
     return f"{place} = {shown} - expected {expected}{location.example}."
 

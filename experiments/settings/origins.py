@@ -1,9 +1,9 @@
 """Every setting by its dotted name: its value, and where it comes from."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from acquisition import parse_toml
 from experiments.settings.load import Settings
 
 _SHIPPED = "shipped default"
@@ -38,7 +38,7 @@ def origin_lines(settings: Settings) -> list[str]:
         ("matrix.toml", settings.matrix, settings.matrix_text),
     )
     for file, model, text in files:
-        given = flatten(tomllib.loads(text))
+        given = flatten(parse_toml(text))
         origin = _origin(settings, file)
         for name, value in flatten(model.model_dump()).items():
             source = origin if name in given else f"default, not in {file}"

@@ -1,8 +1,6 @@
 """The simulated rig as a process of its own: bus on a socket, sensor on a terminal."""
 
-import os
 import select
-import shutil
 import signal
 import tempfile
 from pathlib import Path
@@ -17,6 +15,7 @@ from acquisition import (
     SimulationControl,
     SystemClock,
     TruthSource,
+    temporary_folder,
 )
 from acquisition.control_loop import RealtimeRequest, request
 from acquisition.ipc import (
@@ -171,8 +170,7 @@ def main(station: ChildContext) -> None:
     # When the console dies, the driver still has to brake the arm.
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
-    folder = Path(tempfile.mkdtemp(prefix=f"traction-{os.getpid()}-"))
-    try:
+    with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:
         settings, clock = station.settings, WorldClock(SystemClock())
         rig = FakeRig(
             scene_of(settings["scene"]),
@@ -183,5 +181,3 @@ def main(station: ChildContext) -> None:
         )
         simulation = LocalSimulation(rig, PACES[settings["pace"]])
         RigServer(simulation, clock, folder, station.channel).serve()
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)

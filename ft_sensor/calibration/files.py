@@ -1,13 +1,12 @@
 """Calibration and terrain as TOML: what a recording needs to be read years later."""
 
 import json
-import tomllib
 from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition import SettingsError, parse_toml
 from ft_sensor.payload import Payload, TerrainFrame
 from wam.model import Array
 
@@ -97,8 +96,8 @@ def terrain_metadata(text: str) -> dict[str, str]:
 
 def _parse(text: str, name: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        return parse_toml(text)
+    except ValueError as error:
         raise SettingsError(f"{name}: {error}.") from error
 
 
@@ -109,7 +108,7 @@ def _number(value: object) -> float:
 def _array(value: object, shape: tuple[int, ...]) -> Array:
     array = np.array(value, dtype=float)
     if array.shape != shape or not bool(np.isfinite(array).all()):
-        raise ValueError(f"expected {shape} finite numbers, got {value!r}")
+        raise ValueError(f"expected {shape} finite numbers, got {value!r:.80}")
     return array
 
 

@@ -1,11 +1,10 @@
 """A calibration of the wrist sensor as TOML: payload, mounting, bias, what was read."""
 
-import tomllib
 from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition import SettingsError, parse_toml
 from ft_sensor.calibration.fit import Floats, SensorFit
 from wam.model import Array
 
@@ -75,7 +74,7 @@ def sensor_from_toml(text: str, name: str) -> SensorCalibration:
         SettingsError: the text is no calibration of a wrist sensor.
     """
     try:
-        table = tomllib.loads(text)
+        table = parse_toml(text)
         if not isinstance(table["is_simulated"], bool):
             raise TypeError("is_simulated is neither true nor false")
         count = len(table["rotations"])

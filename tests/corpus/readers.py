@@ -4,10 +4,13 @@ It puts the bytes where they belong in the empty folder and reads them as the pr
 does. It returns or raises a `TractionError`; anything else is a failure.
 """
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.clock import SystemClock
+from acquisition.errors import TrialFileError
+from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
@@ -23,6 +26,7 @@ from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import bota, optoforce, robotous
+from tests.corpus.used_session import use
 from wam.bus.decoder import BusReader
 from wam.bus.frames import (
     FrameError,
@@ -38,6 +42,7 @@ from wam.bus.frames import (
 )
 from wam.bus.log import parse_log
 from wam.calibration.gravity_file import gravity_from_toml
+from wam.model.constants import load_constants
 
 SESSION = "2027-01-15_S001_TF.fake"
 _DECODERS = (
@@ -148,6 +153,22 @@ def _sensor(data: bytes, _: Path) -> None:
     optoforce.find_serial_number(data)
 
 
+def _trial(data: bytes, folder: Path) -> None:
+    """Read, verify and recover `data` as a trial file."""
+    path = folder / "T01.mcap"
+    path.write_bytes(data)
+    for look in (TrialReader.cycles, TrialReader.topic_counts):
+        with contextlib.suppress(TrialFileError):
+            look(TrialReader(path))
+    recovery = recover_file(path)
+    TrialReader(recovery.path).cycles()
+
+
+def _used(name: str) -> Callable[[bytes, Path], None]:
+    """Return a reader that puts its bytes into a whole session and works on that."""
+    return lambda data, folder: use(name, data, folder)
+
+
 READERS: dict[str, Callable[[bytes, Path], None]] = {
     "journal": lambda data, folder: _session(folder, "events.jsonl", data),
     "session": lambda data, folder: _session(folder, "session.json", data),
@@ -168,6 +189,14 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "bus-log": _bus_log,
     "frames": _frames,
     "sensor": _sensor,
+    "mcap": _trial,
+    "arm-model": _text(load_constants),
+    "lock": lambda data, folder: _session(folder, ".lock", data),
+    "used-sidecar": _used("trials/T01.json"),
+    "used-rejected": _used("rejected/T01a.json"),
+    "used-session": _used("/session.json"),
+    "used-journal": _used("/events.jsonl"),
+    "used-mcap": _used("trials/T01.mcap"),
 }
 RUNNING = b"""\
 {"event": "session-started", "terrain": "TF", "trials": 2}

@@ -14,6 +14,7 @@ from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
 from tests.corpus.readers import RUNNING
+from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
 from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
 from wam.model.constants import Body
@@ -117,6 +118,7 @@ def samples() -> dict[str, bytes]:
     frame = TerrainFrame(0.1, 0.2, (0.7, 0.1, 0.12), 0.45)
     texts = {
         "rig": (shipped / "rig.toml").read_text(),
+        "arm-model": (resources.files("wam.data") / "wam7.toml").read_text(),
         "matrix": (shipped / "matrix.toml").read_text(),
         "gravity": _gravity(),
         "foot": payload_to_toml(payload, _TOOL.sole),
@@ -129,7 +131,14 @@ def samples() -> dict[str, bytes]:
     }
     return {name: text.encode() for name, text in texts.items()} | {
         "journal": _JOURNAL,
-        "partial": bytes(64),
+        "partial": session_file("trials/T01.mcap")[:-700],
+        "mcap": session_file("trials/T01.mcap"),
+        "lock": b'{"pid": 4711, "since": "2027-01-15T08:00:00Z"}',
+        "used-sidecar": session_file("trials/T01.json"),
+        "used-rejected": session_file("rejected/T01a.json"),
+        "used-session": session_file("/session.json"),
+        "used-journal": session_file("/events.jsonl"),
+        "used-mcap": session_file("trials/T01.mcap"),
         "npz": _npz(),
         "script": _SCRIPT,
         "bus-log": _LOG,

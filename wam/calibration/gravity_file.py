@@ -1,12 +1,11 @@
 """A gravity calibration as TOML: first moments, how well they fit, what was fitted."""
 
-import tomllib
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition import SettingsError, parse_toml
 from wam.model import Array, Body, Tool, tool_metadata, tool_of
 
 _SAME = 1e-9  # kg and m: the tool of a calibration and of a session
@@ -77,7 +76,7 @@ def gravity_from_toml(text: str, name: str) -> GravityCalibration:
         SettingsError: the text is no gravity calibration.
     """
     try:
-        table = tomllib.loads(text)
+        table = parse_toml(text)
         if not isinstance(table["is_simulated"], bool):
             raise TypeError("is_simulated is neither true nor false")
         poses = _numbers(table["poses"], (len(table["poses"]), 7))

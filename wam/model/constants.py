@@ -1,6 +1,5 @@
 """The arm's constants, read from TOML and checked."""
 
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from typing import Self
@@ -14,7 +13,7 @@ from pydantic import (
     model_validator,
 )
 
-from acquisition import SettingsError, SettingsSection
+from acquisition import SettingsError, SettingsSection, parse_toml
 
 GRAVITY = 9.81  # m/s^2
 Array = NDArray[np.float64]
@@ -199,8 +198,8 @@ def load_constants(text: str | None = None) -> ArmConstants:
     if text is None:
         text = (resources.files("wam.data") / "wam7.toml").read_text()
     try:
-        file = ConstantsFile.model_validate(tomllib.loads(text))
-    except (tomllib.TOMLDecodeError, ValidationError, RecursionError) as error:
+        file = ConstantsFile.model_validate(parse_toml(text))
+    except ValueError as error:
         raise SettingsError(
             f"The arm model cannot be read: {_reason(error)}.",
             hint="Use the model shipped with Traction as a pattern.",

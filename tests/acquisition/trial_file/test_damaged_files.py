@@ -104,7 +104,7 @@ def test_another_ros_recording_is_no_trial(put):
 
 
 def test_a_file_without_checksums_is_refused(put):
-    with pytest.raises(TrialFileError, match="data whose checksum"):
+    with pytest.raises(TrialFileError, match="data without a checksum"):
         TrialReader(put(foreign("ros2", data_crcs=False)))
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.study.fits import to_fits
-from analysis.study.jobs import Workers, run_tasks
+from analysis.study.jobs import Workers, is_guarded, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -73,6 +73,30 @@ def test_a_killed_worker_changes_nothing(cluster, slice_trials):
     assert killed.is_set()
     remote["options"] = local["options"] = None
     assert remote == local
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "tcp://192.168.1.5:8786",
+        "192.168.1.5:8786",
+        "tcp://localhost.evil.example:8786",
+        "ws://127.0.0.1:8786",
+        "tcp://[fe80::1]:8786",
+        "tcp://",
+    ],
+)
+def test_a_scheduler_elsewhere_is_refused_without_tls(address):
+    with pytest.raises(SettingsError, match="TLS"):
+        run_tasks(abs, [1, 2], Workers(scheduler=address))
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["tcp://127.0.0.1:8786", "localhost:8786", "tcp://[::1]:8786", "tls://lab:8786"],
+)
+def test_a_scheduler_on_this_machine_or_by_tls_is_accepted(address):
+    assert is_guarded(address)
 
 
 @pytest.mark.long

@@ -28,3 +28,28 @@ def test_a_value_that_is_no_finite_number_is_refused(point):
 )
 def test_an_estimate_says_whether_it_lies_outside_the_table(point, is_outside):
     assert TERRAIN.predict(*point).is_extrapolated is is_outside
+
+
+POINTS = np.array([(2.0, 0.1), (5.0, 0.2), (6.0, 0.1), (0.5, 0.1), (2.0, 0.3)])
+
+
+def test_many_estimates_say_which_of_them_lie_outside_the_table():
+    many = TERRAIN.predict_many(*POINTS.T)
+    single = [TERRAIN.predict(*point).is_extrapolated for point in POINTS.tolist()]
+    assert many.is_extrapolated.tolist() == single == [False, False, True, True, True]
+
+
+@pytest.mark.parametrize(
+    ("point", "is_outside"),
+    [
+        ((2.0, 0.1), False),
+        ((2.0,), False),  # at rest counts as the slowest velocity
+        ((6.0, 0.1), True),
+        ((0.5,), True),
+        ((2.0, 0.3), True),
+    ],
+)
+def test_a_risk_says_whether_it_lies_outside_the_table(point, is_outside):
+    risk = TERRAIN.slip_risk(1.0, *point)
+    assert risk.is_extrapolated is is_outside
+    assert 0.0 <= risk <= 1.0

@@ -2,7 +2,7 @@ import pytest
 
 from acquisition.recording.recorder import seal
 from acquisition.trial_file.reader import TrialReader
-from tests.acquisition.trials import make_cycles, write_trial
+from tests.acquisition.trials import make_cycles, summary_start, write_trial
 from tests.experiments.program import traction
 
 
@@ -96,3 +96,38 @@ def test_a_folder_without_partial_files_has_nothing_to_recover(tmp_path):
     done = traction("recover", tmp_path)
     assert done.code == 0
     assert "nothing to recover" in done.out
+
+
+def test_a_half_copied_trial_lacks_what_its_sidecar_states(tmp_path):
+    path = tmp_path / "T01.mcap"
+    seal(write_trial(path, make_cycles(300), block=50), "travel")
+    path.with_suffix(".json").write_text('{"trial": "T01", "cycles": 300}')
+    data = path.read_bytes()
+    path.chmod(0o644)
+    path.write_bytes(data[: len(data) // 2])
+    done = traction("recover", path)
+    cycles = TrialReader(tmp_path / "T01.recovered.mcap").cycles().data.size
+    assert f"states 300 cycles: at least {300 - cycles} are missing" in done.out
+
+
+@pytest.mark.parametrize("stated", ['"300"', "1e400", "true", "-1", "9" * 50])
+def test_a_sidecar_that_states_nonsense_says_nothing_of_a_loss(folder, stated):
+    sidecar = folder / "trials" / "T07.json"
+    sidecar.write_text(f'{{"cycles": {stated}}}')
+    done = traction("recover", folder / "trials" / "T07.mcap.partial")
+    assert done.code == 0
+    assert "are missing" not in done.out
+
+
+def test_a_trial_of_a_program_without_checksums_is_copied_with_them(folder):
+    source = folder / "trials" / "T06.mcap"
+    data = bytearray(source.read_bytes())
+    start = summary_start(data)
+    data[start - 4 : start] = bytes(4)  # no checksum of the data
+    other = folder / "trials" / "T09.mcap"
+    other.write_bytes(data)
+    done = traction("recover", other)
+    assert done.code == 0
+    assert "It has data without a checksum" in done.out
+    copied = TrialReader(folder / "trials" / "T09.recovered.mcap").cycles()
+    assert copied.data.tobytes() == TrialReader(source).cycles().data.tobytes()

@@ -1,0 +1,77 @@
+"""Temporary folders that a kill does not leave behind for good.
+
+A folder carries the number of its process in its name and is locked while it is used.
+Whoever makes the next one removes those of the same user whose process is gone.
+"""
+
+import fcntl
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_PID = re.compile(r"-(?P<pid>[1-9]\d{0,9})-\w+$")
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC
+
+
+@contextmanager
+def temporary_folder(prefix: str, parent: Path) -> Generator[Path]:
+    """Give a new folder PREFIX-PID-... in `parent`; at the end it is removed.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    remove_abandoned(prefix, parent)
+    path = Path(tempfile.mkdtemp(prefix=f"{prefix}-{os.getpid()}-", dir=parent))
+    descriptor = os.open(path, _FOLDER)
+    try:
+        with suppress(OSError):  # a file system without locks: the number counts alone
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield path
+    finally:
+        os.close(descriptor)
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def remove_abandoned(prefix: str, parent: Path) -> None:
+    """Remove the folders PREFIX-PID-... in `parent` that a killed process left.
+
+    Folders of other users, and of processes that run, stay; so does what is no folder.
+    """
+    with suppress(OSError):
+        for path in parent.glob(f"{prefix}-*-*"):
+            match = _PID.match(path.name.removeprefix(prefix))
+            if match and not _is_running(int(match["pid"])):
+                _remove(path)
+
+
+def _is_running(pid: int) -> bool:
+    """Return whether another process has this number; this one knows its own."""
+    if pid == os.getpid():
+        return False
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
+
+
+def _remove(path: Path) -> None:
+    """Remove a folder of this user that nobody has locked."""
+    try:
+        descriptor = os.open(path, _FOLDER)
+    except OSError:
+        return
+    try:
+        if os.fstat(descriptor).st_uid == os.getuid():
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(path, ignore_errors=True)
+    except OSError:
+        return  # in use, e.g. by a process of another container
+    finally:
+        os.close(descriptor)

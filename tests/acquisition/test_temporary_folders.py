@@ -1,0 +1,91 @@
+"""Temporary folders of killed processes are removed, those of living ones stay."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from acquisition.temporary_folders import remove_abandoned, temporary_folder
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from acquisition.temporary_folders import temporary_folder
+with temporary_folder("room", Path(sys.argv[1])) as folder:
+    (folder / "file").write_text("x")
+    print(folder, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """Give a process that holds a folder, and the folder's path."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    path = tmp_path / process.stdout.readline().strip()
+    yield process, path
+    process.kill()
+    process.communicate()
+
+
+def test_a_folder_is_gone_after_its_use(tmp_path):
+    with temporary_folder("room", tmp_path) as folder:
+        (folder / "file").write_text("x")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_of_a_living_process_stays(holder, tmp_path):
+    _, path = holder
+    remove_abandoned("room", tmp_path)
+    assert (path / "file").read_text() == "x"
+
+
+def test_a_folder_of_a_killed_process_goes_with_the_next_one(holder, tmp_path):
+    process, path = holder
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert path.exists()
+    with temporary_folder("room", tmp_path):
+        assert not path.exists()
+
+
+def test_a_locked_folder_stays_though_its_number_is_unknown_here(tmp_path):
+    path = tmp_path / f"room-{_dead_pid()}-abc"
+    path.mkdir()
+    descriptor = os.open(path, os.O_RDONLY)
+    fcntl.flock(descriptor, fcntl.LOCK_EX)
+    remove_abandoned("room", tmp_path)
+    assert path.exists()
+    os.close(descriptor)
+    remove_abandoned("room", tmp_path)
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("name", ["room-x-abc", "room-1", "other-{pid}-abc"])
+def test_other_names_stay(tmp_path, name):
+    path = tmp_path / name.format(pid=_dead_pid())
+    path.mkdir()
+    remove_abandoned("room", tmp_path)
+    assert path.exists()
+
+
+def test_a_link_is_not_followed(tmp_path):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (tmp_path / f"room-{_dead_pid()}-abc").symlink_to(outside)
+    remove_abandoned("room", tmp_path)
+    assert outside.exists()
+
+
+def _dead_pid():
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    return process.pid

@@ -1,0 +1,173 @@
+"""Files of sizes that nothing legitimate has: refused in little memory, whole program.
+
+Sparse files cost no disk; what a command takes is read from the kernel.
+"""
+
+import os
+import subprocess
+import sys
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.corpus.used_session import session_files
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
+ROOT = Path(__file__).parents[2]
+MEMORY = 300 * 2**20
+START = "import sys; from experiments.cli import main; sys.exit(main())"
+SESSION_FILES = ("T01.json", "session.json", "events.jsonl", "trials/T01.mcap", ".lock")
+COMMANDS = (
+    ("status",),
+    ("verify", "--all"),
+    ("note", "S001", "T01", "seen"),
+    ("verdict", "S001", "T01", "reject", "why"),
+    ("report", "S001"),
+)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended, and what it took [bytes]."""
+
+    code: int
+    text: str
+    memory: int
+
+
+def run(*arguments, cwd):
+    """Run `traction` in a process of its own."""
+    log = cwd / "out.txt"
+    with log.open("w") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-c", START, *map(str, arguments)],
+            cwd=cwd,
+            stdout=out,
+            stderr=out,
+            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+        )
+        _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    return Ended(process.returncode, log.read_text(), usage.ru_maxrss * 1024)
+
+
+def sparse(path, size):
+    """Let `path` be as long as `size`, mostly a hole."""
+    with path.open("ab") as file:
+        file.truncate(size)
+
+
+@pytest.fixture
+def data(tmp_path):
+    for path, content in session_files().items():
+        place = tmp_path / "data" / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(content)
+    return tmp_path / "data"
+
+
+@pytest.mark.parametrize("name", SESSION_FILES)
+def test_three_gigabytes_in_a_session_are_not_read(data, name):
+    path = next(p for p in data.rglob("*") if str(p).endswith(name))
+    sparse(path, 3 * 2**30)
+    for command in COMMANDS:
+        ended = run(*command, "--data", data, cwd=data.parent)
+        assert ended.code in {0, 2, 6}, ended.text
+        assert ended.memory < MEMORY, (command, ended)
+
+
+def test_three_gigabytes_of_a_partial_file_are_not_recovered(data):
+    path = next(data.rglob("trials")) / "T03.mcap.partial"
+    path.touch()
+    sparse(path, 3 * 2**30)
+    ended = run("recover", path, cwd=data.parent)
+    assert ended.code == 6
+    assert "the limit is 67108864" in ended.text
+    assert ended.memory < MEMORY
+
+
+def write_bomb(path):
+    """Write 1.8 GB of zeros into an npz of 8 MB at most."""
+    zeros = bytes(60_000_000)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for number in range(30):
+            archive.writestr(f"TF/{number:02d}.npy", zeros)
+
+
+def lines(text, size):
+    return text * (size // len(text))
+
+
+HEADER = b"t,v_t,F_n,F_t\n"
+TABLES = {
+    "320-mb.csv": lambda path: sparse(path, 320_000_000),
+    "one-line.csv": lambda path: path.write_bytes(HEADER + lines(b"1,", 23_000_000)),
+    "one-header.csv": lambda path: path.write_bytes(lines(b"t,", 23_000_000)),
+    "bomb.npz": write_bomb,
+}
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_table_beyond_its_limits_is_refused(tmp_path, name):
+    TABLES[name](tmp_path / name)
+    ended = run("fit", tmp_path / name, "--out", tmp_path / "out", cwd=tmp_path)
+    assert ended.code == 2, ended.text
+    assert ended.memory < MEMORY, ended
+
+
+def test_the_largest_table_is_read_in_little_memory(tmp_path):
+    path = tmp_path / "large.csv"
+    count = 950_000
+    rows = (b"%d.25,0.125,2.5,1.5\n" % number for number in range(count))
+    path.write_bytes(HEADER + b"".join(rows))
+    assert 22_000_000 < path.stat().st_size < 24_000_000
+    code = (
+        "import sys; from pathlib import Path; from analysis.data import load_tables; "
+        "(trials,) = load_tables([Path(sys.argv[1])]).values(); print(len(trials[0].t))"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(path)], cwd=ROOT, stdout=subprocess.PIPE
+    )
+    read = int(process.stdout.read())
+    process.stdout.close()
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    assert read == count
+    assert usage.ru_maxrss * 1024 < MEMORY
+
+
+DATABASES = {
+    "sparse": lambda path: sparse(path, 3 * 2**30),
+    "lists": lambda path: path.write_bytes(
+        b"[" + lines(b"[],", 5_900_000).rstrip(b",") + b"]"
+    ),
+}
+
+
+@pytest.mark.parametrize("name", DATABASES)
+def test_a_database_beyond_its_limits_is_refused(tmp_path, name):
+    table = tmp_path / "table.csv"
+    table.write_bytes(HEADER + b"0,0.1,2,1\n" * 200)
+    DATABASES[name](tmp_path / "terrains.json")
+    database = ("--models", tmp_path / "terrains.json")
+    ended = run("identify", table, *database, cwd=tmp_path)
+    assert ended.code == 2, ended.text
+    assert ended.memory < MEMORY, ended
+
+
+def test_a_journal_of_more_events_than_a_session_has_is_refused(data):
+    path = next(data.rglob("events.jsonl"))
+    path.write_bytes(b"{}\n" * (4 * 2**20 // 3))
+    ended = run("verify", "--all", "--data", data, cwd=data.parent)
+    assert ended.code == 6
+    assert "more than 50000 lines" in ended.text
+    assert ended.memory < MEMORY
+
+
+def test_settings_of_three_gigabytes_are_not_read(tmp_path):
+    sparse(tmp_path / "rig.toml", 3 * 2**30)
+    ended = run("status", "--config", tmp_path / "rig.toml", cwd=tmp_path)
+    assert ended.code == 2
+    assert ended.memory < MEMORY

@@ -1,0 +1,117 @@
+"""A session of two kept trials and a rejected one, used while one file is hostile."""
+
+import contextlib
+import hashlib
+import io
+import tempfile
+from functools import cache
+from pathlib import Path
+
+from acquisition.clock import SystemClock
+from acquisition.trial_file import publish
+from acquisition.trial_file.verify import verify_file
+from experiments.cli import main
+from experiments.session.data_files import write_json
+from experiments.session.journal import Journal
+from experiments.session.sidecar import TrialOutcome, sidecar_of
+from experiments.session.states import Event
+from experiments.session.store import create_session
+from experiments.session.trial_name import TrialName
+from tests.acquisition.trials import make_cycles, write_trial
+
+SOUND_CODES = {0, 2, 5, 6}
+CYCLES = 60
+COMMANDS = (
+    ("status", "--data", "."),
+    ("verify", "--all", "--data", "."),
+    ("note", "S001", "T01", "seen", "--data", "."),
+    ("verdict", "S001", "T01", "reject", "why", "--data", "."),
+    ("verdict", "S001", "T01b", "keep", "why", "--data", "."),
+)
+
+
+class HalfDoneError(Exception):
+    """A command has left files that do not belong together, or has ended as a bug."""
+
+
+@cache
+def session_files() -> dict[str, bytes]:
+    """Return the files of the data folder of the session, by their path below it."""
+    with tempfile.TemporaryDirectory(prefix="corpus-") as place:
+        data = Path(place)
+        folder = create_session(data, "TF", is_simulated=True, utc_ns=1_800 * 10**15)
+        journal = Journal(folder, SystemClock())
+        journal.append(Event.STARTED, terrain="TF", trials=2)
+        journal.append(Event.ACTIVATED)
+        for number, attempt, verdict in (
+            (1, 1, Event.TRIAL_REJECTED),
+            (1, 2, Event.TRIAL_KEPT),
+            (2, 1, Event.TRIAL_KEPT),
+        ):
+            _record(journal, TrialName(number, attempt), verdict)
+        journal.append(Event.ENDED, reason="complete")
+        files = (path for path in data.rglob("*") if path.is_file())
+        return {str(path.relative_to(data)): path.read_bytes() for path in files}
+
+
+def session_file(name: str) -> bytes:
+    """Return the file of the session whose path ends in `name`."""
+    (content,) = (c for path, c in session_files().items() if path.endswith(name))
+    return content
+
+
+def _record(journal: Journal, name: TrialName, verdict: Event) -> None:
+    fields = {"trial": name.number, "attempt": name.attempt}
+    journal.append(Event.TRIAL_STARTED, **fields)
+    path = journal.folder.trials / f"{name.kept}.mcap"
+    cycles = make_cycles(CYCLES, seed=10 * name.number + name.attempt)
+    writer = write_trial(path, cycles, block=CYCLES // 2)
+    writer.finish("travel")
+    publish(writer)
+    sidecar = sidecar_of(name, verify_file(path), TrialOutcome("travel"))
+    write_json(path.with_suffix(".json"), sidecar)
+    journal.append(Event.TRIAL_RECORDED, **fields)
+    journal.append(verdict, **fields, reason="", who="mk")
+
+
+def use(name: str, data: bytes, folder: Path) -> None:
+    """Run commands on the session, with `data` in place of its file `name`.
+
+    Raises:
+        HalfDoneError: one ended as a bug, or data and sidecar of a trial are apart.
+    """
+    for path, content in session_files().items():
+        place = folder / path
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_bytes(data if path.endswith(name) else content)
+    before = _sums(folder)
+    for command in COMMANDS:
+        _run(command)
+        if not name.endswith(".mcap") and _sums(folder) != before:
+            raise HalfDoneError(f"{command[0]} lost or doubled a recording")
+        if name.endswith(".json"):
+            _check_pairs(folder, command[0])
+
+
+def _run(command: tuple[str, ...]) -> None:
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+        code = main(command)
+    if code not in SOUND_CODES:
+        raise HalfDoneError(f"{command} ended with {code}: {out.getvalue()}")
+
+
+def _sums(folder: Path) -> list[str]:
+    """Return the checksums of all trial files."""
+    paths = folder.rglob("*.mcap")
+    return sorted(hashlib.sha256(path.read_bytes()).hexdigest() for path in paths)
+
+
+def _check_pairs(folder: Path, command: str) -> None:
+    """Require a sidecar beside every recording, and none without one."""
+    for place in ("trials", "rejected"):
+        files = list(folder.glob(f"sessions/*/{place}/T*"))
+        recordings = {path.stem for path in files if path.suffix == ".mcap"}
+        sidecars = {path.stem for path in files if path.suffix == ".json"}
+        if recordings != sidecars:
+            raise HalfDoneError(f"{command} left {recordings} and {sidecars} apart")

@@ -1,0 +1,27 @@
+"""Break disks: `python -m tests.crash power-cuts|io-errors [COUNT] [SEED]`."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.crash.io_errors import fail
+from tests.crash.power_cuts import record_session, survive
+
+
+def main(what: str, count: int, seed: int) -> int:
+    """Return how many things went wrong."""
+    with tempfile.TemporaryDirectory(prefix="crash-") as place:
+        folder = Path(place)
+        if what == "io-errors":
+            wrong = fail(folder, count, seed)
+        else:
+            wrong = survive(record_session(folder), folder, count, seed)
+        for text in wrong:
+            print(text)  # noqa: T201
+        print(f"{count} {what}, {len(wrong)} problems")  # noqa: T201
+    return len(wrong)
+
+
+if __name__ == "__main__":
+    asked = [int(word) for word in sys.argv[2:]]
+    sys.exit(main(sys.argv[1], *(asked + [1000, 1][len(asked) :])) > 0)

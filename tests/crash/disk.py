@@ -1,0 +1,180 @@
+"""The disks that a power cut may leave behind a list of operations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tests.crash.syscalls import (
+    Link,
+    MakeFolder,
+    Operation,
+    RemoveFolder,
+    Replace,
+    SyncFile,
+    SyncFolder,
+    Truncate,
+    Unlink,
+    Write,
+)
+
+FOLDER = 0  # in place of the number of a file
+HOW = ("none", "all", "first", "torn", "some", "zeros")
+
+
+@dataclass
+class Disk:
+    """Names and contents that are on the disk after a power cut.
+
+    Attributes:
+        names: number of the file at each path, `FOLDER` for a folder.
+        contents: bytes by number of the file.
+    """
+
+    names: dict[Path, int] = field(default_factory=dict)
+    contents: dict[int, bytes] = field(default_factory=dict)
+
+    def files(self) -> dict[Path, bytes]:
+        """Return the content at every path that can be reached from the root."""
+        return {
+            path: self.contents.get(number, b"")
+            for path, number in self.names.items()
+            if number != FOLDER and self._is_reached(path)
+        }
+
+    def folders(self) -> list[Path]:
+        """Return the folders that can be reached from the root, outer ones first."""
+        names = [path for path, number in self.names.items() if number == FOLDER]
+        return sorted(path for path in names if self._is_reached(path))
+
+    def write(self, folder: Path) -> None:
+        """Make the files in the empty folder `folder`."""
+        folder.mkdir()
+        for path in self.folders():
+            (folder / path).mkdir()
+        first: dict[int, Path] = {}
+        for path, content in self.files().items():
+            number = self.names[path]
+            if number in first:
+                (folder / path).hardlink_to(first[number])
+                continue
+            first[number] = folder / path
+            first[number].write_bytes(content)
+
+    def _is_reached(self, path: Path) -> bool:
+        outer = list(path.parents)[:-1]
+        return all(self.names.get(folder) == FOLDER for folder in outer)
+
+
+def everything(operations: Sequence[Operation]) -> Disk:
+    """Return the disk after all operations and no power cut."""
+    return _disk(list(operations))
+
+
+def after_power_cut(operations: Sequence[Operation], rng: np.random.Generator) -> Disk:
+    """Return one disk that a power cut right after `operations` may leave.
+
+    What was forced to the disk is there. Of the rest, each file and each folder has
+    nothing, everything, a first part, a torn last part, any part, or zeros.
+    """
+    forced = _forced(operations)
+    kept = []
+    for members in _by_object(operations).values():
+        early = [i for i in members if i in forced]
+        late = [i for i in members if i not in forced]
+        kept += [(i, operations[i]) for i in early]
+        kept += _part(late, operations, rng)
+    return _disk([operation for _, operation in sorted(kept, key=lambda pair: pair[0])])
+
+
+def _object_of(operation: Operation) -> int | Path:
+    """Return the file or folder whose content an operation changes."""
+    match operation:
+        case Write() | Truncate() | SyncFile():
+            return operation.file
+        case Replace():
+            return operation.target.parent
+        case SyncFolder():
+            return operation.path
+        case _:
+            return operation.path.parent
+
+
+def _by_object(operations: Sequence[Operation]) -> dict[int | Path, list[int]]:
+    members: dict[int | Path, list[int]] = {}
+    for i, operation in enumerate(operations):
+        if not isinstance(operation, SyncFile | SyncFolder):
+            members.setdefault(_object_of(operation), []).append(i)
+    return members
+
+
+def _forced(operations: Sequence[Operation]) -> set[int]:
+    """Return the indices of all operations that a later one forced to the disk."""
+    forced: set[int] = set()
+    waiting: dict[int | Path, list[int]] = {}
+    for i, operation in enumerate(operations):
+        if isinstance(operation, SyncFile | SyncFolder):
+            forced.update(waiting.pop(_object_of(operation), []))
+        else:
+            waiting.setdefault(_object_of(operation), []).append(i)
+    return forced
+
+
+def _part(
+    late: list[int], operations: Sequence[Operation], rng: np.random.Generator
+) -> list[tuple[int, Operation]]:
+    """Return what has reached the disk of operations that nothing forced there."""
+    how = HOW[rng.integers(len(HOW))]
+    if how == "none" or not late:
+        return []
+    if how in {"first", "torn"}:
+        late = late[: int(rng.integers(len(late) + 1))]
+    elif how == "some":
+        late = [i for i in late if rng.random() < 0.5]
+    part = [(i, operations[i]) for i in late]
+    if how == "torn" and part:
+        part[-1] = (part[-1][0], _torn(part[-1][1], rng))
+    if how == "zeros":
+        part = [(i, _zeroed(operation)) for i, operation in part]
+    return part
+
+
+def _torn(operation: Operation, rng: np.random.Generator) -> Operation:
+    if not isinstance(operation, Write):
+        return operation
+    size = int(rng.integers(len(operation.data) + 1))
+    return Write(operation.file, operation.offset, operation.data[:size])
+
+
+def _zeroed(operation: Operation) -> Operation:
+    if not isinstance(operation, Write):
+        return operation
+    return Write(operation.file, operation.offset, bytes(len(operation.data)))
+
+
+def _disk(operations: list[Operation]) -> Disk:
+    disk = Disk()
+    contents: dict[int, bytearray] = {}
+    for operation in operations:
+        match operation:
+            case Write(file, offset, data):
+                content = contents.setdefault(file, bytearray())
+                content.extend(bytes(max(0, offset - len(content))))
+                content[offset : offset + len(data)] = data
+            case Truncate(file, size):
+                content = contents.setdefault(file, bytearray())
+                content[size:] = bytes(max(0, size - len(content)))
+            case MakeFolder(path):
+                disk.names[path] = FOLDER
+            case RemoveFolder(path) | Unlink(path):
+                disk.names.pop(path, None)
+            case Link(path, file):
+                disk.names[path] = file
+            case Replace(source, target, file):
+                disk.names.pop(source, None)
+                disk.names[target] = file
+            case _:
+                pass
+    disk.contents = {number: bytes(content) for number, content in contents.items()}
+    return disk

@@ -1,0 +1,79 @@
+"""A session whose every change of the disk is known, and power cuts anywhere in it."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+
+from experiments.operator.prompts import Prompt
+from tests.crash.disk import after_power_cut
+from tests.crash.inspection import (
+    acknowledged,
+    problems,
+    put_in_order,
+    recordings,
+)
+from tests.crash.syscalls import Recording, recorded
+from tests.experiments.program import run_watched, traction, write_config
+from tests.experiments.run.test_resume import short
+
+AUTO = ("--operator-script", "auto")
+
+
+def record_session(folder: Path) -> Recording:
+    """Return the operations of a session with a rejected trial and changed verdicts.
+
+    T01 is rejected, T01 and T02 are kept; later T01b is rejected and kept again and
+    T02 is repeated.
+
+    Args:
+        folder: for the data and the configuration.
+    """
+    config = write_config(folder)
+    data = folder / "recorded" / "data"
+    data.parent.mkdir()
+
+    def press(asked, _):
+        is_bad = asked.prompt is Prompt.REVIEW and (asked.trial, asked.attempt) == (
+            1,
+            1,
+        )
+        return "r1" if is_bad else short(asked)
+
+    with recorded(data.parent) as recording:
+        assert run_watched(config, data, 2, press=press).done.code == 0
+        place = ("--data", data)
+        for command in (
+            ("note", "S001", "T01", "wet", *place),
+            ("verdict", "S001", "T01", "reject", "tilted", *place),
+            ("verdict", "S001", "T01b", "keep", "was fine", *place),
+            ("redo", "S001", "T02", "--reason", "wet", *AUTO, *place),
+        ):
+            done = traction(*command)
+            assert done.code == 0, done.err
+    return recording
+
+
+def survive(recording: Recording, folder: Path, cuts: int, seed: int) -> list[str]:
+    """Cut the power `cuts` times at random moments; return what went wrong.
+
+    Every third disk is put in order while the power fails once more.
+    """
+    rng = np.random.default_rng(seed)
+    wrong = []
+    for number in range(cuts):
+        length = int(rng.integers(len(recording.operations) + 1))
+        operations = recording.operations[:length]
+        wanted = acknowledged(operations)
+        place = folder / f"cut{number}"
+        after_power_cut(operations, rng).write(place)
+        if number % 3 == 0:
+            with recorded(place) as second:
+                put_in_order(place / "data")
+            shutil.rmtree(place)
+            until = int(rng.integers(second.start, len(second.operations) + 1))
+            after_power_cut(second.operations[:until], rng).write(place)
+        found = problems(place, wanted, recordings(operations))
+        wrong += [f"{number} after {length} operations: {text}" for text in found]
+        shutil.rmtree(place)
+    return wrong

@@ -1,0 +1,25 @@
+"""The bill of materials has every pinned package, with the checksums of the lock."""
+
+from importlib import metadata
+
+from tests.licences import ROOT, pins
+from tests.sbom import bill, hashes
+
+CONSTRAINTS = (ROOT / "constraints.txt").read_text()
+LOCK = (ROOT / "constraints.lock").read_text()
+
+
+def test_the_lock_pins_what_the_constraints_pin():
+    assert pins(LOCK.replace(" \\", "")) == pins(CONSTRAINTS)
+
+
+def test_every_pin_of_the_lock_has_a_checksum():
+    assert [name for name in pins(CONSTRAINTS) if not hashes(LOCK).get(name)] == []
+
+
+def test_the_bill_names_every_pinned_package_as_it_is_installed():
+    made = bill(CONSTRAINTS, LOCK)
+    assert made["bomFormat"] == "CycloneDX"
+    versions = {part["name"]: part["version"] for part in made["components"]}
+    assert versions == {name: metadata.version(name) for name in pins(CONSTRAINTS)}
+    assert all(part["hashes"] and part["purl"] for part in made["components"])
