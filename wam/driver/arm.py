@@ -148,6 +148,7 @@ class WamArm:
             is_complete=is_complete,
             missing_cycles=self._missing_cycles,
             jump=motion.jump,
+            foreign_id=self._link.foreign_id,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:

@@ -17,6 +17,7 @@ RECORDED_NAMES = {
     "can-silence",
     "safety-silent",
     "position-jump",
+    "bus-shared",
     "not-a-number",
     "joint-limit",
     "overspeed",
