@@ -65,6 +65,7 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
+        heartbeat_ns: longest time without position traffic while ACTIVE.
     """
 
     def __init__(
@@ -76,6 +77,7 @@ class FakeSafetyModule:
         self.mode = options.safety_mode
         self.is_mute = False
         self.is_disobedient = False
+        self.heartbeat_ns = options.heartbeat_ns
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
@@ -187,7 +189,7 @@ class FakeSafetyModule:
     def _feel_beat(self) -> None:
         """Wait for the next position until the heartbeat is over, while ACTIVE."""
         is_active = self.mode is _ACTIVE
-        due_ns = self._schedule.now_ns + self._options.heartbeat_ns
+        due_ns = self._schedule.now_ns + self.heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
     def _miss_beat(self) -> None:
