@@ -56,6 +56,9 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
 SETTLE = 0.5  # s after a move
 CLEARANCE = 0.10  # m that sole, plate and elbow stay above the highest container
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
+# rad, how far a joint may be from its place in a move; gravity that is off by a quarter
+# and the friction of another arm make 12 mrad.
+ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
 ATTEMPTS = 4  # at an arm that does not come to rest
 
 AcceptancePlan = Callable[[Array, float], Sequence[MeasurementPose]]
@@ -107,10 +110,37 @@ class PoseWalk:
         return halts
 
     def go_to(self, halt: MeasurementPose) -> None:
-        """Move to a halt and wait until the arm has settled."""
+        """Move to a halt and wait until the arm has settled.
+
+        Raises:
+            PreflightError: a joint is not where it was sent; the arm is braked then.
+        """
+        move = JointMove(self._here, halt.q, halt.speed)
         self._rig.backend.loop_client.move_to(halt.q.tolist(), halt.speed)
-        self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
+        sent_ns = self._rig.clock.now_ns()
+        for _ in range(round((move.duration + SETTLE) / TICK) + 1):
+            self.console_loop.tick(Prompt.MOVING)
+            self._check_on_the_way(move, sent_ns)
         self._here = halt.q
+
+    def _check_on_the_way(self, move: JointMove, sent_ns: int) -> None:
+        """Brake an arm that something holds up, or whose encoder stands still.
+
+        A joint with a dead encoder is pulled on for ever and seems to stand.
+        """
+        record = self._rig.backend.loop_client.latest()[0]
+        wanted, _ = move.at((int(record["host_ns"]) - sent_ns) * 1e-9)
+        apart = np.abs(record["position"] - wanted)
+        joint = int((apart / ASTRAY).argmax())
+        if apart[joint] <= ASTRAY[joint]:
+            return
+        self.console_loop.make_safe()
+        raise PreflightError(
+            f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
+            f"(limit {ASTRAY[joint]:g}).",
+            hint="Is something in its way, or does an encoder stand still? Start again.",
+            arm_state="idle, braked",
+        )
 
     def end(self) -> None:
         """Ask for support and idle the arm; nobody need hold it afterwards."""

@@ -123,7 +123,7 @@ class PuckNetwork:
 
     def set_heartbeat(self, heartbeat_ns: int) -> None:
         """Let the safety module wait otherwise than expected for positions [ns]."""
-        self._safety.heartbeat_ns = heartbeat_ns
+        self._safety.set_heartbeat(heartbeat_ns)
 
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the arm's power bus have `voltage` [V], at the last `advance`."""

@@ -1,8 +1,8 @@
 """Print the fault matrix as a table in Markdown: `python -m tests.faults`."""
 
 from tests.faults.expected import TABLE, Cell, End
+from tests.faults.phases import PHASES
 from tests.faults.processes import TABLE as PROCESSES
-from tests.faults.rehearse import PHASES
 
 HEAD = """\
 # Every fault in every phase

@@ -284,7 +284,9 @@ def _no_loop(scene):
 
 def _lost_sensor(scene):
     fields = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(inline_crew.InProcessBackend, "sensor_metadata", lambda _: fields)
+    scene.patch.setattr(
+        inline_crew.InProcessBackend, "sensor_metadata", lambda _: fields
+    )
     return resume(scene)
 
 
