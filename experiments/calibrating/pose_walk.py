@@ -138,7 +138,7 @@ class PoseWalk:
         raise PreflightError(
             f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
-            hint="Is something in its way, or does an encoder stand still? Start again.",
+            hint="Is something in its way, or does an encoder stand still?",
             arm_state="idle, braked",
         )
 
