@@ -624,12 +624,12 @@ ROWS: dict[str, dict[str, Fields]] = {
         "implausible": (
             "gravity pulls askew, the foot is not where it is recorded",
             "zeroed away from home",
-            "mech_at_home at the zeroing; else the direction of the foot's weight at the first tare",
+            "mech_at_home at the zeroing and at every start; without it not detected but by the residual at a tare where the bias of the sensor is known",
             "refused",
             (),
-            "a turn about joint 1 is not observable by gravity",
+            "modulo a motor turn (joint 1: 0.15 rad); gravity would not see a turn about joint 1 at all; the residual of 1 N is 13 degrees of the foot's weight",
             (
-                "tests/experiments/commands/test_zero.py::test_an_arm_that_is_not_at_its_old_home_is_not_zeroed",
+                "tests/experiments/preflight/test_zero_check.py::test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named",
             ),
         ),
         "late": (

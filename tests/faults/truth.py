@@ -70,6 +70,17 @@ LYING = Promise(
     why="speed is seen through the encoder that lies: the guard bounds what it "
     "believes, the driver how fast a lie may grow, so the truth has twice the limit",
 )
+TWISTED = Promise(
+    speed=2.0,
+    why="somebody twists the foot with 1.2 N m, nearly all that the motor of joint 7 "
+    "may have; the lock gives way and the arm holds without it",
+)
+LIMP = Promise(
+    speed=1.5,
+    travel=0.1,
+    why="a motor whose puck restarted has no torque: its joints sink until the arm is "
+    "braked",
+)
 STUCK = Promise(
     speed=8.0,
     travel=0.2,
@@ -85,6 +96,9 @@ def promise_of(fault: str, cell: Cell) -> Promise:
         return FALLING
     if fault.startswith("creep"):
         return LYING
+    own = {"joint7-slip": TWISTED, "puck-reboot": LIMP}
+    if fault in own:
+        return own[fault]
     if fault.startswith("stuck"):
         return STUCK
     return Promise() if cell.arm is None else STOPPING
