@@ -45,7 +45,7 @@ def check_zero(error: Array) -> None:
     if abs(error[joint]) > HOME_LIMIT:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where its position "
-            f"puts it (limit {HOME_LIMIT}), as far as its motor's absolute encoder tells.",
+            f"puts it (limit {HOME_LIMIT}), says its motor's absolute encoder.",
             arm_state="idle",
             hint="The zero is wrong: put the arm at home, then: traction zero.",
         )
