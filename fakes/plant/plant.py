@@ -185,16 +185,6 @@ class ArmPlant:
         return x, y, z
 
     @property
-    def hand_force(self) -> tuple[float, float, float]:
-        """Force of the operator's hand on the arm, terrain frame [N]."""
-        return self._push
-
-    @property
-    def drive_torque(self) -> Array:
-        """Torques of the motors at the joints as they are now [N m], shape (7,)."""
-        return self._tau
-
-    @property
     def foot_speed(self) -> float:
         """Speed of the sole [m/s]."""
         return float(np.linalg.norm(self._rates[:3]))

@@ -121,12 +121,16 @@ class TruthLog:
     Attributes:
         plant: whose truth it is.
         tool: below the wrist.
+        drive: torques of the motors at the joints [N m], shape (7,).
+        hand: force of the operator's hand [N].
     """
 
     plant: ArmPlant
     tool: Tool
     t_ns: list[int] = field(default_factory=list)
     rows: list[np.ndarray] = field(default_factory=list)
+    drive: np.ndarray = field(default_factory=lambda: np.zeros(7))
+    hand: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def look(self) -> None:
         """Take a row when a cycle has passed."""
@@ -135,7 +139,7 @@ class TruthLog:
             return
         self.t_ns.append(plant.t_ns)
         is_free = 0.0 if plant.is_held else 1.0
-        parts = (plant.q, plant.qd, plant.drive_torque, (is_free,), plant.hand_force)
+        parts = (plant.q, plant.qd, self.drive, (is_free,), self.hand)
         self.rows.append(np.concatenate(parts))
 
     def since(self, struck_ns: int, fault: str) -> TrueMotion:
@@ -168,7 +172,18 @@ def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
         def __init__(self, constants, tool, *arguments):
             super().__init__(constants, tool, *arguments)
             self.log = TruthLog(self, tool)
+            self.of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
+            self.hand.step = _noting(self.hand.step, self.log)
             logs.append(self.log)
+
+        def set_torques(self, units):
+            super().set_torques(units)
+            self.log.drive = self.of_units.dot(units)
+
+        def set_braking(self, is_braked, is_powered):
+            super().set_braking(is_braked, is_powered)
+            if is_braked or not is_powered:
+                self.log.drive = np.zeros(7)
 
         def advance(self, t_ns):
             while self.t_ns + _PERIOD_NS <= t_ns:
@@ -179,6 +194,16 @@ def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
 
     patch.setattr(fakes.world.rig, "ArmPlant", SeenPlant)
     return logs
+
+
+def _noting(step, log: TruthLog):
+    """Return the hand's step, which notes its force in `log` too."""
+
+    def noted(view):
+        log.hand = step(view)
+        return log.hand
+
+    return noted
 
 
 def _drive(model: ArmModel, q, tau, is_free) -> float:
