@@ -8,6 +8,7 @@ from acquisition.control_loop.states import ArmState
 from tests.acquisition.control_loop.test_cycle import Bench, Law
 from tests.wam.control.test_controller import DOWN, reading
 from wam.control.controller import FootController
+from wam.control.joint_move import JointMove
 from wam.control.soft_walls import SoftWalls, Walls
 
 GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
@@ -95,3 +96,29 @@ def test_a_move_uses_nine_tenths_of_the_torque_limits_and_no_more(foot_model, si
     assert (np.abs(tau) <= 0.9 * np.array(LIMITS) + 1e-12).all()
     used = np.abs(tau) / np.array(LIMITS)
     assert (used > 0.899).sum() >= 6  # of joint 2 its weight takes some back
+
+
+def test_an_arm_on_its_way_gets_its_weight_alone(foot_model):
+    """Where it should be, as fast as it should be, half-way: no error, no torque."""
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN.copy()
+    goal[1] += 0.4
+    duration = law.move_to(goal, 0.5, reading(0.0))
+    way = JointMove(DOWN, goal, 0.5)
+    for share in (0.3, 0.5, 0.9):
+        q, qd = way.at(share * duration)
+        tau, gravity = law.torque(reading(share * duration, q=q, qd=qd))
+        assert tau[:6] == pytest.approx(gravity[:6], abs=1e-3)
+
+
+@pytest.mark.parametrize("stop", ["q_lower", "q_upper"])
+def test_a_move_may_end_at_a_stop_and_not_beyond(foot_model, stop):
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN.copy()
+    goal[3] = getattr(foot_model.constants, stop)[3]
+    assert law.move_to(goal, 0.5, reading(0.0)) > 0.0
+    goal[3] *= 1.01
+    with pytest.raises(ValueError, match="stops"):
+        law.move_to(goal, 0.5, reading(0.0))
