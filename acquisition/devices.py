@@ -49,6 +49,7 @@ class ArmReading:
         is_complete: all seven replies arrived.
         missing_cycles: incomplete cycles in a row, 0 = this one is complete.
         jump: a position that was not believed in this cycle; None = all were.
+        foreign_id: identifier of a frame that another master sent; None = none ever.
     """
 
     host_ns: int
@@ -61,6 +62,7 @@ class ArmReading:
     is_complete: bool
     missing_cycles: int
     jump: PositionJump | None = None
+    foreign_id: int | None = None
 
 
 @dataclass(slots=True)

@@ -1,6 +1,6 @@
 """Small errors sown into the code that decides: do the tests notice? Run by hand.
 
-python tests/mutation_check.py [--count 60] [--seed 1] [--only guard]
+python tests/mutation_check.py [--count 300] [--seed 1] [--only guard]
 
 Every mutation - a comparison flipped, a constant or sign changed, a statement removed -
 is run against the tests of its module in a copy of the tree, with a time limit.
@@ -21,14 +21,41 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[1]
+_LOOP, _LOOP_TESTS = "acquisition/control_loop", "tests/acquisition/control_loop"
+_CONTROL, _CONTROL_TESTS = "wam/control", "tests/wam/control"
+_DRIVER, _DRIVER_TESTS = "wam/driver", "tests/wam/driver"
 TESTS = {
-    "acquisition/control_loop/guard.py": (
-        "tests/acquisition/control_loop/test_guard.py",
+    f"{_LOOP}/guard.py": (f"{_LOOP_TESTS}/test_guard.py",),
+    f"{_LOOP}/cycle.py": (
+        f"{_LOOP_TESTS}/test_cycle.py",
+        "tests/wam/control/test_move_in_the_cycle.py",
     ),
-    "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
+    f"{_LOOP}/states.py": (f"{_LOOP_TESTS}/test_states.py",),
+    f"{_LOOP}/faults.py": (f"{_LOOP_TESTS}/test_faults.py",),
+    f"{_LOOP}/torque_limiter.py": (f"{_LOOP_TESTS}/test_torque_limiter.py",),
+    "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
+    f"{_CONTROL}/controller.py": (f"{_CONTROL_TESTS}/test_controller.py",),
+    f"{_CONTROL}/joint_lock.py": (f"{_CONTROL_TESTS}/test_joint_lock.py",),
+    f"{_CONTROL}/joint_move.py": (f"{_CONTROL_TESTS}/test_joint_move.py",),
+    f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
+    f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
+    f"{_DRIVER}/status_poller.py": (
+        f"{_DRIVER_TESTS}/test_status_poller.py",
+        f"{_DRIVER_TESTS}/test_arm.py",
+    ),
+    f"{_DRIVER}/joint_estimator.py": (
+        f"{_DRIVER_TESTS}/test_arm.py",
+        f"{_DRIVER_TESTS}/test_lost_replies.py",
+    ),
+    f"{_DRIVER}/zero_check.py": ("tests/experiments/preflight/test_zero_check.py",),
+    "wam/model/clearance.py": ("tests/wam/model/test_clearance.py",),
     "wam/bus/frames.py": ("tests/wam/bus/test_frames.py",),
-    "wam/driver/transmission.py": ("tests/wam/driver/test_transmission.py",),
     "ft_sensor/payload.py": ("tests/ft_sensor/test_payload.py",),
+    "ft_sensor/tare.py": ("tests/ft_sensor/test_tare.py",),
+    "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
+    "experiments/session/crash_recovery.py": (
+        "tests/experiments/session/test_crash_recovery.py",
+    ),
     "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
 }
 TIMEOUT = 120.0  # s; a mutation that hangs is noticed
@@ -171,7 +198,7 @@ def sample(count: int, seed: int, only: str) -> list[Mutation]:
 def main() -> int:
     """Print every survivor and the share that was killed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--count", type=int, default=60)
+    parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help="part of a module's path")
     given = parser.parse_args()

@@ -36,6 +36,7 @@ class Fault(StrEnum):
     CAN_SILENCE = "can-silence"
     SAFETY_SILENT = "safety-silent"
     POSITION_JUMP = "position-jump"
+    BUS_SHARED = "bus-shared"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
     OVERSPEED = "overspeed"
@@ -84,6 +85,13 @@ class SafetySilence:
     """Age of the safety module's last answer [ms]."""
 
     ms: float
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignFrame:
+    """Identifier of a frame of another master on the arm's bus."""
+
+    can_id: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +171,7 @@ FaultDetail = (
     | ReplySilence
     | SafetySilence
     | PositionJump
+    | ForeignFrame
     | JointExcess
     | FootSpeedExcess
     | Joint7Slip
@@ -206,6 +215,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.POSITION_JUMP: FaultSpec(
         (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
+    Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),
     Fault.OVERSPEED: FaultSpec(_DAMP, JointExcess),

@@ -14,6 +14,7 @@ from acquisition.control_loop.faults import (
     Fault,
     FootSpeedExcess,
     ForceAge,
+    ForeignFrame,
     GuardVerdict,
     Joint7Slip,
     JointExcess,
@@ -104,6 +105,7 @@ def check(
     verdicts = (
         _check_safety(limits, seen),
         _check_silence(limits, seen),
+        _check_master(seen.reading.foreign_id),
         _check_numbers(sum(q) + sum(qd) + sum(tau), seen),
         _check_position(limits, state, q),
         _check_speed(limits, seen, qd),
@@ -164,6 +166,13 @@ def _check_silence(limits: GuardLimits, seen: Observation) -> GuardVerdict:
     silent = ~seen.reading.fresh & 0x7F  # bit i set = motor i+1 did not answer
     detail = ReplySilence(missing * PERIOD_NS / NS_PER_MS, silent)
     return verdict_for(Fault.CAN_SILENCE, detail, is_lasting=is_lasting)
+
+
+def _check_master(foreign_id: int | None) -> GuardVerdict:
+    """Give up an arm that takes torques of another program as well."""
+    if foreign_id is None:
+        return OK
+    return verdict_for(Fault.BUS_SHARED, ForeignFrame(foreign_id))
 
 
 def _check_numbers(total: float, seen: Observation) -> GuardVerdict:

@@ -1,6 +1,7 @@
 from .gravity import GravityGuide
 from .pose_walk import guided
 from .sensor import SensorGuide
+from .surroundings import read_poses
 from .terrain import TerrainGuide
 
 __all__ = [
@@ -8,4 +9,5 @@ __all__ = [
     "SensorGuide",
     "TerrainGuide",
     "guided",
+    "read_poses",
 ]

@@ -9,6 +9,7 @@ from experiments.calibrating.pose_walk import PoseWalk
 from experiments.run import ConsoleLoop
 from experiments.session import iso_utc
 from wam.calibration import (
+    FreeSpace,
     GravityCalibration,
     MeasurementPose,
     choose_poses,
@@ -42,11 +43,14 @@ class GravityGuide:
         self._rig = console_loop.rig
         self._console = console_loop.console
 
-    def run(self, count: int, *, is_forced: bool) -> GravityCalibration:
+    def run(
+        self, count: int, poses: Sequence[Array] = (), *, is_forced: bool
+    ) -> GravityCalibration:
         """Measure in `count` poses and return the calibration.
 
         Args:
-            count: how many poses.
+            count: how many poses are chosen.
+            poses: of a person, instead [rad], shape (7,) each.
             is_forced: accept a fit that `check_fit` refuses.
 
         Raises:
@@ -56,8 +60,9 @@ class GravityGuide:
         """
         model = self._rig.model
 
-        def plan(start: Array, floor: float) -> list[MeasurementPose]:
-            return plan_halts(model, start, choose_poses(model, count, floor), floor)
+        def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
+            chosen = poses or choose_poses(model, count, space)
+            return plan_halts(model, start, chosen, space)
 
         rests = self._measure(self._walk.begin(plan, 2 * AVERAGE))
         self._walk.end()

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition import PreflightError, TractionError
+from experiments.calibrating.surroundings import free_space
 from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator import Prompt
 from experiments.run import (
@@ -14,7 +15,12 @@ from experiments.run import (
     StopRequestedError,
     activate,
 )
-from wam.calibration import APPROACH_SPEED, MeasurementPose, way_seconds
+from wam.calibration import (
+    APPROACH_SPEED,
+    FreeSpace,
+    MeasurementPose,
+    way_seconds,
+)
 from wam.control import JointMove
 from wam.model import Array
 
@@ -61,11 +67,13 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
 
 
 SETTLE = 0.5  # s after a move
-CLEARANCE = 0.10  # m that sole, plate and elbow stay above the highest container
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
+# rad, how far a joint may be from its place in a move; gravity that is off by a quarter
+# and the friction of another arm make 12 mrad.
+ASTRAY = np.array([0.04, 0.04, 0.04, 0.04, 0.04, 0.04, 0.1])
 ATTEMPTS = 4  # at an arm that does not come to rest
 
-AcceptancePlan = Callable[[Array, float], Sequence[MeasurementPose]]
+AcceptancePlan = Callable[[Array, FreeSpace], Sequence[MeasurementPose]]
 
 
 class PoseWalk:
@@ -87,8 +95,8 @@ class PoseWalk:
         """Activate the arm, plan the way and ask for free space; return the halts.
 
         Args:
-            plan: returns the halts, from where the arm is (7,) [rad] and the height
-                that nothing may come below [m].
+            plan: returns the halts, from where the arm is (7,) [rad] and where it may
+                move.
             seconds_per_pose: how long the arm stops in each pose [s].
 
         Raises:
@@ -98,9 +106,8 @@ class PoseWalk:
         """
         activate(self.console_loop)
         start = self._rig.backend.loop_client.latest()["position"][0].copy()
-        rows = self._rig.settings.matrix.terrains
-        floor = max(row.far_end[2] for row in rows) + CLEARANCE
-        halts = self.console_loop.run_aside(lambda: plan(start, floor))
+        space = free_space(self._rig.settings, self._rig.row)
+        halts = self.console_loop.run_aside(lambda: plan(start, space))
         number = len({halt.pose for halt in halts} - {None})
         stops = len(halts) * SETTLE + number * seconds_per_pose
         # Held by position: the weight may not be known yet, and the hand lets go.
@@ -119,14 +126,38 @@ class PoseWalk:
 
         Raises:
             MoveStoppedError: the guard stopped the move.
+            PreflightError: a joint is not where it was sent; the arm is braked then.
             StopRequestedError: as `ConsoleLoop.tick`.
         """
+        move = JointMove(self._here, halt.q, halt.speed)
         self._rig.backend.loop_client.move_to(halt.q.tolist(), halt.speed)
+        sent_ns = self._rig.clock.now_ns()
         try:
-            self.wait(JointMove(self._here, halt.q, halt.speed).duration + SETTLE)
+            for _ in range(round((move.duration + SETTLE) / TICK) + 1):
+                self.console_loop.tick(Prompt.MOVING)
+                self._check_on_the_way(move, sent_ns)
         except ArmFaultError as fault:
             raise MoveStoppedError(fault.verdict) from fault
         self._here = halt.q
+
+    def _check_on_the_way(self, move: JointMove, sent_ns: int) -> None:
+        """Brake an arm that something holds up, or whose encoder stands still.
+
+        A joint with a dead encoder is pulled on for ever and seems to stand.
+        """
+        record = self._rig.backend.loop_client.latest()[0]
+        wanted, _ = move.at((int(record["host_ns"]) - sent_ns) * 1e-9)
+        apart = np.abs(record["position"] - wanted)
+        joint = int((apart / ASTRAY).argmax())
+        if apart[joint] <= ASTRAY[joint]:
+            return
+        self.console_loop.make_safe()
+        raise PreflightError(
+            f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
+            f"(limit {ASTRAY[joint]:g}).",
+            hint="Is something in its way, or does an encoder stand still?",
+            arm_state="idle, braked",
+        )
 
     def end(self) -> None:
         """Ask for support and idle the arm; it needs no support afterwards."""

@@ -15,7 +15,12 @@ from ft_sensor.calibration import (
     check_residual,
     fit_sensor,
 )
-from wam.calibration import MeasurementPose, choose_orientations, plan_halts
+from wam.calibration import (
+    FreeSpace,
+    MeasurementPose,
+    choose_orientations,
+    plan_halts,
+)
 from wam.model import Array
 
 AVERAGE = 2.0  # s of readings that are averaged in each orientation
@@ -31,7 +36,12 @@ class SensorGuide:
         self._console = console_loop.console
 
     def run(
-        self, count: int, mounting: tuple[float, float] | None, *, is_forced: bool
+        self,
+        count: int,
+        mounting: tuple[float, float] | None,
+        poses: Sequence[Array] = (),
+        *,
+        is_forced: bool,
     ) -> SensorCalibration:
         """Measure in `count` orientations and return the calibration.
 
@@ -39,6 +49,7 @@ class SensorGuide:
 
         Args:
             count: how many orientations.
+            poses: of a person, instead of chosen ones [rad], shape (7,) each.
             mounting: angle [rad] and sign where they are known; None = fitted too.
             is_forced: accept a fit that `check_residual` refuses.
 
@@ -49,10 +60,10 @@ class SensorGuide:
         """
         model = self._rig.model
 
-        def plan(start: Array, floor: float) -> list[MeasurementPose]:
-            poses = choose_orientations(model, count, floor)
-            poses.append(poses[0])
-            return plan_halts(model, start, poses, floor, is_two_sided=False)
+        def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
+            chosen = list(poses) or choose_orientations(model, count, space)
+            chosen.append(chosen[0])
+            return plan_halts(model, start, chosen, space, is_two_sided=False)
 
         measured = self._measure(self._walk.begin(plan, AVERAGE))
         self._walk.end()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from experiments.run import ConsoleLoop
     from experiments.settings import Settings, TerrainRow
+    from wam.model import Array
 
 EXAMPLES = """\
   traction calibrate terrain --terrain S10  where the container of a terrain stands
@@ -44,6 +45,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--poses", type=int, default=12, metavar="N", help="how many poses (12)"
     )
     parser.add_argument(
+        "--pose-file",
+        type=Path,
+        metavar="FILE",
+        help="poses of your own instead of chosen ones (TOML)",
+    )
+    parser.add_argument(
         "--force", action="store_true", help="accept a fit that is refused as bad"
     )
 
@@ -63,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
     settings, row = _without_old(args.what, settings, row)
     out = args.out or _place(args.what, settings, row, is_fake=args.fake)
     _check_out(out)
+    args.chosen = _chosen_poses(args, settings, row)
     console = Console(color=not args.no_color)
     operator = choose_operator(args.operator_script, is_fake=args.fake)
     fake = FakeOptions(args.fast, seed=1) if args.fake else None
@@ -82,7 +90,8 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     from experiments.session import write_new_text
     from wam.calibration import gravity_to_toml
 
-    result = GravityGuide(console_loop).run(args.poses, is_forced=args.force)
+    guide = GravityGuide(console_loop)
+    result = guide.run(args.poses, args.chosen, is_forced=args.force)
     write_new_text(out, gravity_to_toml(result))
     _say_use(console_loop, out, '[gravity] model = "calibrated"', "rig.toml")
 
@@ -96,7 +105,8 @@ def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> N
     assert tool is not None
     is_foot = args.what == "foot"
     mounting = (tool.sensor_angle, tool.sensor_sign) if is_foot else None
-    result = SensorGuide(console_loop).run(args.poses, mounting, is_forced=args.force)
+    guide = SensorGuide(console_loop)
+    result = guide.run(args.poses, mounting, args.chosen, is_forced=args.force)
     write_new_text(out, sensor_to_toml(result))
     section = f"feet.{result.foot}" if is_foot else "ft_sensor"
     _say_use(
@@ -173,6 +183,25 @@ def _check_arguments(args: argparse.Namespace) -> None:
             "e.g. 12.",
             hint=nothing,
         )
+
+
+def _chosen_poses(
+    args: argparse.Namespace, settings: Settings, row: TerrainRow
+) -> list[Array]:
+    """Return the poses of a person, checked before anything is started; [] = none."""
+    if args.pose_file is None:
+        return []
+    from acquisition import SettingsError
+    from experiments.calibrating import read_poses
+
+    poses = read_poses(args.pose_file, settings, row)
+    fewest = _FEWEST.get(args.what, 0)
+    if not fewest or not fewest <= len(poses) <= _MOST:
+        raise SettingsError(
+            f"{args.pose_file}: {len(poses)} poses - expected {fewest}..{_MOST}.",
+            hint="A terrain is touched by hand, without poses. Nothing was started.",
+        )
+    return poses
 
 
 def _check_out(out: Path) -> None:

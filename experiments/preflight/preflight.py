@@ -29,7 +29,14 @@ from experiments.preflight.host_checks import (
 )
 from experiments.rig import EXCHANGE_CYCLES, FakeOptions, Rig, build_rig, gravity_words
 from experiments.settings import RigSettings, Settings, TerrainRow
-from wam.driver import complaints, temperature_range
+from wam.driver import (
+    HOME_LIMIT,
+    ArmInfo,
+    check_zero,
+    complaints,
+    temperature_range,
+    zero_error,
+)
 
 LOOP_TEST = 5.0  # s
 STEPPED_TEST = 0.3  # s
@@ -101,13 +108,14 @@ def run_preflight(
     if not rig.is_stepped:
         add_result(check_governor())
     check_disk(rig, data, add, probe)
-    _check_arm(rig, add)
+    info = _check_arm(rig, add)
     sensor = _check_sensor(rig, add)
     _check_exchange(rig, add)
     grants = _check_rights(rig, add)
     wrenches = rig.shared.wrenches.reader()
     rig.backend.begin()
     _check_loop(rig, seconds, add)
+    _check_zero(rig, info, add)
     stale_ms = rig.settings.rig.limits.ft_stale_ms
     add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
     _check_stream(rig, add_result)
@@ -115,7 +123,7 @@ def run_preflight(
     return Preflight(tuple(checks), {**devices, **grants})
 
 
-def _check_arm(rig: Rig, add: Add) -> None:
+def _check_arm(rig: Rig, add: Add) -> ArmInfo:
     try:
         info = rig.backend.start_arm()
     except TractionError as error:
@@ -138,6 +146,25 @@ def _check_arm(rig: Rig, add: Add) -> None:
     name = info.safety_mode.name.lower().replace("_", "-")
     parts = [name, f"firmware {info.safety_vers}", *faults]
     add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
+    return info
+
+
+def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
+    """Compare the zero with mech_at_home, which is of the real arm.
+
+    Raises:
+        PreflightError: the arm is zeroed elsewhere.
+    """
+    noted = rig.settings.rig.arm.mech_at_home
+    mech = [puck.mech for puck in info.pucks if puck.mech is not None]
+    if noted is None or len(mech) < len(info.pucks) or rig.is_simulated:
+        return
+    cts = [puck.cts for puck in info.pucks]
+    counts = rig.backend.loop_client.latest()["counts"][0].tolist()
+    error = zero_error(rig.model.constants, cts, counts, mech, noted)
+    worst = float(np.abs(error).max())
+    add(BAD if worst > HOME_LIMIT else GOOD, "zero", f"{worst:.4f} rad off at most")
+    check_zero(error)
 
 
 def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:

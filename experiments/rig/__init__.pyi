@@ -1,4 +1,5 @@
 from .backend import EXCHANGE_CYCLES
+from .build import build_tool, terrain_frame
 from .bus_log import logging_bus, open_bus_log
 from .fake import build_sensor_server, build_server
 from .gravity import gravity_path, gravity_words, read_gravity
@@ -15,9 +16,11 @@ __all__ = [
     "build_rig",
     "build_sensor_server",
     "build_server",
+    "build_tool",
     "gravity_path",
     "gravity_words",
     "logging_bus",
     "open_bus_log",
     "read_gravity",
+    "terrain_frame",
 ]

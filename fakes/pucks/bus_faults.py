@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fakes.pucks.event_queue import FRAME_NS, EventQueue
-from wam.bus import compose_id
+from wam.bus import compose_id, decode_position, encode_position
 
 # FROM 31 TO 9 wins every arbitration against pucks, FROM 11 TO group 11 (what the
 # finger of a hand says) loses all of them; nobody here has or hears either.
@@ -85,6 +85,14 @@ class BusFaults:
             return [(0, bytes(spoilt))]
 
         self._add(can_id, spoil, count)
+
+    def falsify(self, can_id: int, lie: Callable[[int], int]) -> None:
+        """Let `lie` change every position [counts] that a puck tells."""
+
+        def tell(data: bytes) -> list[tuple[int, bytes]]:
+            return [(0, encode_position(lie(decode_position(data))))]
+
+        self._add(can_id, tell, None)
 
     def flood(self, load: float, ids: Sequence[int] = FOREIGN_IDS) -> None:
         """Let others use `load` of the bus, 0 to 1, with `ids` in turn.

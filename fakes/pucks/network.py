@@ -10,6 +10,7 @@ from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
 from fakes.pucks.ft_puck import ForceTorquePuck, Load
 from fakes.pucks.options import NetworkOptions
+from fakes.pucks.other_master import OtherMaster
 from fakes.pucks.safety_module import (
     TORQUE_GROUPS,
     FakeSafetyModule,
@@ -37,6 +38,7 @@ class PuckNetwork:
         schedule: the network's time, its plans, and what wants onto the wire.
         options: the arm as it was found.
         faults: what goes wrong with frames on their way to the host.
+        other_master: another program that may join.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class PuckNetwork:
         self.options = options or NetworkOptions()
         self.schedule = schedule = EventQueue(t_ns)
         self.faults = BusFaults(schedule)
+        self.other_master = OtherMaster(schedule, self.receive)
         self._safety = FakeSafetyModule(self.options, schedule, self._mode_changed)
         self._bank = PuckBank(
             motors, self.options, schedule, self._safety.hear_positions
@@ -117,6 +120,10 @@ class PuckNetwork:
     def disobey(self, *, is_disobedient: bool = True) -> None:
         """Let the safety module ignore hosts that lower its mode, or obey again."""
         self._safety.is_disobedient = is_disobedient
+
+    def set_heartbeat(self, heartbeat_ns: int) -> None:
+        """Let the safety module wait otherwise than expected for positions [ns]."""
+        self._safety.set_heartbeat(heartbeat_ns)
 
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the arm's power bus have `voltage` [V], at the last `advance`."""

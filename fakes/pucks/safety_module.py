@@ -76,6 +76,7 @@ class FakeSafetyModule:
         self.mode = options.safety_mode
         self.is_mute = False
         self.is_disobedient = False
+        self._heartbeat_ns = options.heartbeat_ns
         self._options = options
         self._schedule = schedule
         self._on_change = on_change
@@ -152,6 +153,11 @@ class FakeSafetyModule:
         self._bus_voltage = voltage
         self._judge_voltage()
 
+    def set_heartbeat(self, heartbeat_ns: int) -> None:
+        """Wait so long for positions from now on [ns]."""
+        self._heartbeat_ns = heartbeat_ns
+        self._feel_beat()
+
     def trip(self, monitor: Strainable) -> None:
         """Let a monitor find fault with what it sees, until `relax`.
 
@@ -187,7 +193,7 @@ class FakeSafetyModule:
     def _feel_beat(self) -> None:
         """Wait for the next position until the heartbeat is over, while ACTIVE."""
         is_active = self.mode is _ACTIVE
-        due_ns = self._schedule.now_ns + self._options.heartbeat_ns
+        due_ns = self._schedule.now_ns + self._heartbeat_ns
         self._schedule.set_alarm(due_ns if is_active else NEVER)
 
     def _miss_beat(self) -> None:

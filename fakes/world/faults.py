@@ -35,6 +35,7 @@ def network_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:
         "bus-off": faults.go_off,
         "can-down": faults.go_off,
         "not-zeroed": network.forget_positions,
+        "bus-shared": network.other_master.join,
         "bus-flooded": lambda: faults.flood(FOREIGN_LOAD),
         "safety-speed": lambda: network.trip("velocity"),
         "safety-torque": lambda: network.trip("torque"),
@@ -57,6 +58,7 @@ def clear_network_faults(network: PuckNetwork) -> None:
     until a start-up wakes it and has to be zeroed, as on a real arm.
     """
     network.faults.clear_faults()
+    network.other_master.leave()
     network.reset_monitors()
     network.silence(SAFETY_NODE, is_mute=False)
     network.disobey(is_disobedient=False)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from acquisition.control_loop.states import ArmState
-from tests.faults.rehearse import PHASES
+from tests.faults.phases import PHASES
 
 HOLD, DAMP = ArmState.HOLD, ArmState.DAMP
 
@@ -20,6 +20,8 @@ class End(Enum):
     UNTARED = "five tares refused, resumed"
     UNBRACKETED = "kept, the last tare is missing"
     ENDED = "session ends, resumed"
+    SOMEHOW = "stopped; the session goes on or ends"
+    UNMEASURED = "the arm stops, nothing is written"
     UNWRITTEN = "session ends, what is on the disk stays"
     STOPPED = "unfinished on purpose, resumed"
     INTERRUPTED = "ends at once"
@@ -69,6 +71,9 @@ class Cell:
 Row = tuple[Cell, ...]
 OK = Cell(End.COMPLETE)
 NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
+UNSEEN = Cell(
+    End.COMPLETE, why="not detected: where the foot is and how fast is recorded wrongly"
+)
 AT_REVIEW = ("session ended at the review",)
 
 
@@ -167,6 +172,17 @@ def _limit(text: str, why: str, preflight: Cell = NO_LOOP) -> Row:
     )
 
 
+def _creeping(motor: int) -> Row:
+    """Return the row of an encoder that creeps away: what is seen first stops it.
+
+    Joint 7 turns the foot about its own axis, so only its stop or its lock tell.
+    """
+    arm = Arm(1700 if motor == 7 else 400, "driven", DAMP, "")
+    stopped = Cell(End.SOMEHOW, arm=arm)
+    late = Cell(End.SOMEHOW, why="found when the arm becomes active")
+    return _row(stopped, preflight=late, idle=late, end=replace(OK, arm=arm))
+
+
 def _disk(word: str) -> Row:
     text = f"cannot be written ({word})"
     lost = Cell(End.UNWRITTEN, text)
@@ -200,6 +216,7 @@ _LOADED = Cell(
     ("interrupted: contact-force",),
     Arm(30, "driven", HOLD, "holding"),
 )
+_SHARED = "Another program sends to the arm: frame "
 _NAN = "A position or torque was not a number."
 _CANNOT_COUNT = Cell(End.ENDED, "Joint torques are not numbers")
 _HEARTBEAT = f"{_MODULE}heartbeat fault."
@@ -250,6 +267,13 @@ TABLE: dict[str, Row] = {
         idle=_not_ready("The CAN interface refuses to send and receive."),
     ),
     "bus-flooded": _row(OK),
+    "bus-shared": _ending(
+        _SHARED,
+        _IDLE,
+        "bus-shared",
+        preflight=Cell(End.ENDED, _SHARED, why="found when the arm becomes active"),
+        idle=Cell(End.ENDED, _SHARED, why="found when the arm becomes active"),
+    ),
     "estop": _ending(
         "Stop pressed", _STOPPED, "estop", preflight=_IN_STOP, idle=_UNPOWERED
     ),
@@ -301,6 +325,9 @@ TABLE: dict[str, Row] = {
         ),
     ),
     "safety-disobedient": _row(OK),
+    **{f"lie-of-motor-{motor}": _row(OK) for motor in range(1, 8)},
+    **{f"stuck-motor-{motor}": _row(UNSEEN) for motor in range(1, 8)},
+    **{f"creep-of-motor-{motor}": _creeping(motor) for motor in range(1, 8)},
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
     "ft-frozen": _sensor(70, _FLAGGED, Cell(End.TOLD, _FLAGGED)),
     "ft-garbled": _sensor(20, _FEW, _NO_FRAME),
@@ -368,6 +395,23 @@ TABLE: dict[str, Row] = {
         ),
         review=Cell(End.ENDED, _HEARTBEAT, AT_REVIEW, replace(_IDLE, limit_ms=150)),
         end=OK,
+    ),
+    "stall-150-ms, heartbeat 1 s": _row(
+        OK,
+        recording=Cell(
+            End.REDONE,
+            "T01 stopped at",
+            ("interrupted: ft-stale",),
+            replace(_HELD, limit_ms=150),
+            why="no force was looked at meanwhile",
+        ),
+    ),
+    "can-silence, heartbeat 1 s": _ending(
+        "No reply from the arm for ",
+        _UNKNOWN,
+        "can-silence",
+        preflight=_refused("Pucks 1,2,3,4,5,6,7 do not answer"),
+        idle=_not_ready("Pucks 1,2,3,4,5,6,7 have not answered for 100 ms."),
     ),
     "clock-step": _row(OK),
     "disk-full": _disk("No space left on device"),

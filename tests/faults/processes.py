@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from tests.faults.expected import Cell, End
-from tests.faults.rehearse import PHASES
+from tests.faults.phases import PHASES
 
 _STOPPED = Cell(End.STOPPED)
 _LOST = Cell(End.ENDED, " process ended: killed by SIGKILL.")

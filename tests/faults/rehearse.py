@@ -10,19 +10,25 @@ import pytest
 import experiments.run.runner
 import experiments.run.session
 import fakes.world
-from acquisition.clock import Clock
+from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify_file
+from experiments.calibrating import gravity, pose_walk
 from experiments.operator.prompts import AutoOperator, Prompt
 from fakes.pucks.bank import PuckBank
 from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
+from tests.faults.phases import MOVING
+from tests.faults.truth import TruthLog, watch_truth
+from wam.calibration import poses
 
-PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
 MS = 1_000_000
+CALIBRATION = "gravity.toml"
+_AFTERWARDS_NS = 500 * MS
+_MOVING_SPEED = 0.3  # rad/s; the trapezoid is on its way
 _FRESH_NS = 5 * MS  # torques older than two cycles are the last ones
 _PROMPTS = {
     "tare": (Prompt.LIFT, 0.9),  # still since 0.6 s, the mean is being taken
@@ -92,6 +98,13 @@ class Seen:
     scene: SimulatedScene
     folder: Path | None
     data: Path
+    truth: TruthLog
+
+    @property
+    def written(self) -> Path | None:
+        """The calibration that was written; None = none was."""
+        path = self.data / CALIBRATION
+        return path if path.exists() else None
 
     @property
     def events(self) -> list[dict]:
@@ -109,13 +122,39 @@ Strike = Callable[[SimulatedScene], None]
 
 
 def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
-    """Run a session of one trial in which `inject` comes once, in `phase`."""
+    """Run a session of one trial in which `inject` comes once, in `phase`.
+
+    While the arm moves by itself, it is a short calibration of gravity.
+    """
     with pytest.MonkeyPatch.context() as patch:
-        scenes = _watch(patch)
+        logs, scenes = watch_truth(patch), _watch(patch)
         _at(patch, phase, scenes, inject)
-        done = run_short(config, data, "TF", 1)
+        if phase == MOVING:
+            done = _calibrate(patch, config, data)
+        else:
+            done = run_short(config, data, "TF", 1)
+        _let_the_world_go_on(scenes[0])
     found = [path for path in (data / "sessions").glob("2*") if path.is_dir()]
-    return Seen(done, scenes[0], found[0] if found else None, data)
+    return Seen(done, scenes[0], found[0] if found else None, data, logs[0])
+
+
+def _let_the_world_go_on(scene: SimulatedScene) -> None:
+    """Let the arm do what it does when the program is gone."""
+    rig, clock = scene.rig, scene.clock
+    for cycle in range(_AFTERWARDS_NS // PERIOD_NS):
+        rig.advance(clock.now_ns() + (cycle + 1) * PERIOD_NS)
+
+
+def _calibrate(patch: pytest.MonkeyPatch, config: Path, data: Path) -> Done:
+    """Calibrate in the fewest poses, close to each other, with short stops."""
+    patch.setattr(pose_walk, "SETTLE", 0.1)
+    patch.setattr(gravity, "AVERAGE", 0.1)
+    patch.setattr(poses, "APPROACH_SPEED", 0.1)
+    patch.setattr(poses, "REACH", 0.6 * poses.REACH)
+    data.mkdir()
+    options = ("--fake", "--fast", "--poses", 3, "--force", "--config", config)
+    out = ("--data", data, "--out", data / CALIBRATION)
+    return traction("calibrate", "gravity", *options, *out)
 
 
 def resume(data: Path) -> Done:
@@ -190,7 +229,14 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
             scene.struck_ns = scene.clock.now_ns()
             inject(scene)
 
-    def answer(_, asked):
+    usual_answer = AutoOperator.answer
+
+    def answer(operator, asked):
+        if phase == MOVING:
+            qd = scenes[0].rig.plant.qd
+            if asked.prompt is Prompt.MOVING and abs(qd).max() > _MOVING_SPEED:
+                strike_once()
+            return usual_answer(operator, asked)
         prompt, since = _PROMPTS.get(phase, (None, 0.0))
         if asked.prompt is prompt and asked.since > since:
             is_first = not scenes[0].strikes

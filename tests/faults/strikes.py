@@ -8,9 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
+from wam.bus.frames import MOTOR_NODES, position_reply_id
 from wam.control.controller import FootController
+from wam.driver.settings import ArmSettings
+from wam.driver.transmission import Transmission
 
 _J2, _J6 = 1, 5
+_ALMOST = 0.95  # of what driver and guard believe
+_PERIOD = 0.002  # s
+_LONG_BEAT_NS = 1000 * MS
+_ARM_SETTINGS = ArmSettings()
+_SPEEDS = np.array(_ARM_SETTINGS.speed_limits)
 
 
 def _tighten(change: Callable[[SimulatedScene], dict[str, object]]) -> Strike:
@@ -72,6 +80,70 @@ def _no_disk(number: int) -> Strike:
     return lambda scene: scene.patch.setattr(os, "fsync", refuse)
 
 
+def _transmission(scene: SimulatedScene) -> Transmission:
+    options = scene.rig.network.options
+    torques = _ARM_SETTINGS.torque_limits
+    return Transmission(_ARM_SETTINGS.j2mp, options.cts, options.ipnm, torques)
+
+
+def _step_lie(motor: int) -> Strike:
+    """Return a strike after which a motor tells a place that it just cannot be at.
+
+    It is the largest step that the driver believes in one cycle, and it stays.
+    """
+
+    def inject(scene: SimulatedScene) -> None:
+        fastest = _transmission(scene).fastest_counts(_SPEEDS)[motor - 1]
+        step = int(_ALMOST * _ARM_SETTINGS.jump_margin * fastest * _PERIOD)
+        reply = position_reply_id(motor)
+        scene.rig.network.faults.falsify(reply, lambda counts: counts + step)
+
+    return inject
+
+
+def _creeping_lie(motor: int) -> Strike:
+    """Return a strike after which a motor's position creeps away from the truth.
+
+    It creeps as fast as it may without a joint's seeming too fast for the guard.
+    """
+
+    def inject(scene: SimulatedScene) -> None:
+        one = [int(node == motor) for node in MOTOR_NODES]
+        turned = np.abs(_transmission(scene).joints(one))  # rad per count
+        rate = _ALMOST * float((_SPEEDS[turned > 0] / turned[turned > 0]).min())
+        begin_ns = scene.clock.now_ns()
+
+        def lie(counts: int) -> int:
+            return counts + int(rate * 1e-9 * (scene.clock.now_ns() - begin_ns))
+
+        scene.rig.network.faults.falsify(position_reply_id(motor), lie)
+
+    return inject
+
+
+def _stuck(motor: int) -> Strike:
+    """Return a strike after which a motor goes on telling the place it is at now."""
+
+    def inject(scene: SimulatedScene) -> None:
+        here = scene.rig.plant.counts()[motor - 1]
+        reply = position_reply_id(motor)
+        scene.rig.network.faults.falsify(reply, lambda _: here)
+
+    return inject
+
+
+def _stall_under_a_long_heartbeat(scene: SimulatedScene) -> None:
+    """Take the computer away for 150 ms; the module would wait for a second."""
+    scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
+    _stall(150)(scene)
+
+
+def _long_heartbeat_and_silence(scene: SimulatedScene) -> None:
+    """Silence the arm; the module would wait for a second."""
+    scene.rig.network.set_heartbeat(_LONG_BEAT_NS)
+    inject("can-silence")(scene)
+
+
 _BY_HAND: dict[str, Strike] = {
     "joint-limit": _tighten(_behind_a_stop),
     "torque-limit": _tighten(_weak),
@@ -83,6 +155,11 @@ _BY_HAND: dict[str, Strike] = {
     "clock-step": _step_utc,
     "disk-full": _no_disk(errno.ENOSPC),
     "disk-read-only": _no_disk(errno.EROFS),
+    "stall-150-ms, heartbeat 1 s": _stall_under_a_long_heartbeat,
+    "can-silence, heartbeat 1 s": _long_heartbeat_and_silence,
+    **{f"lie-of-motor-{motor}": _step_lie(motor) for motor in MOTOR_NODES},
+    **{f"stuck-motor-{motor}": _stuck(motor) for motor in MOTOR_NODES},
+    **{f"creep-of-motor-{motor}": _creeping_lie(motor) for motor in MOTOR_NODES},
 }
 
 

@@ -17,8 +17,8 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from tests.experiments.program import traction, write_config
 from tests.faults.expected import End
+from tests.faults.phases import PHASES
 from tests.faults.processes import TABLE
-from tests.faults.rehearse import PHASES
 from tests.processes.watching import (
     NAMES,
     ROOT,

@@ -39,6 +39,11 @@ class Link(Protocol):
         """Number of changes of mode that the safety module has announced."""
         ...
 
+    @property
+    def foreign_id(self) -> int | None:
+        """Identifier of the first frame of another master; None = none ever came."""
+        ...
+
     def send(self, can_id: int, data: bytes) -> None:
         """Queue a frame; raises LinkError when the bus refuses it."""
         ...
@@ -97,6 +102,7 @@ class CanLink:
         mode_hints: broadcasts of the safety module so far.
         error_frames: error frames of the controller so far.
         foreign_ids: identifiers of hosts' frames that have arrived so far.
+        foreign_id: the first of them; None = none has.
     """
 
     def __init__(self, bus: CanBus, tap: Tap | None = None) -> None:
@@ -111,6 +117,7 @@ class CanLink:
         self.mode_hints = 0
         self.error_frames = 0
         self.foreign_ids: set[int] = set()
+        self.foreign_id: int | None = None
         self._bus = bus
         self._inbox: list[Frame] = []
         self._is_open = True
@@ -198,6 +205,8 @@ class CanLink:
                 self._inbox.append(frame)
             else:
                 self.foreign_ids.add(can_id)
+                if self.foreign_id is None:
+                    self.foreign_id = can_id
 
 
 def _cannot_open(

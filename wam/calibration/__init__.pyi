@@ -1,3 +1,4 @@
+from .free_space import FreeSpace, check_poses
 from .gravity_file import (
     GravityCalibration,
     fits_tool,
@@ -15,8 +16,10 @@ from .poses import (
 
 __all__ = [
     "APPROACH_SPEED",
+    "FreeSpace",
     "GravityCalibration",
     "MeasurementPose",
+    "check_poses",
     "choose_orientations",
     "choose_poses",
     "fits_tool",

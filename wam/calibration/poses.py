@@ -4,21 +4,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import SettingsError
+from wam.calibration.free_space import (
+    OFFSET,
+    UPRIGHT,
+    FreeSpace,
+    check_rise,
+    elbow_of,
+    lowest,
+    way_of,
+)
 from wam.control import TOP_SPEED, JointMove
-from wam.model import ArmConstants, ArmModel, Array, regressor
+from wam.model import ArmModel, Array, regressor
 
-OFFSET = 0.03  # rad; a pose is approached from this far on both sides
 APPROACH_SPEED = 0.05  # rad/s, on the last bit
 POINT_SPEED = 0.3  # m/s of sole and elbow; the safety module warns at 0.5
 MARGIN = 0.2  # rad a pose stays away from the joint stops: no wall is near
-UPRIGHT = (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)  # rad; elbow and foot are high
 _CANDIDATES = 1000
 _SEED = 7
-_STEP = 0.04  # rad between two looks at a path
-_SLACK = 0.002  # m a path may sag below its ends
 # How far from the upright pose a candidate may be [rad]: no wild contortions. Gravity
 # does not see joint 1, so the arm is not swung about.
 REACH = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
@@ -39,22 +43,22 @@ class MeasurementPose:
     pose: int | None
 
 
-def choose_poses(model: ArmModel, count: int, floor: float) -> list[Array]:
+def choose_poses(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
     """Return `count` poses [rad], shapes (7,), that show gravity best.
 
-    Out of many in which sole, plate and elbow are higher than `floor` [m], each next
-    one is that which adds most to the information on the first moments (the
-    determinant of Y^T Y grows most). The choice is always the same.
+    Out of many in which the arm keeps within `space`, each next one is that which adds
+    most to the information on the first moments (the determinant of Y^T Y grows most).
+    The choice is always the same.
 
     Raises:
-        SettingsError: not as many poses are higher than `floor`.
+        SettingsError: not as many poses are within `space`.
     """
-    reachable = _candidates(model, floor, count)
+    reachable = _candidates(model, space, count)
     blocks = [regressor(model.constants, q) for q in reachable]
     return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
 
 
-def choose_orientations(model: ArmModel, count: int, floor: float) -> list[Array]:
+def choose_orientations(model: ArmModel, count: int, space: FreeSpace) -> list[Array]:
     """Return `count` poses [rad], shapes (7,), that turn the tool to all sides.
 
     As `choose_poses`, for a force sensor: each next pose adds most to the information
@@ -62,9 +66,9 @@ def choose_orientations(model: ArmModel, count: int, floor: float) -> list[Array
     direction of gravity in frame 7.
 
     Raises:
-        SettingsError: not as many poses are higher than `floor`.
+        SettingsError: not as many poses are within `space`.
     """
-    reachable = _candidates(model, floor, count)
+    reachable = _candidates(model, space, count)
     down = [-model.plate_pose(q)[1][2] for q in reachable]
     blocks = [np.append(direction, 1.0)[None, :] for direction in down]
     return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
@@ -93,30 +97,26 @@ def plan_halts(
     model: ArmModel,
     start: Array,
     poses: Sequence[Array],
-    floor: float,
+    space: FreeSpace,
     *,
     is_two_sided: bool = True,
 ) -> list[MeasurementPose]:
     """Return the halts: each pose from below and from above, in every joint.
 
     The way begins at `start` [rad], shape (7,), goes by the upright pose and ends at
-    `start`. A straight way in joint space that would come lower than `floor` [m] goes
-    by the upright pose; a pose that cannot be reached from there is left out. Where
-    friction does not matter (`is_two_sided` false) each pose is reached once, directly.
+    `start`. A straight way in joint space that would leave `space` goes by the upright
+    pose; a pose that cannot be reached from there is left out. Where friction does not
+    matter (`is_two_sided` false) each pose is reached once, directly.
 
     Raises:
         SettingsError: even the upright pose cannot be reached from `start`.
     """
     upright = np.array(UPRIGHT)
-    if not is_clear(model, start, upright, floor):
-        raise SettingsError(
-            "The arm cannot rise from where it is without going down first.",
-            hint="Lift the foot clear of everything and start again.",
-        )
+    check_rise(model, start, space)
     way: list[tuple[Array, int | None]] = [(upright, None)]
-    reachable = [pose for pose in poses if is_clear(model, upright, pose, floor)]
+    reachable = [pose for pose in poses if space.is_clear(model, upright, pose)]
     for number, pose in enumerate(reachable):
-        if not is_clear(model, way[-1][0], pose, floor):
+        if not space.is_clear(model, way[-1][0], pose):
             way.append((upright, None))
         if not is_two_sided:
             way.append((pose, number))
@@ -137,35 +137,10 @@ def plan_halts(
     ]
 
 
-def lowest(model: ArmModel, q: NDArray[np.float64]) -> Array:
-    """Return the height of the lowest of sole, plate and elbow [m].
-
-    Args:
-        model: the arm with its tool.
-        q: joint positions [rad], shape (n, 7).
-
-    Returns:
-        Heights in the base frame, shape (n,).
-    """
-    plate = np.array([model.plate_pose(row)[0][2] for row in q])
-    sole = model.sole_path(q).position[:, 2]
-    return np.minimum(np.minimum(plate, sole), _elbow(model.constants, q)[:, 2])
-
-
-def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
-    """Return whether the arm stays above `floor` [m] on the straight way.
-
-    An end that is lower itself, such as the foot in its container, may be left and
-    reached, but nothing on the way is lower than the lower end.
-    """
-    heights = lowest(model, _path(start, goal))
-    return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK)
-
-
 def leg_speed(model: ArmModel, start: Array, goal: Array) -> float:
     """Return the joint speed [rad/s] at which sole and elbow stay below 0.3 m/s."""
-    path = _path(start, goal)
-    points = (model.sole_path(path).position, _elbow(model.constants, path))
+    path = way_of(start, goal)
+    points = (model.sole_path(path).position, elbow_of(model.constants, path))
     steps = [np.linalg.norm(np.diff(p, axis=0), axis=1).max() for p in points]
     turned = float(np.abs(goal - start).max()) / (len(path) - 1)  # rad per step
     fastest = POINT_SPEED * turned / max(*steps, 1e-9)
@@ -181,22 +156,8 @@ def way_seconds(start: Array, halts: Sequence[MeasurementPose]) -> float:
     return total
 
 
-def _path(start: Array, goal: Array) -> NDArray[np.float64]:
-    """Return joint positions on the straight way, shape (n, 7), n >= 2."""
-    count = 2 + int(np.abs(goal - start).max() / _STEP)
-    return start + np.linspace(0.0, 1.0, count)[:, None] * (goal - start)
-
-
-def _elbow(constants: ArmConstants, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the elbow's axis [m], shape (n, 3), the link's width off its height."""
-    reach, width = constants.d[2], abs(constants.a[2])
-    out = reach * np.sin(q[:, 1])
-    x, y = out * np.cos(q[:, 0]), out * np.sin(q[:, 0])
-    return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1)
-
-
-def _candidates(model: ArmModel, floor: float, count: int) -> list[Array]:
-    """Return poses that are above `floor` [m], also where they are approached.
+def _candidates(model: ArmModel, space: FreeSpace, count: int) -> list[Array]:
+    """Return poses that are within `space`, also where they are approached.
 
     Raises:
         SettingsError: there are fewer than `count`.
@@ -206,12 +167,17 @@ def _candidates(model: ArmModel, floor: float, count: int) -> list[Array]:
     constants = model.constants
     drawn = np.array(UPRIGHT) + REACH * rng.uniform(-1.0, 1.0, (_CANDIDATES, 7))
     drawn = np.clip(drawn, constants.q_lower + away, constants.q_upper - away)
-    heights = np.min([lowest(model, drawn + d) for d in (-OFFSET, 0.0, OFFSET)], axis=0)
-    reachable = list(drawn[heights > floor])
+    sides = (-OFFSET, 0.0, OFFSET)
+    heights = np.min([lowest(model, drawn + side) for side in sides], axis=0)
+    reachable = [
+        q
+        for q in drawn[heights > space.floor]
+        if all(space.holds(q + side) for side in sides)
+    ]
     if len(reachable) < count:
         raise SettingsError(
             f"Only {len(reachable)} of {_CANDIDATES} poses keep the arm above "
-            f"{floor:.2f} m.",
+            f"{space.floor:.2f} m and clear of everything.",
             hint="Calibrate with a lower container: --terrain NAME.",
         )
     return reachable

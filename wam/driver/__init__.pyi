@@ -11,10 +11,12 @@ from .safety_module import (
     encode_pendant,
 )
 from .settings import ArmSettings
-from .startup import ArmInfo, check_home, home_error
+from .startup import HOME_LIMIT, ArmInfo, check_home, home_error
+from .zero_check import check_zero, zero_error
 
 __all__ = [
     "COUNTS_PER_SPEED",
+    "HOME_LIMIT",
     "MONITORS",
     "WARNING_SHARE",
     "ArmInfo",
@@ -25,9 +27,11 @@ __all__ = [
     "SafetyLimits",
     "WamArm",
     "check_home",
+    "check_zero",
     "complaints",
     "encode_pendant",
     "health_metadata",
     "home_error",
     "temperature_range",
+    "zero_error",
 ]

@@ -134,8 +134,7 @@ class WamArm:
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
         if not (is_complete and self._is_commanded):
             # No torque frame may follow to carry the question.
-            is_urgent = 0 < self._missing_cycles <= _URGENT_CYCLES
-            traffic.ask(is_urgent=is_urgent)
+            traffic.ask(is_urgent=0 < self._missing_cycles <= _URGENT_CYCLES)
         self._is_commanded = False
         return ArmReading(
             host_ns=now_ns,
@@ -148,6 +147,7 @@ class WamArm:
             is_complete=is_complete,
             missing_cycles=self._missing_cycles,
             jump=motion.jump,
+            foreign_id=self._link.foreign_id,
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:

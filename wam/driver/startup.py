@@ -28,11 +28,14 @@ from wam.driver.safety_module import PendantWord, SafetyModule
 from wam.driver.settings import ArmSettings
 from wam.model import Array
 
-LARGEST = 0.03  # rad; by eye an arm is put against its stops to about a degree
+HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
 
 
 def home_error(
-    j2mp: Array, cts: Sequence[int], mech: Sequence[int], mech_at_home: Sequence[int]
+    j2mp: Array,
+    cts: Sequence[int],
+    mech: Sequence[float],
+    mech_at_home: Sequence[float],
 ) -> Array:
     """Return how far the joints are from home [rad], shape (7,).
 
@@ -55,10 +58,10 @@ def check_home(error: Array) -> None:
         PreflightError: a joint is more than 0.03 rad from where home was.
     """
     joint = int(np.abs(error).argmax())
-    if abs(error[joint]) > LARGEST:
+    if abs(error[joint]) > HOME_LIMIT:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where home was last "
-            f"time (limit {LARGEST}), as far as its motor's absolute encoder tells.",
+            f"time (limit {HOME_LIMIT}), as far as its motor's absolute encoder tells.",
             arm_state="idle",
             hint="Put the arm against its stops and zero it again. If a cable was "
             "tensioned or a motor changed, take mech_at_home out of rig.toml.",

@@ -1,17 +1,29 @@
 # pyright: reportUnknownVariableType=false
 from .arm_model import ArmModel, add_point, build_pinocchio, drive_inertia_matrix, urdf
+from .clearance import (
+    BASE_HEIGHT,
+    CLEARANCE_MARGIN,
+    ArmClearance,
+    BodyGap,
+    ObstacleBox,
+)
 from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
 from .gravity import VirtualMass, compensation, gravity_model
 from .moments import MomentFit, check_fit, fit_moments, regressor
 from .tool import Tool, sensor_body, tool_metadata, tool_of
 
 __all__ = [
+    "BASE_HEIGHT",
+    "CLEARANCE_MARGIN",
     "GRAVITY",
+    "ArmClearance",
     "ArmConstants",
     "ArmModel",
     "Array",
     "Body",
+    "BodyGap",
     "MomentFit",
+    "ObstacleBox",
     "Tool",
     "VirtualMass",
     "add_point",

@@ -17,6 +17,7 @@ RECORDED_NAMES = {
     "can-silence",
     "safety-silent",
     "position-jump",
+    "bus-shared",
     "not-a-number",
     "joint-limit",
     "overspeed",
@@ -71,3 +72,8 @@ def test_a_name_that_is_no_fault_is_refused():
 
 def test_a_reason_is_the_recorded_name():
     assert GuardVerdict(Action.HOLD, Fault.FT_STALE).reason == "ft-stale"
+
+
+def test_actions_take_more_from_the_arm_one_after_the_other():
+    order = (Action.NONE, Action.HOLD, Action.DAMP, Action.IDLE)
+    assert [GuardVerdict(action).severity for action in order] == [0, 1, 2, 3]

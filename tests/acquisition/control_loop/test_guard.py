@@ -93,6 +93,7 @@ def missing(cycles):
 
 E = 1e-9
 LIMIT_TABLE = [
+    (Fault.BUS_SHARED, Action.IDLE, {"foreign_id": None}, {"foreign_id": 0x404}),
     (
         Fault.E_STOP,
         Action.IDLE,

@@ -42,3 +42,8 @@ def test_what_is_no_number_stays_so_and_is_refused_by_the_driver():
     wanted = np.zeros(7)
     wanted[2] = np.nan
     assert np.isnan(bounded_torque(wanted, np.zeros(7), LIMITS)[2])
+
+
+def test_the_largest_change_of_every_joint_is_its_share_of_the_limit():
+    given = bounded_torque(np.full(7, 99.0), np.zeros(7), LIMITS)
+    assert given == pytest.approx(STEP)

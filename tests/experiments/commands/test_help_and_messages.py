@@ -298,7 +298,9 @@ def _no_loop(scene):
 
 def _lost_sensor(scene):
     fields = {"trouble": "The port is gone.", "reopened": "0"}
-    scene.patch.setattr(inline_crew.InProcessBackend, "sensor_facts", lambda _: fields)
+    scene.patch.setattr(
+        inline_crew.InProcessBackend, "sensor_metadata", lambda _: fields
+    )
     return resume(scene)
 
 
@@ -427,6 +429,7 @@ CASES = {
     "can-silence": struck("can-silence"),
     "safety-silent": struck("safety-silent"),
     "position-jump": struck("position-jump"),
+    "bus-shared": struck("bus-shared", words="frame 4"),
     "puck-silent": struck("puck-silent", words="Puck 3 has not"),
     "bus-off": struck("bus-off"),
     "estop": fault("estop@T2+0.1s", 4, E_STOP, "Stop pressed at 0.1"),

@@ -91,6 +91,7 @@ def test_an_arm_at_rest_may_be_claimed(mode):
 def test_a_silent_safety_module_is_left_to_the_start_up():
     class Silent:
         mode_hints = 0
+        foreign_id = None
 
         def send(self, can_id, data):
             pass

@@ -198,3 +198,13 @@ def test_a_tap_hears_what_came_before_the_bus_broke():
         link.receive()
     assert [can_id for can_id, _, _ in heard] == [0x426]
     link.close()
+
+
+def test_the_first_frame_of_another_master_is_kept():
+    arrived = [message(0x426), message(0x404, b"\x30"), message(0x00A, b"\x08")]
+    link = CanLink(ScriptedBus(arrived))
+    assert link.foreign_id is None
+    link.receive()
+    assert link.foreign_id == 0x404
+    assert link.foreign_ids == {0x404, 0x00A}
+    link.close()

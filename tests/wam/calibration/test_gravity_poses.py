@@ -4,16 +4,13 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
+from wam.calibration.free_space import OFFSET, UPRIGHT, FreeSpace, is_clear, lowest
 from wam.calibration.poses import (
     APPROACH_SPEED,
     MARGIN,
-    OFFSET,
     POINT_SPEED,
-    UPRIGHT,
     choose_poses,
-    is_clear,
     leg_speed,
-    lowest,
     plan_halts,
     way_seconds,
 )
@@ -23,6 +20,7 @@ from wam.model.constants import load_constants
 from wam.model.moments import regressor
 
 FLOOR = 0.33
+SPACE = FreeSpace(FLOOR)
 TWISTED = (0.0, 1.0, -1.1, 2.9, -4.3, -1.2, 0.6)  # to rise it goes down first
 IN_CONTAINER = np.array([0.0, 0.7, 0.0, 1.25, 0.0, 1.15, 0.0])
 
@@ -34,17 +32,17 @@ def model(example_tool):
 
 @pytest.fixture(scope="module")
 def poses(model):
-    return choose_poses(model, 12, FLOOR)
+    return choose_poses(model, 12, SPACE)
 
 
 @pytest.fixture(scope="module")
 def halts(model, poses):
-    return plan_halts(model, IN_CONTAINER, poses, FLOOR)
+    return plan_halts(model, IN_CONTAINER, poses, SPACE)
 
 
 @pytest.mark.parametrize("count", [4, 12])
 def test_the_poses_show_all_of_gravity_well(model, count):
-    poses = choose_poses(model, count, FLOOR)
+    poses = choose_poses(model, count, SPACE)
     Y = np.vstack([regressor(model.constants, q) for q in poses])
     values = np.linalg.svd(Y, compute_uv=False)
     assert len(poses) == count
@@ -131,9 +129,9 @@ def test_the_time_of_the_way_is_that_of_its_moves(halts):
 
 def test_a_container_that_is_too_high_is_refused(model):
     with pytest.raises(SettingsError, match=r"poses keep the arm above 1\.20 m"):
-        choose_poses(model, 12, 1.2)
+        choose_poses(model, 12, FreeSpace(1.2))
 
 
 def test_an_arm_that_cannot_rise_is_refused(model, poses):
     with pytest.raises(SettingsError, match="cannot rise"):
-        plan_halts(model, np.array(TWISTED), poses, FLOOR)
+        plan_halts(model, np.array(TWISTED), poses, SPACE)

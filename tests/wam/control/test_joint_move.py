@@ -57,3 +57,9 @@ def test_the_pd_part_is_clipped_joint_by_joint():
     assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), error, error) == pytest.approx(
         np.full(7, 5.0)
     )
+
+
+def test_nothing_that_is_in_the_way_is_pressed_harder_than_this():
+    """N m beyond the weight: what a person who holds a joint has to bear."""
+    held = joint_pd(np.full(7, 1e6), np.zeros(7), np.ones(7), np.zeros(7))
+    assert held.tolist() == [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0]

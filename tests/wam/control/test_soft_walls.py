@@ -152,3 +152,15 @@ def test_no_trial_of_the_shipped_matrix_touches_a_wall(foot_model):
                 )
                 assert (q > constants.q_lower + DEPTH).all()
                 assert (q < constants.q_upper - DEPTH).all()
+
+
+def test_the_damper_of_a_wall_is_as_strong_as_it_was_chosen():
+    """At the stop all of the damper is there, half-way half of it."""
+    damping, speed = 3.0, -0.4
+    walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
+    pushed(walls, np.zeros(7))  # armed in the middle
+    qd = np.array([speed, *np.zeros(6)])
+    for depth, share in ((DEPTH, 1.0), (DEPTH / 2, 0.5)):
+        q = np.array([-1.0 + DEPTH - depth, *np.zeros(6)])
+        braked = pushed(walls, q, qd)[0] - pushed(walls, q)[0]
+        assert braked == pytest.approx(-share * damping * speed)

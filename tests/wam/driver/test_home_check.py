@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import PreflightError
-from wam.driver.startup import LARGEST, check_home, home_error
+from wam.driver.startup import HOME_LIMIT, check_home, home_error
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()
@@ -46,11 +46,13 @@ def test_encoders_of_another_resolution_are_scaled():
 
 def test_the_worst_joint_is_named_with_its_error():
     error = np.zeros(7)
-    error[3] = -(LARGEST + 0.001)
+    error[3] = -(HOME_LIMIT + 0.001)
     with pytest.raises(PreflightError, match=r"Joint 4 is -0\.031 rad .*limit 0\.03"):
         check_home(error)
 
 
 def test_small_errors_pass():
-    check_home(np.full(7, -(LARGEST - 0.001)))
-    assert np.pi / 42 > 2 * LARGEST  # half a turn of the motor with the highest ratio
+    check_home(np.full(7, -(HOME_LIMIT - 0.001)))
+    assert (
+        np.pi / 42 > 2 * HOME_LIMIT
+    )  # half a turn of the motor with the highest ratio

@@ -1,0 +1,117 @@
+"""What can become dangerous, as data: every signal and every way it can be wrong.
+
+`python -m tests.faults.hazards > docs/hazards.md` prints it; what is measured comes
+from bounds.json.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from tests.faults.bounds import BOUND_PHASES, PrintedBound, read_bounds
+from tests.faults.hazard_rows import ROWS
+
+HEAD = """\
+# Hazards
+
+For every signal: what comes of it when it is lost, stuck, drifting, implausible or
+late; how that is noticed, what the program does, how far it gets until then, and the
+test that holds it. "not detected" stands where nothing notices, with what bounds it.
+Made by `python -m tests.faults.hazards > docs/hazards.md`. Bounds are the worst of the
+recording of a trial and of a move by the arm itself, measured on the simulated arm
+(docs/faults.md): largest joint speed as a share of the joint's limit, travel of the
+sole within 0.5 s, force of the motors on whoever holds the sole.
+"""
+
+
+class Mode(Enum):
+    """How a signal is wrong."""
+
+    LOST = "lost"
+    STUCK = "stuck"
+    DRIFTING = "drifting"
+    IMPLAUSIBLE = "implausible"
+    LATE = "late"
+
+
+@dataclass(frozen=True, slots=True)
+class Hazard:
+    """A row of the page.
+
+    Attributes:
+        signal: whose it is.
+        mode: how it is wrong.
+        hazard: what it may do to person, arm or measurement.
+        cause: what brings it about.
+        detection: what notices it, or "not detected".
+        reaction: what the program does.
+        faults: names in the fault matrix that were measured.
+        bound: what bounds it where no fault was measured.
+        tests: nodes that hold it.
+    """
+
+    signal: str
+    mode: Mode
+    hazard: str
+    cause: str
+    detection: str
+    reaction: str
+    faults: tuple[str, ...]
+    bound: str
+    tests: tuple[str, ...]
+
+
+def hazards() -> list[Hazard]:
+    """Return every row, signal by signal, the modes in their order."""
+    return [
+        Hazard(signal, Mode(mode), *fields)
+        for signal, rows in ROWS.items()
+        for mode, fields in rows.items()
+    ]
+
+
+def measured(hazard: Hazard) -> str:
+    """Return the worst that was measured of the faults, or the bound in words."""
+    bounds = [
+        bound
+        for fault in hazard.faults
+        for phase, bound in read_bounds()[fault].items()
+        if phase in BOUND_PHASES
+    ]
+    words = [hazard.bound] if hazard.bound else []
+    return "; ".join(words + ([_worst(bounds)] if bounds else []))
+
+
+def _worst(bounds: list[PrintedBound]) -> str:
+    fastest = max(bounds, key=lambda bound: bound.speed)
+    travel = max(bound.travel for bound in bounds)
+    drive = max(bound.drive for bound in bounds)
+    return (
+        f"speed {fastest.speed:.2f} of the limit (joint {fastest.joint}), "
+        f"{1e3 * travel:.0f} mm, {drive:.0f} N"
+    )
+
+
+def page() -> str:
+    """Return docs/hazards.md."""
+    lines = [HEAD]
+    signal = ""
+    for row in hazards():
+        if row.signal != signal:
+            signal = row.signal
+            lines += ["", f"## {signal.capitalize()}", "", _TITLES, _RULE]
+        tests = "<br>".join(f"`{test}`" for test in row.tests)
+        faults = ", ".join(f"`{fault}`" for fault in row.faults)
+        cause = f"{row.cause} ({faults})" if faults else row.cause
+        cells = (row.mode.value, row.hazard, cause, row.detection, row.reaction)
+        lines.append(f"| {' | '.join((*cells, measured(row), tests))} |")
+    blind = sum(row.detection.startswith("not detected") for row in hazards())
+    lines += ["", f"{len(hazards())} rows, {blind} of them not detected."]
+    return "\n".join(lines) + "\n"
+
+
+_COLUMNS = ("how", "hazard", "cause", "detected by", "reaction", "bound", "test")
+_TITLES = f"| {' | '.join(_COLUMNS)} |"
+_RULE = "|---" * len(_COLUMNS) + "|"
+
+if __name__ == "__main__":
+    print(page(), end="")  # noqa: T201

@@ -1,0 +1,36 @@
+"""What each fault comes to while the arm moves by itself, in a calibration."""
+
+from dataclasses import replace
+
+from tests.faults.expected import OK, TABLE, Cell, End
+from tests.faults.phases import PHASES
+
+_TARE = PHASES.index("tare")
+_NO_FORCE = "no force is read while the arm is weighed"
+_WEIGHED = replace(OK, why=_NO_FORCE)
+_UNLOCKED = Cell(
+    End.UNMEASURED,
+    "Joint 7 is ",
+    why="joint 7 is not locked while the arm moves: its place tells",
+)
+_ASTRAY = Cell(
+    End.UNMEASURED, why="seen where the arm was sent, not how fast it truly goes"
+)
+_STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
+
+
+def _cell(fault: str) -> Cell:
+    """Return the cell that follows from the fault's own during a tare."""
+    still = TABLE[fault][_TARE]
+    if fault == "joint7-slip":
+        return _UNLOCKED
+    if fault.startswith(("creep", "stuck")):
+        return _ASTRAY
+    if fault.startswith("ft-"):
+        return _WEIGHED
+    if still.end in _STOPPING:
+        return replace(still, end=End.UNMEASURED, rejected=(), why="")
+    return replace(still, why="")
+
+
+MOVING_CELLS: dict[str, Cell] = {fault: _cell(fault) for fault in TABLE}

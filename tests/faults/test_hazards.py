@@ -1,0 +1,70 @@
+"""The table of hazards is whole, names tests that exist, and is the printed one."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from tests.faults.expected import TABLE
+from tests.faults.hazards import Mode, hazards, measured, page
+
+ROOT = Path(__file__).parents[2]
+SIGNALS = {
+    "joint position",
+    "joint torque command",
+    "safety mode",
+    "pendant and e-stop",
+    "F/T wrench",
+    "host cycle",
+    "console heartbeat",
+    "recorder",
+    "disk",
+    "CAN bus",
+    "serial line",
+    "zero",
+    "tool model",
+    "wall clock",
+}
+
+
+def functions_of(path):
+    tree = ast.parse((ROOT / path).read_text())
+    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
+
+
+def test_the_printed_hazards_are_those_of_the_table():
+    assert (ROOT / "docs" / "hazards.md").read_text() == page()
+
+
+def test_every_signal_is_wrong_in_every_way():
+    found = {(row.signal, row.mode) for row in hazards()}
+    assert found == {(signal, mode) for signal in SIGNALS for mode in Mode}
+
+
+@pytest.mark.parametrize("row", hazards(), ids=lambda r: f"{r.signal}-{r.mode.value}")
+def test_a_hazard_names_tests_that_exist_and_what_bounds_it(row):
+    assert row.tests
+    for test in row.tests:
+        path, name = test.split("::")
+        assert name in functions_of(path), test
+    assert measured(row)
+    assert all((row.hazard, row.cause, row.detection, row.reaction))
+    assert "|" not in row.hazard + row.cause + row.detection + row.reaction + row.bound
+
+
+def test_every_fault_of_the_matrix_is_a_cause_of_some_hazard():
+    named = {fault for row in hazards() for fault in row.faults}
+    assert named <= set(TABLE)
+    # What only warns, or comes from the person who leads the arm, is no lost signal.
+    assert set(TABLE) - named == {
+        "puck-hot",
+        "puck-error",
+        "reply-lost-3",
+        "safety-speed",
+        "safety-torque",
+        "safety-voltage",
+        "joint-limit",
+        "foot-speed",
+        "overspeed",
+        "joint7-slip",
+    }

@@ -1,0 +1,219 @@
+"""What the simulated arm truly does after a fault, and what it never may do.
+
+Nothing here comes from the driver: positions, velocities, torques and forces are those
+of the simulated plant, every 2 ms, from the fault to the end of the command.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+import fakes.world.rig
+from fakes.plant.plant import ArmPlant
+from tests.faults.expected import NO_POWER, Cell
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+from wam.model.tool import Tool
+
+MS = 1_000_000
+WINDOW_NS = 500 * MS  # travel is counted so long after a fault
+BLOW_NS = 150 * MS  # a blow to a joint is over after this
+SPEED_LIMITS = np.array([1.5, 1.5, 2.0, 2.5, 4.0, 4.0, 4.0])  # rad/s, of rig.toml
+BLOWS = {"overspeed": 12.0, "foot-speed": 8.0}  # rad/s that the fault itself gives
+_PERIOD_NS = 2 * MS
+
+
+@dataclass(frozen=True, slots=True)
+class TrueMotion:
+    """The worst that truly happened from a fault on.
+
+    Attributes:
+        speed: largest joint speed as a share of the joint's limit in rig.toml.
+        joint: the joint that had it, 1-7.
+        travel: farthest that the sole was from its place within 0.5 s [m].
+        drive: largest force that the motors, beyond the arm's weight, put on whoever
+            holds the sole [N].
+        hand: largest force between the arm and the operator's hand [N].
+    """
+
+    speed: float
+    joint: int
+    travel: float
+    drive: float
+    hand: float
+
+
+@dataclass(frozen=True, slots=True)
+class Promise:
+    """What nothing may exceed; fields as of `TrueMotion`.
+
+    Attributes:
+        why: why it is another one than that of most faults.
+    """
+
+    speed: float = 1.0
+    travel: float = 0.16
+    drive: float = 50.0
+    hand: float = 80.0
+    why: str = ""
+
+
+FALLING = Promise(
+    speed=np.inf,
+    travel=np.inf,
+    why="nobody drives the arm: without power it sinks, and a person has to support it",
+)
+LYING = Promise(
+    speed=2.0,
+    travel=0.2,
+    why="speed is seen through the encoder that lies: the guard bounds what it "
+    "believes, the driver how fast a lie may grow, so the truth has twice the limit",
+)
+TWISTED = Promise(
+    speed=2.0,
+    why="somebody twists the foot with 1.2 N m, nearly all that the motor of joint 7 "
+    "may have; the lock gives way and the arm holds without it",
+)
+LIMP = Promise(
+    speed=1.5,
+    travel=0.1,
+    why="a motor whose puck restarted has no torque: its joints sink until the arm is "
+    "braked",
+)
+STUCK = Promise(
+    speed=8.0,
+    travel=0.2,
+    why="a motor whose place stands still is pulled on as long as the arm moves: "
+    "its torque limit and 40 mrad of the other joints, or the way's end, bound it",
+)
+STOPPING = Promise(travel=0.1)
+
+
+def promise_of(fault: str, cell: Cell) -> Promise:
+    """Return what is promised of a fault that comes to `cell`."""
+    if cell.at_rest == NO_POWER:
+        return FALLING
+    if fault.startswith("creep"):
+        return LYING
+    own = {"joint7-slip": TWISTED, "puck-reboot": LIMP}
+    if fault in own:
+        return own[fault]
+    if fault.startswith("stuck"):
+        return STUCK
+    return Promise() if cell.arm is None else STOPPING
+
+
+def is_within(motion: TrueMotion, bound: Promise) -> bool:
+    """Return whether the arm stayed within `bound`."""
+    return (
+        motion.speed <= bound.speed
+        and motion.travel <= bound.travel
+        and motion.drive <= bound.drive
+        and motion.hand <= bound.hand
+    )
+
+
+@dataclass(slots=True)
+class TruthLog:
+    """Rows of the plant while a command runs, one per cycle.
+
+    Attributes:
+        plant: whose truth it is.
+        tool: below the wrist.
+        drive: torques of the motors at the joints [N m], shape (7,).
+        hand: force of the operator's hand [N].
+    """
+
+    plant: ArmPlant
+    tool: Tool
+    t_ns: list[int] = field(default_factory=list)
+    rows: list[np.ndarray] = field(default_factory=list)
+    drive: np.ndarray = field(default_factory=lambda: np.zeros(7))
+    hand: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def look(self) -> None:
+        """Take a row when a cycle has passed."""
+        plant = self.plant
+        if self.t_ns and plant.t_ns < self.t_ns[-1] + _PERIOD_NS:
+            return
+        self.t_ns.append(plant.t_ns)
+        is_free = 0.0 if plant.is_held else 1.0
+        parts = (plant.q, plant.qd, self.drive, (is_free,), self.hand)
+        self.rows.append(np.concatenate(parts))
+
+    def since(self, struck_ns: int, fault: str) -> TrueMotion:
+        """Return the worst from `struck_ns` on, the blow of `fault` itself left out."""
+        t_ns = np.array(self.t_ns)
+        begin = max(int(np.searchsorted(t_ns, struck_ns)) - 1, 0)
+        rows, after_ns = np.array(self.rows[begin:]), t_ns[begin:] - struck_ns
+        q, qd, tau = rows[:, :7], np.abs(rows[:, 7:14]), rows[:, 14:21]
+        calm = qd[after_ns > BLOW_NS] if fault in BLOWS else qd
+        shares = calm / SPEED_LIMITS if len(calm) else np.zeros((1, 7))
+        joint = int(shares.max(axis=0).argmax())
+        model = ArmModel(load_constants(), self.tool)
+        near = q[after_ns <= WINDOW_NS]
+        places = model.sole_path(near if len(near) else q[:1]).position
+        travel = np.linalg.norm(places - places[0], axis=1).max()
+        return TrueMotion(
+            speed=float(shares.max()),
+            joint=joint + 1,
+            travel=float(travel),
+            drive=_drive(model, q, tau, rows[:, 21] > 0.0),
+            hand=float(np.linalg.norm(rows[:, 22:25], axis=1).max()),
+        )
+
+
+def watch_truth(patch: pytest.MonkeyPatch) -> list[TruthLog]:
+    """Return the logs of the plants that are built while `patch` lasts."""
+    logs: list[TruthLog] = []
+
+    class SeenPlant(ArmPlant):
+        def __init__(self, constants, tool, *arguments):
+            super().__init__(constants, tool, *arguments)
+            self.log = TruthLog(self, tool)
+            self.of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
+            self.hand.step = _noting(self.hand.step, self.log)
+            logs.append(self.log)
+
+        def set_torques(self, units):
+            super().set_torques(units)
+            self.log.drive = self.of_units.dot(units)
+
+        def set_braking(self, is_braked, is_powered):
+            super().set_braking(is_braked, is_powered)
+            if is_braked or not is_powered:
+                self.log.drive = np.zeros(7)
+
+        def advance(self, t_ns):
+            while self.t_ns + _PERIOD_NS <= t_ns:
+                super().advance(self.t_ns + _PERIOD_NS)
+                self.log.look()
+            super().advance(t_ns)
+            self.log.look()
+
+    patch.setattr(fakes.world.rig, "ArmPlant", SeenPlant)
+    return logs
+
+
+def _noting(step, log: TruthLog):
+    """Return the hand's step, which notes its force in `log` too."""
+
+    def noted(view):
+        log.hand = step(view)
+        return log.hand
+
+    return noted
+
+
+def _drive(model: ArmModel, q, tau, is_free) -> float:
+    """Return the largest force at the sole of torques beyond the weight [N]."""
+    worst = 0.0
+    for row, torque in zip(q[is_free], tau[is_free], strict=True):
+        if not torque.any():
+            continue  # no power: nothing drives it
+        excess = torque - model.gravity(row)
+        J = model.sole_jacobian(row)[:3]
+        force = np.linalg.lstsq(J.T, excess, rcond=0.05)[0]
+        worst = max(worst, float(np.linalg.norm(force)))
+    return worst

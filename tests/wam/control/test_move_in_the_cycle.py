@@ -1,0 +1,124 @@
+"""A move that is asked for reaches the law once and bounded; so do reports."""
+
+import numpy as np
+import pytest
+
+from acquisition.control_loop.faults import Fault, verdict_for
+from acquisition.control_loop.states import ArmState
+from tests.acquisition.control_loop.test_cycle import Bench, Law
+from tests.wam.control.test_controller import DOWN, reading
+from wam.control.controller import FootController
+from wam.control.joint_move import JointMove
+from wam.control.soft_walls import SoftWalls, Walls
+
+GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+LIMITS = (2.0, 4.5, 1.5, 1.5, 0.25, 0.25, 0.13)  # N m, far below the arm's weight
+
+
+class MovingLaw(Law):
+    """Keeps the moves that it is sent on."""
+
+    def __init__(self):
+        super().__init__()
+        self.moves = []
+        self.is_refusing = False
+
+    def move_to(self, goal, speed, reading):
+        if self.is_refusing:
+            raise ValueError
+        self.moves.append((goal.tolist(), speed))
+
+
+@pytest.fixture
+def bench():
+    bench = Bench()
+    bench.law = MovingLaw()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.HOLD)
+    return bench
+
+
+def test_a_move_reaches_the_law_once(bench):
+    bench.cycle.move_to(GOAL, 0.4)
+    bench.run(3)
+    assert bench.law.moves == [(list(GOAL), 0.4)]
+
+
+def test_a_move_waits_for_a_complete_reading(bench):
+    bench.cycle.move_to(GOAL, 0.4)
+    bench.arm.missing = 1
+    bench.run()
+    assert bench.law.moves == []
+    bench.arm.missing = 0
+    bench.run()
+    assert len(bench.law.moves) == 1
+
+
+def test_a_move_that_the_law_refuses_is_a_fault(bench):
+    bench.law.is_refusing = True
+    bench.cycle.move_to(GOAL, 0.4)
+    bench.run(2)
+    assert bench.reason == Fault.MOVE_REFUSED
+
+
+def test_what_others_report_counts_where_the_guard_is_content(bench):
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.run()
+    assert bench.reason == Fault.CONSOLE_SILENT
+
+
+def test_what_others_report_hides_nothing_worse(bench):
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.arm.qd = np.full(7, 9.0)
+    bench.run()
+    assert bench.reason == Fault.OVERSPEED
+    assert bench.state is ArmState.DAMP
+
+
+def test_a_report_is_obeyed_once(bench):
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.run()
+    bench.enter(ArmState.FLOAT)
+    bench.run(3)
+    assert (bench.state, bench.reason) == (ArmState.FLOAT, "")
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_move_uses_nine_tenths_of_the_torque_limits_and_no_more(foot_model, side):
+    constants = foot_model.constants
+    walls = SoftWalls(
+        Walls(tuple(constants.q_lower), tuple(constants.q_upper), LIMITS, (0.0,) * 7)
+    )
+    law = FootController(foot_model, 0.0, walls=walls)
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.move_to(DOWN + 0.1 * side, 0.5, reading(0.0))
+    tau, _ = law.torque(reading(60.0, q=DOWN - 0.3 * side))  # held back
+    assert (np.abs(tau) <= 0.9 * np.array(LIMITS) + 1e-12).all()
+    used = np.abs(tau) / np.array(LIMITS)
+    assert (used > 0.899).sum() >= 6  # of joint 2 its weight takes some back
+
+
+def test_an_arm_on_its_way_gets_its_weight_alone(foot_model):
+    """Where it should be, as fast as it should be, half-way: no error, no torque."""
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN.copy()
+    goal[1] += 0.4
+    duration = law.move_to(goal, 0.5, reading(0.0))
+    way = JointMove(DOWN, goal, 0.5)
+    for share in (0.3, 0.5, 0.9):
+        q, qd = way.at(share * duration)
+        tau, gravity = law.torque(reading(share * duration, q=q, qd=qd))
+        assert tau[:6] == pytest.approx(gravity[:6], abs=1e-3)
+
+
+@pytest.mark.parametrize("stop", ["q_lower", "q_upper"])
+def test_a_move_may_end_at_a_stop_and_not_beyond(foot_model, stop):
+    law = FootController(foot_model, 0.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    goal = DOWN.copy()
+    goal[3] = getattr(foot_model.constants, stop)[3]
+    assert law.move_to(goal, 0.5, reading(0.0)) > 0.0
+    goal[3] *= 1.01
+    with pytest.raises(ValueError, match="stops"):
+        law.move_to(goal, 0.5, reading(0.0))
