@@ -145,7 +145,10 @@ class PoseWalk:
 
         A joint with a dead encoder is pulled on for ever and seems to stand.
         """
-        record = self._rig.backend.loop_client.latest()[0]
+        loop_client = self._rig.backend.loop_client
+        if loop_client.status.verdict is not None:
+            return  # the guard has stopped the move; the next tick says why
+        record = loop_client.latest()[0]
         wanted, _ = move.at((int(record["host_ns"]) - sent_ns) * 1e-9)
         apart = np.abs(record["position"] - wanted)
         joint = int((apart / ASTRAY).argmax())

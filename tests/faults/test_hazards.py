@@ -67,4 +67,5 @@ def test_every_fault_of_the_matrix_is_a_cause_of_some_hazard():
         "foot-speed",
         "overspeed",
         "joint7-slip",
+        "contact-force",
     }

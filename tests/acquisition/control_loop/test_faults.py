@@ -75,5 +75,5 @@ def test_a_reason_is_the_recorded_name():
 
 
 def test_actions_take_more_from_the_arm_one_after_the_other():
-    order = (Action.NONE, Action.HOLD, Action.DAMP, Action.IDLE)
-    assert [GuardVerdict(action).severity for action in order] == [0, 1, 2, 3]
+    order = (Action.NONE, Action.END_TRIAL, Action.HOLD, Action.DAMP, Action.IDLE)
+    assert [GuardVerdict(action).severity for action in order] == [0, 1, 2, 3, 4]
