@@ -54,10 +54,10 @@ def doubts_of(trial: PreparedTrial) -> list[Doubt]:
     units = list(_units(smooth))
     if units:
         return units
-    moving = np.abs(smooth.v_t) > SLOWEST
-    if np.count_nonzero(moving) < FEWEST:
+    rubbing = (np.abs(smooth.v_t) > SLOWEST) & (np.abs(smooth.F_n) > PRESSED)
+    if np.count_nonzero(rubbing) < FEWEST:
         return []
-    v, load, along = smooth.v_t[moving], smooth.F_n[moving], smooth.F_t[moving]
+    v, load, along = smooth.v_t[rubbing], smooth.F_n[rubbing], smooth.F_t[rubbing]
     return [*_normal(load), *_signs(v, load, along)]
 
 
@@ -139,15 +139,11 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
             "the heading of the container is turned by 180 degrees",
             "traction calibrate terrain",
         )
-    pressed = np.abs(load) > PRESSED
-    if np.count_nonzero(pressed) < FEWEST:
-        return
-    power = float(np.mean(along[pressed] * v[pressed]))
+    power = float(np.mean(along * v))
     if power < 0.0:
         mean = power / float(np.mean(np.abs(along * v)))
         yield Doubt("power", f"the ground drives the foot ({mean:+.0%})", _TURNED)
-    ratios = along[pressed] * np.sign(v[pressed]) / np.abs(load[pressed])
-    ratio = float(np.median(ratios))
+    ratio = float(np.median(along * np.sign(v) / np.abs(load)))
     if ratio <= 0.0:
         yield Doubt("ratio", f"median F_t/F_n {ratio:.2f}", _TURNED)
     elif not FRICTION[0] <= ratio <= FRICTION[1]:

@@ -17,7 +17,25 @@ from tests.corpus.used_session import session_files
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(180)]
 ROOT = Path(__file__).parents[2]
 MEMORY = 300 * 2**20
-START = "import sys; from experiments.cli import main; sys.exit(main())"
+# A process says at its end what it took at most: what the kernel tells its parent is
+# never less than the parent's own.
+PEAK = """import atexit, os, re, sys
+
+def peak():
+    with open("/proc/self/status") as status, open(os.environ["PEAK"], "w") as out:
+        out.write(re.search(r"VmHWM:\\s+(\\d+)", status.read())[1])
+
+atexit.register(peak)
+"""
+START = PEAK + "from experiments.cli import main; sys.exit(main())"
+READ = (
+    PEAK
+    + """from pathlib import Path
+from analysis.data import load_tables
+(trials,) = load_tables([Path(sys.argv[1])]).values()
+print(len(trials[0].t))
+"""
+)
 SESSION_FILES = ("T01.json", "session.json", "events.jsonl", "trials/T01.mcap", ".lock")
 COMMANDS = (
     ("status",),
@@ -37,20 +55,20 @@ class Ended:
     memory: int
 
 
-def run(*arguments, cwd):
-    """Run `traction` in a process of its own."""
-    log = cwd / "out.txt"
+def run(*arguments, cwd, code=START):
+    """Run `traction`, or other code, in a process of its own."""
+    log, peak = cwd / "out.txt", cwd / "peak.txt"
+    more = {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT), "PEAK": str(peak)}
     with log.open("w") as out:
-        process = subprocess.Popen(
-            [sys.executable, "-c", START, *map(str, arguments)],
+        done = subprocess.run(
+            [sys.executable, "-c", code, *map(str, arguments)],
             cwd=cwd,
             stdout=out,
             stderr=out,
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)},
+            env={**os.environ, **more},
+            check=False,
         )
-        _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return Ended(process.returncode, log.read_text(), usage.ru_maxrss * 1024)
+    return Ended(done.returncode, log.read_text(), int(peak.read_text()) * 1024)
 
 
 def sparse(path, size):
@@ -123,19 +141,9 @@ def test_the_largest_table_is_read_in_little_memory(tmp_path):
     rows = (b"%d.25,0.125,2.5,1.5\n" % number for number in range(count))
     path.write_bytes(HEADER + b"".join(rows))
     assert 22_000_000 < path.stat().st_size < 24_000_000
-    code = (
-        "import sys; from pathlib import Path; from analysis.data import load_tables; "
-        "(trials,) = load_tables([Path(sys.argv[1])]).values(); print(len(trials[0].t))"
-    )
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, str(path)], cwd=ROOT, stdout=subprocess.PIPE
-    )
-    read = int(process.stdout.read())
-    process.stdout.close()
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    assert read == count
-    assert usage.ru_maxrss * 1024 < MEMORY
+    ended = run(path, cwd=tmp_path, code=READ)
+    assert ended.text.split() == [str(count)]
+    assert ended.memory < MEMORY
 
 
 DATABASES = {

@@ -49,6 +49,12 @@ def test_a_foot_that_never_moves_is_not_judged():
     assert names(table) == set()
 
 
+def test_a_foot_that_is_carried_through_the_air_is_not_judged():
+    table = pushed()
+    table[:, LOAD] = -0.1
+    assert names(table) == set()
+
+
 @pytest.mark.parametrize(
     ("disturb", "expected"),
     [

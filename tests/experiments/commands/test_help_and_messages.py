@@ -241,7 +241,7 @@ def _deaf(scene):
 
 
 def _orphan(scene):
-    scene.built.loop_servers[-1].is_orphaned = True
+    scene.built.loop_servers[-1].orphan()
 
 
 def _stuck_recorder(scene):
