@@ -49,16 +49,20 @@ def remove_abandoned(prefix: str, parent: Path) -> None:
 
 
 def _is_running(pid: int) -> bool:
-    """Return whether another process has this number; this one knows its own."""
+    """Return whether another process has this number; this one knows its own.
+
+    One that has ended and was not yet collected by its parent runs no more.
+    """
     if pid == os.getpid():
         return False
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
+        stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except (ProcessLookupError, FileNotFoundError):
         return False
     except (OSError, OverflowError):
         return True
-    return True
+    return not stat.rpartition(")")[2].strip().startswith(("Z", "X"))
 
 
 def _remove(path: Path) -> None:

@@ -57,6 +57,15 @@ def test_a_folder_of_a_killed_process_goes_with_the_next_one(holder, tmp_path):
         assert not path.exists()
 
 
+def test_a_folder_of_a_process_that_was_not_collected_yet_goes_too(tmp_path):
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        folder = tmp_path / f"room-{process.pid}-abcdefgh"
+        folder.mkdir()
+        with temporary_folder("room", tmp_path):
+            assert not folder.exists()
+
+
 def test_a_locked_folder_stays_though_its_number_is_unknown_here(tmp_path):
     path = tmp_path / f"room-{_dead_pid()}-abc"
     path.mkdir()
