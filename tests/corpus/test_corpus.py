@@ -23,6 +23,8 @@ from tests.corpus.readers import READERS
 from tests.corpus.samples import samples
 from tests.corpus.trial import read
 
+pytestmark = pytest.mark.slow
+
 CORPUS = Path(__file__).parents[1] / "data" / "corpus"
 ROOT = Path(__file__).parents[2]
 SECONDS = 2.0  # of CPU

@@ -51,6 +51,7 @@ def test_a_session_of_version_0_1_is_held_against_its_sidecars(recorded):
     assert path.name in done.err
 
 
+@pytest.mark.slow
 def test_a_session_of_version_0_1_is_reported(recorded):
     data, config = recorded
     done = traction("report", "S001", "--data", data, "--config", config)

@@ -14,6 +14,8 @@ from ft_sensor.serial_line.sensor import SerialSensor
 from tests.experiments.program import run_short, traction
 from tests.ft_sensor.sensor_bench import MAKES
 
+pytestmark = pytest.mark.slow
+
 ABSENT = "23 never came"  # of 31 ids asked for, seven pucks and the module are there
 PATIENCE = 30.0  # s, for a machine that stalls; met at once on one that does not
 

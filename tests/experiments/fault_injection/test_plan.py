@@ -16,6 +16,8 @@ from tests.experiments.program import (
     sidecar,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def stale(tmp_path_factory, config):

@@ -12,6 +12,8 @@ from experiments.session.lock import session_lock
 from experiments.session.store import find_session
 from tests.experiments.program import only_session, traction
 
+pytestmark = pytest.mark.slow
+
 FILES = [
     ".lock",
     "events.jsonl",

@@ -9,6 +9,8 @@ from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import SPEED, TORQUE, HoldBench
 from wam.control.position_hold import TORQUE_LIMIT
 
+pytestmark = pytest.mark.slow
+
 FRICTION = (0.02, 1.0)
 DRIFT = 0.02  # rad
 STILL = 5e-4  # rad in a second: wrist joints go on creeping by encoder counts

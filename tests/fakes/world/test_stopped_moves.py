@@ -10,6 +10,8 @@ from acquisition.control_loop.states import ArmState
 from fakes.world.rig import LocalSimulation
 from tests.fakes.world.holding import LIMITS, HoldBench
 
+pytestmark = pytest.mark.slow
+
 SPEED = 0.5  # rad/s, the fastest a move is
 WAY = np.array([0.6, -0.45, 0.3, 0.6, 0.45, -0.6, 0.3])  # rad
 MIDDLE = 1.0  # s after the start; the arm moves at full speed
