@@ -1,3 +1,4 @@
+from .columns import parse_columns, parse_units
 from .events import Slip, find_slips
 from .load import Frame, RecordedTrial, load_trial
 from .plausibility import Doubt, doubts_of, doubts_of_record, summed_up
@@ -13,7 +14,7 @@ from .prepare import (
 from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, suggest
 from .samples import SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
-from .tables import load_tables, parse_columns
+from .tables import load_tables
 from .terrain_kinds import (
     BIG,
     FLAT,
@@ -24,7 +25,6 @@ from .terrain_kinds import (
     parse_stones,
     terrain_kind,
 )
-from .units import parse_units
 
 __all__ = [
     "BIG",

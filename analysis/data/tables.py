@@ -17,14 +17,15 @@ from typing import TextIO
 import numpy as np
 
 from acquisition import SettingsError
+from analysis.data.columns import COLUMNS, factor, split_header
 from analysis.data.series import Array, TractionSeries
-from analysis.data.units import COLUMNS, factor, split_header
 
 DEFAULT_TERRAIN = "table"
 LARGEST_FILE = 24_000_000  # bytes, also of an npz once unpacked; six times in memory
 MOST_TRIALS = 2000
 LONGEST_LINE = 65_536  # characters
 
+_NAMED = "Name them: --columns t=...,v_t=...,F_n=...,F_t=..."
 _FORM = "An npz holds arrays TERRAIN/NN of four columns: t, v_t, F_n, F_t."
 _BROKEN_NPZ = (
     ValueError,
@@ -36,26 +37,6 @@ _BROKEN_NPZ = (
     zipfile.BadZipFile,
     zlib.error,
 )
-
-
-def parse_columns(text: str) -> dict[str, str]:
-    """Return the names of the columns from `t=t_s,v_t=vt_mps,...`.
-
-    Columns that are not mentioned keep their own name.
-
-    Raises:
-        SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
-    """
-    columns = {name: name for name in COLUMNS}
-    for part in filter(None, text.split(",")):
-        name, equals, column = (piece.strip() for piece in part.partition("="))
-        if not (equals and column) or name not in columns:
-            raise SettingsError(
-                f"--columns {text}: {part!r} does not name a column.",
-                hint="Write e.g. --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N",
-            )
-        columns[name] = column
-    return columns
 
 
 def load_tables(
@@ -257,7 +238,10 @@ def _places(
     for name in COLUMNS:
         column = form.columns[name]
         if column in header or column in names:
-            place = (header if column in header else names).index(column)
+            among = header if column in header else names
+            if among.count(column) > 1:
+                raise _refusal(path, f"column {column} stands there twice", _NAMED)
+            place = among.index(column)
             places.append(place)
             stated[name] = bare[place][1]
         else:
@@ -267,9 +251,21 @@ def _places(
             path,
             f"no column {', '.join(missing)}; it has "
             f"{', '.join(header)[:300] or 'none'}",
-            "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
+            _NAMED,
         )
     return places, stated
+
+
+def _with_points(row: str, places: list[int], delimiter: str) -> str:
+    """Return a row with points for its decimal commas.
+
+    Raises:
+        ValueError: a number has both, so one of them groups its digits.
+    """
+    cells = row.split(delimiter)
+    if any("," in cells[k] and "." in cells[k] for k in places if k < len(cells)):
+        raise ValueError("a number with a comma and a point")
+    return row.replace(",", ".")
 
 
 def _numbers(
@@ -277,7 +273,7 @@ def _numbers(
 ) -> Array:
     """Read the columns at `places`; beside semicolons and tabs a comma is a point."""
     if delimiter != ",":
-        rows = (row.replace(",", ".") for row in rows)
+        rows = (_with_points(row, places, delimiter) for row in rows)
     try:
         return np.loadtxt(
             rows,

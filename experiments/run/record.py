@@ -150,10 +150,8 @@ def _follow(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None
             return
         if pace.is_too_fast(outcome.seconds, outcome.displacement):
             context.feedback.give(FeedbackSignal.TOO_FAST)
-        if (
-            not context.console.is_live
-            and outcome.seconds >= reported_at + LIVE_SECONDS
-        ):
+        is_due = outcome.seconds >= reported_at + LIVE_SECONDS
+        if is_due and not context.console.is_live:
             reported_at = outcome.seconds
             v_t, F_t, F_n = record["traction"].tolist()
             where = (outcome.seconds, outcome.displacement, rig.frame.travel)
@@ -167,9 +165,7 @@ def _end(
     """Seal the files, say what they are worth; an interrupted one is rejected."""
     archive, recorder = context.archive, context.rig.backend.recorder
     context.loop_client.watch_trial(is_recording=False)
-    context.loop_client.advance(
-        TICK
-    )  # the metadata of the devices so far is written down
+    context.loop_client.advance(TICK)  # the newest metadata is written down
     recorder.event(20, "link", context.loop_client.device_metadata().get("link", ""))
     recorder.event(20, "stop", outcome.reason)
     try:

@@ -17,7 +17,8 @@ pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(400)]
 LIMIT = 0.5  # s, of a heartbeat
 REACTION = 0.6  # s
 STEP = 10  # samples, over which a true speed is taken
-FASTEST = 2.0  # rad/s of any joint; 1.0 is the limit that begins a hold
+# rad/s; the guard's limits of joints 1 and 2, and less than its limits of the others
+FASTEST = np.array([1.5, 1.5, 2.0, 2.0, 2.0, 2.0, 2.0])
 HOG = (
     "import os, sys, time; os.sched_setaffinity(0, {int(sys.argv[1])});"
     "os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(90));"
@@ -117,4 +118,4 @@ def test_whatever_stands_still_the_arm_is_not_thrown(tmp_path, victim, seconds):
         assert "Traceback" not in seen.output()
         assert "ARM: idle, braked." in seen.output()
         for speeds in true_speeds(seen.data):
-            assert speeds.max() < FASTEST
+            assert (speeds < FASTEST).all()

@@ -13,11 +13,12 @@ from wam.model import (
     ArmConstants,
     ArmModel,
     Array,
+    straight_way,
 )
 
 OFFSET = 0.03  # rad; a pose is approached from this far on both sides
 UPRIGHT = (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)  # rad; elbow and foot are high
-_STEP = 0.04  # rad between two looks at a path
+STEP = 0.04  # rad between two looks at a path
 _SLACK = 0.002  # m a path may sag below its ends
 
 
@@ -132,14 +133,8 @@ def is_clear(model: ArmModel, start: Array, goal: Array, floor: float) -> bool:
     An end that is lower itself, such as the foot in its container, may be left and
     reached, but nothing on the way is lower than the lower end.
     """
-    heights = lowest(model, way_of(start, goal))
+    heights = lowest(model, straight_way(start, goal, STEP))
     return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK)
-
-
-def way_of(start: Array, goal: Array) -> NDArray[np.float64]:
-    """Return joint positions on the straight way, shape (n, 7), n >= 2."""
-    count = 2 + int(np.abs(goal - start).max() / _STEP)
-    return start + np.linspace(0.0, 1.0, count)[:, None] * (goal - start)
 
 
 def elbow_of(constants: ArmConstants, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,15 +8,15 @@ import numpy as np
 from acquisition import SettingsError
 from wam.calibration.free_space import (
     OFFSET,
+    STEP,
     UPRIGHT,
     FreeSpace,
     check_rise,
     elbow_of,
     lowest,
-    way_of,
 )
 from wam.control import TOP_SPEED, JointMove
-from wam.model import ArmModel, Array, regressor
+from wam.model import ArmModel, Array, regressor, straight_way
 
 APPROACH_SPEED = 0.05  # rad/s, on the last bit
 POINT_SPEED = 0.3  # m/s of sole and elbow; the safety module warns at 0.5
@@ -139,7 +139,7 @@ def plan_halts(
 
 def leg_speed(model: ArmModel, start: Array, goal: Array) -> float:
     """Return the joint speed [rad/s] at which sole and elbow stay below 0.3 m/s."""
-    path = way_of(start, goal)
+    path = straight_way(start, goal, STEP)
     points = (model.sole_path(path).position, elbow_of(model.constants, path))
     steps = [np.linalg.norm(np.diff(p, axis=0), axis=1).max() for p in points]
     turned = float(np.abs(goal - start).max()) / (len(path) - 1)  # rad per step

@@ -6,6 +6,7 @@ from .clearance import (
     ArmClearance,
     BodyGap,
     ObstacleBox,
+    straight_way,
 )
 from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
 from .gravity import VirtualMass, compensation, gravity_model
@@ -36,6 +37,7 @@ __all__ = [
     "load_constants",
     "regressor",
     "sensor_body",
+    "straight_way",
     "tool_metadata",
     "tool_of",
     "urdf",

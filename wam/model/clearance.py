@@ -144,9 +144,12 @@ class ArmClearance:
         return self._shapes.geometryObjects[index].name
 
 
-def straight_way(start: Array, goal: Array) -> NDArray[np.float64]:
-    """Return joint positions [rad] on the straight way, shape (n, 7)."""
-    count = 2 + int(np.abs(goal - start).max() / STEP)
+def straight_way(start: Array, goal: Array, step: float = STEP) -> NDArray[np.float64]:
+    """Return joint positions on the straight way, shape (n, 7), n >= 2.
+
+    No joint turns by more than `step` [rad] between two of them.
+    """
+    count = 2 + int(np.abs(goal - start).max() / step)
     return start + np.linspace(0.0, 1.0, count)[:, None] * (goal - start)
 
 

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data import tables
-from analysis.data.tables import load_tables, parse_columns
+from analysis.data.columns import parse_columns, parse_units
+from analysis.data.tables import load_tables
 from analysis.data.terrain_kinds import parse_stones
-from analysis.data.units import parse_units
 
 GOOD = "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
 
@@ -85,6 +85,21 @@ def test_units_unknown_or_contradicted_are_refused(tmp_path, header, units, reas
     path = write(tmp_path, GOOD.replace("v_t", header))
     with pytest.raises(SettingsError, match=reason):
         load_tables([path], units=units)
+
+
+@pytest.mark.parametrize(
+    "header", ["t,v_t [m/s],v_t [mm/s],F_n,F_t", "t,v_t,v_t,F_n,F_t"]
+)
+def test_a_column_that_stands_there_twice_is_refused(tmp_path, header):
+    path = write(tmp_path, header + "\n0,0.1,100,2,1\n1,0.1,100,2,1\n2,0.1,100,2,1\n")
+    with pytest.raises(SettingsError, match="v_t stands there twice"):
+        load_tables([path])
+
+
+def test_a_number_with_comma_and_point_is_refused(tmp_path):
+    path = write(tmp_path, "t;v_t;F_n;F_t\n0;0.1;1,234.5;1\n1;0.1;2;1\n2;0.1;2;1\n")
+    with pytest.raises(SettingsError, match="a comma and a point"):
+        load_tables([path])
 
 
 @pytest.mark.parametrize("text", ["v_t", "v_t=km/h", "x=m", "v_t=N"])

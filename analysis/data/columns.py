@@ -1,4 +1,4 @@
-"""Units of a table's columns, from its header or from the command line."""
+"""Columns of a table: their names and units, of its header or of the command line."""
 
 import re
 from collections.abc import Mapping
@@ -17,6 +17,26 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "F_t": _FORCES,
 }
 _HEADER = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
+
+
+def parse_columns(text: str) -> dict[str, str]:
+    """Return the names of the columns from `t=t_s,v_t=vt_mps,...`.
+
+    Columns that are not mentioned keep their own name.
+
+    Raises:
+        SettingsError: a part is not NAME=COLUMN, or names no column of the analysis.
+    """
+    columns = {name: name for name in COLUMNS}
+    for part in filter(None, text.split(",")):
+        name, equals, column = (piece.strip() for piece in part.partition("="))
+        if not (equals and column) or name not in columns:
+            raise SettingsError(
+                f"--columns {text}: {part!r} does not name a column.",
+                hint="Write e.g. --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N",
+            )
+        columns[name] = column
+    return columns
 
 
 def parse_units(text: str) -> dict[str, str]:
