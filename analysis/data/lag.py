@@ -22,6 +22,7 @@ LONGEST = 0.05  # s
 EXPLAINED = 0.5  # of the force's variance in the band, below which nothing is said
 _SLOWEST_RATE = 200.0  # Hz
 _SHORTEST = 1.0  # s of a trial
+_SPARSEST = 2  # times the rows that there would be without gaps
 _ORDER = 2  # of the band's filter
 _SINGULAR = 1e12  # condition number: a foot that never moves
 
@@ -49,11 +50,14 @@ def force_lag(t: Array, v_t: Array, F_t: Array) -> ForceLag | None:
     """
     steps = np.diff(t)
     rate = float(1.0 / np.median(steps))
-    if rate < _SLOWEST_RATE or t.size < _SHORTEST * rate:
+    count = round((t[-1] - t[0]) * rate) + 1
+    if rate < _SLOWEST_RATE or t.size < _SHORTEST * rate or count > _SPARSEST * t.size:
         return None
+    even = t[0] + np.arange(count) / rate  # a lost row is no shift of those behind it
+    rows = (even, np.interp(even, t, v_t), np.interp(even, t, F_t))
     with np.errstate(all="ignore"):  # absurd numbers come to nothing by themselves
         for band in BANDS:
-            lag = _in_band((t, v_t, F_t), rate, band)
+            lag = _in_band(rows, rate, band)
             if lag.explained >= EXPLAINED:
                 return lag
     return None

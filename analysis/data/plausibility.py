@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.data.load import RecordedTrial
 from analysis.data.prepare import PreparedTrial, Smoothed
@@ -19,6 +20,8 @@ PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
 FEWEST = 20  # moving samples below which nothing is judged
 FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
 LATEST_MS = 3.0  # of the force against the motion, its time stamps' age apart
+SHORTEST = 0.05  # m of a way that has a direction
+HEADING, INCLINE = 5.0, 4.0  # degrees that a way may differ from the container's
 FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
@@ -32,7 +35,7 @@ class Doubt:
 
     Attributes:
         name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment",
-            "unit", "lag" or "swapped".
+            "unit", "lag", "swapped", "incline" or "heading".
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
@@ -66,8 +69,8 @@ def doubts_of(trial: PreparedTrial) -> list[Doubt]:
 def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     """Return why a recording cannot be that of a foot that is pushed along x_T.
 
-    It sees what velocity and two forces do not show: the force across the way, and the
-    moment.
+    It sees what velocity and two forces do not show: the force across the way, the
+    moment, and the way of the sole itself.
     """
     v_t, F_t, F_n = recorded.traction.T
     moving = (np.abs(v_t) > SLOWEST) & (F_n > PRESSED)
@@ -76,6 +79,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
     raw = np.ascontiguousarray(recorded.cycles["wrench_raw"][moving])
     wrench = recorded.payload.contact(raw, recorded.rotation[moving])
     return [
+        *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
         *_free_moment(wrench[:, :3], wrench[:, 3:]),
     ]
@@ -175,6 +179,37 @@ def _signs(v: Array, load: Array, along: Array) -> Iterator[Doubt]:
             f"median F_t/F_n {ratio:.2g} is outside {FRICTION[0]:g} to {FRICTION[1]:g}",
             "F_t and F_n are swapped, or the tare or a calibration is wrong",
         )
+
+
+def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
+    """Hold the way of the sole against the plane and the heading of the container."""
+    ahead, aside, above = (
+        (recorded.sole[moving] - np.array(recorded.frame.far_end))
+        @ recorded.frame.axes().T
+    ).T
+    if np.ptp(ahead) < SHORTEST:
+        return
+    turned, tilted = (
+        float(np.degrees(np.arctan(np.polyfit(ahead, other, 1)[0])))
+        for other in (aside, above)
+    )
+    for name, angle, limit, what in (
+        ("heading", turned, HEADING, "the container stands askew, or its heading is"),
+        (
+            "incline",
+            tilted,
+            INCLINE,
+            "the plane is inclined otherwise, or its incline is",
+        ),
+    ):
+        if abs(angle) > limit:
+            yield Doubt(
+                name,
+                f"the sole's way is {angle:+.1f} degrees off the container's "
+                f"{name} (limit {limit:g})",
+                f"{what} entered wrong",
+                "traction calibrate terrain",
+            )
 
 
 def _sideways(lateral: Array, along: Array) -> Iterator[Doubt]:

@@ -54,6 +54,15 @@ def test_an_offset_is_found_at_other_rates(rate):
     assert lag.seconds == pytest.approx(0.008, abs=1e-3)
 
 
+@pytest.mark.parametrize("every", [7, 10, 100])
+def test_lost_rows_are_no_offset(every):
+    series = jamming(0.004)
+    left = np.arange(series.t.size) % every != 0
+    lag = force_lag(series.t[left], series.v_t[left], series.F_t[left])
+    assert lag is not None
+    assert lag.seconds == pytest.approx(0.004, abs=1e-3)
+
+
 @pytest.mark.parametrize("terrain", ["S0", "B10"])
 def test_trials_of_another_program_come_within_three_milliseconds(
     slice_trials, terrain

@@ -3,32 +3,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
-from acquisition.trial_file.writer import TrialHeader, TrialWriter
 from analysis.data.lag import ForceLag
 from experiments.operator.console import GOOD, WARNING
 from experiments.trial.quality import review_trial
-
-
-def rewrite(source, path, cycles):
-    """Write `cycles` with the metadata and attachments of another trial."""
-    reader = TrialReader(source)
-    clock = reader.metadata["clock"]
-    trial = {k: v for k, v in reader.metadata["trial"].items() if k != "format_version"}
-    header = TrialHeader(
-        trial=trial,
-        utc_offset_ns=int(clock["utc_offset_ns"]),
-        offset_uncertainty_ns=int(clock["offset_uncertainty_ns"]),
-        provenance={},
-        attachments=reader.attachments,
-        robot_description="",
-    )
-    writer = TrialWriter(path, header)
-    writer.write_cycles(cycles)
-    seal(writer, "key")
-    return path
+from tests.disturbances.rewriting import rewrite
 
 
 @pytest.fixture

@@ -1,0 +1,123 @@
+"""What becomes of disturbed trials, by the path that a user's data take."""
+
+import tarfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from acquisition.errors import TractionError
+from acquisition.trial_file.reader import TrialReader
+from analysis.data.load import load_trial
+from analysis.data.plausibility import doubts_of
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.quality import quick_ratio
+from analysis.data.series import Array
+from analysis.data.tables import load_tables
+from experiments.operator.console import GOOD
+from experiments.trial.quality import review_trial
+from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
+from tests.disturbances.rewriting import rewrite
+from tests.disturbances.rows import Outcome, Recording, RecordingRow, TableRow
+
+DATA = Path(__file__).parents[1] / "data"
+RECORDED = DATA / "recorded" / "session-0.1.tar.xz"
+TRIALS = {"S0": "S0/00", "TF": "TF/05"}
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What became of a disturbed trial.
+
+    Attributes:
+        outcome: whether it was refused or flagged; harmless where nothing was said.
+        words: what was said.
+        changed: share by which F_t/F_n is another; 0 where there is none.
+    """
+
+    outcome: Outcome
+    words: str
+    changed: float
+
+
+def see_table(row: TableRow) -> Seen:
+    """Return what becomes of a table, as `traction fit` reads and doubts it."""
+    with np.load(DATA / "rehearsal_slice.npz") as arrays:
+        table = arrays[TRIALS[row.terrain]].astype(float)
+    with TemporaryDirectory() as folder:
+        try:
+            words, ratio = _fitted(Path(folder), row.disturb(table.copy()), row)
+        except TractionError as error:
+            words = f"{error.message} {error.hint or ''}".replace(f"{folder}/", "")
+            return Seen(Outcome.REFUSED, words.strip(), 0.0)
+        _, before = _fitted(Path(folder), table, None)
+    outcome = Outcome.FLAGGED if words else Outcome.HARMLESS
+    return Seen(outcome, words, abs(ratio / before - 1.0))
+
+
+def _fitted(folder: Path, table: Array, row: TableRow | None) -> tuple[str, float]:
+    """Return (what is said of a table, F_t/F_n).
+
+    Raises:
+        TractionError: it is refused.
+    """
+    if row is not None and row.header:
+        path = folder / "table.csv"
+        np.savetxt(path, table, delimiter=",", header=row.header, comments="")
+    else:
+        path = folder / "table.npz"
+        np.savez(path, **{"S0/00": table})
+    (series,) = next(iter(load_tables([path]).values()))
+    trial = prepare_trial(series, PrepareOptions())
+    doubts = [f"{doubt.name}: {doubt.text}" for doubt in doubts_of(trial)]
+    if trial.dropped_rows:
+        doubts.append("rows were not finite")
+    if trial.repeated_rows:
+        doubts.append("rows were there twice")
+    if not trial.kept and not doubts:
+        raise TractionError("No sample is left to fit.")
+    return "; ".join(doubts), quick_ratio(trial)
+
+
+@contextmanager
+def recorded_trial() -> Iterator[Path]:
+    """Unpack the trial that version 0.1 recorded."""
+    with TemporaryDirectory() as folder:
+        with tarfile.open(RECORDED) as archive:
+            archive.extractall(folder, filter="data")
+        paths = Path(folder).rglob("trials/T*.mcap")
+        yield min(path for path in paths if "truth" not in path.name)
+
+
+def see_recording(row: RecordingRow, source: Path) -> Seen:
+    """Return what becomes of a recorded trial, as the review shows it."""
+    trial, before = load_trial(source), review_trial(source)
+    recording = row.disturb(
+        Recording(
+            TrialReader(source).cycles().data.copy(),
+            trial.payload,
+            trial.frame,
+            trial.sole_point,
+        )
+    )
+    attachments = {
+        "ft_calibration.toml": payload_to_toml(recording.payload, recording.sole),
+        "terrain.toml": terrain_to_toml(trial.terrain, recording.frame, {}),
+    }
+    with TemporaryDirectory() as folder:
+        path = rewrite(
+            *(source, Path(folder) / "T01.mcap", recording.cycles),
+            {name: text.encode() for name, text in attachments.items()},
+        )
+        try:
+            after = review_trial(path)
+        except TractionError as error:
+            return Seen(Outcome.REFUSED, error.message, 0.0)
+    said = [text for mark, text in after.lines() if mark != GOOD]
+    usual = [text for mark, text in before.lines() if mark != GOOD]
+    new = [text for text in said if text not in usual]
+    outcome = Outcome.FLAGGED if new else Outcome.HARMLESS
+    return Seen(outcome, "; ".join(new), abs(after.ratio / before.ratio - 1.0))

@@ -1,0 +1,49 @@
+"""The table of disturbances as a page, measured when it is made."""
+
+from tests.disturbances.measure import Seen, recorded_trial, see_recording, see_table
+from tests.disturbances.rows import RECORDINGS, TABLES, Outcome
+
+HEAD = """\
+# Disturbances
+
+What can be wrong with a trial without a single fault being raised, and what comes of
+it. None passes in silence: it is refused, flagged with its likely cause, or harmless,
+and then a number says how harmless. Made by
+`python -m tests.disturbances > docs/disturbances.md`; held by `tests/disturbances`.
+Known to pass in silence: F_n and F_t swapped in a table from a smooth plate, where no
+slip shows which force moves the foot.
+"""
+_LONGEST = 160  # characters of what was said
+
+
+def page() -> str:
+    """Return the page."""
+    tables = [(row.name, see_table(row)) for row in TABLES]
+    with recorded_trial() as path:
+        recordings = [(row.name, see_recording(row, path)) for row in RECORDINGS]
+    return "\n".join(
+        [
+            HEAD,
+            *_table("Tables, as `traction fit` reads them", tables),
+            "",
+            *_table("Recorded trials, as the review shows them", recordings),
+            "",
+        ]
+    )
+
+
+def _table(title: str, rows: list[tuple[str, Seen]]) -> list[str]:
+    return [
+        f"## {title}",
+        "",
+        "| what is wrong | what comes of it | said, or change of F_t/F_n |",
+        "| --- | --- | --- |",
+        *(f"| {name} | {seen.outcome.value} | {_said(seen)} |" for name, seen in rows),
+    ]
+
+
+def _said(seen: Seen) -> str:
+    if seen.outcome is Outcome.HARMLESS:
+        return f"{seen.changed:.1%}"
+    words = seen.words.replace("|", "/")
+    return words if len(words) <= _LONGEST else words[: _LONGEST - 3] + "..."

@@ -1,0 +1,256 @@
+"""What can be wrong with a trial, and what has to come of it: one table."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from acquisition.sample import Flag, Record
+from analysis.data.series import Array
+from ft_sensor import Payload, TerrainFrame
+
+T, V, N, F = range(4)  # columns of a table
+
+
+class Outcome(Enum):
+    """What becomes of a disturbed trial."""
+
+    REFUSED = "refused"
+    FLAGGED = "flagged"
+    HARMLESS = "harmless"
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A recorded trial as a disturbance changes it."""
+
+    cycles: Record
+    payload: Payload
+    frame: TerrainFrame
+    sole: Array
+
+
+@dataclass(frozen=True, slots=True)
+class TableRow:
+    """A disturbance of a table of t, v_t, F_n and F_t.
+
+    Attributes:
+        name: what is wrong.
+        disturb: what it does to a table (n, 4).
+        outcome: what has to come of it.
+        word: in the refusal or the warning; of a harmless one the largest share by
+            which F_t/F_n may change.
+        terrain: whose trial is disturbed.
+        header: of the table, where it is a CSV.
+    """
+
+    name: str
+    disturb: Callable[[Array], Array]
+    outcome: Outcome
+    word: str | float
+    terrain: str = "S0"
+    header: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingRow:
+    """A disturbance of a recorded trial; the rest as `TableRow`."""
+
+    name: str
+    disturb: Callable[[Recording], Recording]
+    outcome: Outcome
+    word: str | float
+
+
+def times(column: int, factor: float) -> Callable[[Array], Array]:
+    """Return what multiplies a column."""
+
+    def disturb(table: Array) -> Array:
+        table[:, column] *= factor
+        return table
+
+    return disturb
+
+
+def late(rows: int) -> Callable[[Array], Array]:
+    """Return what brings the forces later by so many rows of 2 ms."""
+    return lambda table: np.column_stack([table[rows:, :2], table[:-rows, 2:]])
+
+
+def swapped(table: Array) -> Array:
+    """Swap F_n and F_t."""
+    return table[:, [T, V, F, N]]
+
+
+def jumped(table: Array) -> Array:
+    """Let the clock jump by a second in the middle."""
+    table[len(table) // 2 :, T] += 1.0
+    return table
+
+
+def backward(table: Array) -> Array:
+    """Let the clock go back by a second in the middle."""
+    table[len(table) // 2 :, T] -= 1.0
+    return table
+
+
+def clipped(table: Array) -> Array:
+    """Let the sensor end at a third of its largest traction."""
+    table[:, F] = np.minimum(table[:, F], table[:, F].max() / 3.0)
+    return table
+
+
+def spoilt(table: Array) -> Array:
+    """Lose every tenth row."""
+    table[::10, F] = np.nan
+    return table
+
+
+REFUSED, FLAGGED, HARMLESS = Outcome
+TABLES = (
+    TableRow("nothing", lambda table: table, HARMLESS, 0.0),
+    TableRow("F_t with the other sign", times(F, -1.0), FLAGGED, "ratio"),
+    TableRow("F_n with the other sign", times(N, -1.0), FLAGGED, "normal"),
+    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "direction"),
+    TableRow("v_t in mm/s", times(V, 1e3), FLAGGED, "--unit v_t=mm/s"),
+    TableRow("time in ms", times(T, 1e3), FLAGGED, "--unit t=ms"),
+    TableRow("F_n in mN", times(N, 1e3), FLAGGED, "--unit F_n=mN"),
+    TableRow("F_n in kN", times(N, 1e-3), FLAGGED, "--unit F_n=kN"),
+    TableRow("F_t in mN, F_n in N", times(F, 1e3), FLAGGED, "friction"),
+    TableRow("F_n and F_t swapped", swapped, FLAGGED, "swapped"),
+    TableRow("force 20 ms late", late(10), FLAGGED, "--what-if lag=2"),
+    TableRow("force 8 ms late", late(4), FLAGGED, "lag"),
+    TableRow("clock jumps by 1 s", jumped, HARMLESS, 0.01),
+    TableRow("clock goes back by 1 s", backward, REFUSED, "time does not increase"),
+    TableRow("every tenth row is no number", spoilt, FLAGGED, "not finite"),
+    TableRow("each row twice", lambda x: np.repeat(x, 2, 0), FLAGGED, "there twice"),
+    TableRow("zeros", lambda x: x * [1.0, 0, 0, 0], REFUSED, "No sample"),
+    TableRow("five rows", lambda x: x[:5], REFUSED, "No sample"),
+    TableRow("100 Hz", lambda x: x[::5], HARMLESS, 0.05),
+    TableRow("a smooth plate at 100 Hz", lambda x: x[::5], HARMLESS, 0.03, "TF"),
+    TableRow(
+        "units stated in the header",
+        times(V, 1e3),
+        *(HARMLESS, 1e-6, "S0", "t [s],v_t [mm/s],F_n [N],F_t [N]"),
+    ),
+    TableRow(
+        "a unit that there is not",
+        times(V, 1.0),
+        *(REFUSED, "no unit", "S0", "t,v_t [kn],F_n,F_t"),
+    ),
+    TableRow("a column twice", times(V, 1.0), REFUSED, "twice", "S0", "t,F_n,F_n,F_t"),
+)
+
+
+def turned(degrees: float) -> Callable[[Recording], Recording]:
+    """Return what turns the sensor about its z axis; it was tared like this."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    once = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    both = np.kron(np.eye(2), once)
+
+    def disturb(recording: Recording) -> Recording:
+        cycles, bias = recording.cycles.copy(), recording.payload.bias
+        cycles["wrench_raw"] = (cycles["wrench_raw"] - bias) @ both.T + bias
+        return replace(recording, cycles=cycles)
+
+    return disturb
+
+
+def heavier(share: float) -> Callable[[Recording], Recording]:
+    """Return what makes the foot heavier than rig.toml says; the tare was taken so."""
+
+    def disturb(recording: Recording) -> Recording:
+        payload = recording.payload
+        other = replace(payload, mass=payload.mass / (1.0 + share))
+        upright = np.diag([1.0, -1.0, -1.0])  # frame 7 points down at a tare
+        missed = payload.weight(upright) - other.weight(upright)
+        return replace(
+            recording, payload=replace(other, bias=payload.bias + payload.sign * missed)
+        )
+
+    return disturb
+
+
+def moved(**changes: float) -> Callable[[Recording], Recording]:
+    """Return what enters the container wrong: incline or heading [degrees]."""
+
+    def disturb(recording: Recording) -> Recording:
+        frame = recording.frame
+        angles = {
+            name: getattr(frame, name) + np.radians(degrees)
+            for name, degrees in changes.items()
+        }
+        return replace(recording, frame=replace(frame, **angles))
+
+    return disturb
+
+
+def tared_on_the_ground(recording: Recording) -> Recording:
+    """Let the foot have stood on the ground with 8 N when it was tared."""
+    bias = recording.payload.bias.copy()
+    bias[2] -= 8.0 * recording.payload.sign
+    return replace(recording, payload=replace(recording.payload, bias=bias))
+
+
+def of_cycles(change: Callable[[Record], None]) -> Callable[[Recording], Recording]:
+    """Return a disturbance of the cycles."""
+
+    def disturb(recording: Recording) -> Recording:
+        cycles = recording.cycles.copy()
+        change(cycles)
+        return replace(recording, cycles=cycles)
+
+    return disturb
+
+
+def swap_moments(cycles: Record) -> None:
+    cycles["wrench_raw"] = cycles["wrench_raw"][:, [0, 1, 2, 4, 3, 5]]
+
+
+def saturate(cycles: Record) -> None:
+    rows = slice(len(cycles) // 2, None, 3)
+    cycles["flags"][rows] |= np.uint32(Flag.FT_SATURATED)
+
+
+def go_stale(cycles: Record) -> None:
+    cycles["flags"][len(cycles) // 2 :: 2] &= ~np.uint32(Flag.FT_FRESH)
+
+
+def jump(cycles: Record) -> None:
+    cycles["host_ns"][len(cycles) // 2 :] += np.uint64(1_000_000_000)
+
+
+def turn_foot(cycles: Record) -> None:
+    cycles["position"][len(cycles) // 2 :, 6] += 0.1
+
+
+def zero_wrong(cycles: Record) -> None:
+    cycles["position"][:, 3] += np.radians(10.0)
+
+
+RECORDINGS = (
+    RecordingRow("nothing", lambda r: r, HARMLESS, 0.0),
+    RecordingRow("sensor turned by 180 degrees", turned(180.0), FLAGGED, "turned"),
+    RecordingRow("sensor turned by 90 degrees", turned(90.0), FLAGGED, "turned by 90"),
+    RecordingRow("sensor turned by 5 degrees", turned(5.0), HARMLESS, 0.03),
+    RecordingRow(
+        "axes of the moment swapped", of_cycles(swap_moments), FLAGGED, "moment"
+    ),
+    RecordingRow("foot 5 % heavier than entered", heavier(0.05), HARMLESS, 0.01),
+    RecordingRow("foot 20 % heavier than entered", heavier(0.2), HARMLESS, 0.03),
+    RecordingRow(
+        "tared with the foot on the ground", tared_on_the_ground, FLAGGED, "tare"
+    ),
+    RecordingRow("incline wrong by 6 degrees", moved(incline=6.0), FLAGGED, "incline"),
+    RecordingRow("incline wrong by 2 degrees", moved(incline=2.0), HARMLESS, 0.15),
+    RecordingRow("heading wrong by 8 degrees", moved(heading=8.0), FLAGGED, "heading"),
+    RecordingRow("heading wrong by 4 degrees", moved(heading=4.0), HARMLESS, 0.02),
+    RecordingRow("an axis saturated", of_cycles(saturate), FLAGGED, "saturated"),
+    RecordingRow("force samples stale", of_cycles(go_stale), FLAGGED, "stale"),
+    RecordingRow("clock jumps by 1 s", of_cycles(jump), FLAGGED, "worst gap"),
+    RecordingRow("foot loose by 0.1 rad", of_cycles(turn_foot), FLAGGED, "joint 7"),
+    RecordingRow(
+        "joint 4 zeroed 10 degrees off", of_cycles(zero_wrong), HARMLESS, 0.08
+    ),
+)
