@@ -19,7 +19,7 @@ from fakes.pucks import (
     PendantAction,
     PuckNetwork,
 )
-from fakes.randomness import trial_generators
+from fakes.randomness import TrialGenerators, trial_generators
 from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
@@ -129,7 +129,7 @@ class FakeRig:
         chosen = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:
             chosen = replace(chosen, has_sensor=True)
-        self.rake(0)
+        self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
@@ -199,15 +199,21 @@ class FakeRig:
             self.stream.go_silent()
 
     def rake(self, trial: int) -> None:
-        """Rake the bed for `trial`: everything random starts anew."""
+        """Rake the bed for `trial`: ground and hand start anew.
+
+        The sensor's errors go on; what they draw from here on is the trial's own.
+        """
+        self.random = self._rake(trial)
+        self.errors.draw_from(self.random.sensor)
+
+    def _rake(self, trial: int) -> TrialGenerators:
         scene = self.scene
-        self.random = trial_generators(scene.seed, scene.terrain, trial)
+        random = trial_generators(scene.seed, scene.terrain, trial)
         self.ground = Container(
-            make_terrain(
-                scene.stones, scene.foot, scene.frame.incline, self.random.ground
-            )
+            make_terrain(scene.stones, scene.foot, scene.frame.incline, random.ground)
         )
         self.plant.terrain = self.ground
+        return random
 
 
 def _place(number: int, travel: float) -> tuple[float, float]:
@@ -242,11 +248,7 @@ class LocalSimulation:
         self.rig.rake(trial)
 
     def lift(self) -> None:
-        """Let the hand carry the foot above the far end and hold it still for a tare.
-
-        The sensor shows its offset and noise only, until the next push.
-        """
-        self.rig.errors.settle()
+        """Let the hand carry the foot above the far end and hold it still."""
         self.rig.plant.hand.lift_to_start()
 
     def rest(self) -> None:
@@ -272,11 +274,9 @@ class LocalSimulation:
         self.rig.plant.hand.touch(x, y, ground)
 
     def push(self) -> None:
-        """Let the hand push the foot across; the tare error of a trial begins here."""
-        rig = self.rig
-        rig.errors.new_trial(rig.random.sensor)
-        rig.plant.hand.push(self._pace, rig.random.hand)
-        rig.plant.start_truth()
+        """Let the hand push the foot across."""
+        self.rig.plant.hand.push(self._pace, self.rig.random.hand)
+        self.rig.plant.start_truth()
 
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""

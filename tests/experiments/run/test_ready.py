@@ -150,7 +150,8 @@ def test_the_end_brackets_the_drift_of_the_force(recorded):
     assert len(tares) == 3  # one before each trial, one at the end
     drift = json.loads((recorded.folder / "session.json").read_text())["force_drift"]
     assert drift == pytest.approx(np.subtract(tares[-1], tares[0])[:3], abs=6e-4)
-    assert 0.0 < np.abs(drift).max() < 0.1  # noise of two means of a second
+    # Two tares of a sensor that drifts by 0.24 N: 0.34 N rms between them.
+    assert 0.0 < np.abs(drift).max() < 1.4
     (line,) = [x for x in recorded.done.out.splitlines() if "drifted" in x]
     assert line.endswith("fx {:+.2f}  fy {:+.2f}  fz {:+.2f}".format(*drift))
 
