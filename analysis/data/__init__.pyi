@@ -15,6 +15,7 @@ from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, sugges
 from .samples import SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
 from .tables import load_tables
+from .tare_bracket import TareBracket
 from .terrain_kinds import (
     BIG,
     FLAT,
@@ -45,6 +46,7 @@ __all__ = [
     "SampleTable",
     "Slip",
     "Smoothed",
+    "TareBracket",
     "TractionSeries",
     "TrainingSet",
     "coverage",

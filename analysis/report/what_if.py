@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from acquisition import SettingsError
-from analysis.data import Frame
+from analysis.data import Frame, RecordedTrial, TractionSeries
 from analysis.figures import ReportSection
 from analysis.report.further_tables import paired_cell
 from analysis.report.page_model import ReportTable
@@ -29,6 +29,7 @@ VALUES = {
     "smoothing": "an odd number of samples, e.g. smoothing=15",
     "window": "slowest:fastest in m/s, e.g. window=0.01:0.2",
     "frame": "sole or terrain",
+    "drift": "interpolated (between the tares) or first (the tare before the trial)",
     "kernel": "as_printed (eq. 5 without 1 +) or default",
     "static_friction": "proportional (F_s = f_s F_n) or constant",
 }
@@ -46,6 +47,7 @@ class StudyVariant:
         models: names of the models that it touches.
         frame: the frame that forces are projected on.
         change: from the options of the study to those of the repeated one.
+        is_interpolated: the sensor's zero lies on a line between two tares.
     """
 
     key: str
@@ -53,11 +55,17 @@ class StudyVariant:
     models: tuple[str, ...]
     frame: Frame
     change: Callable[[StudyOptions], StudyOptions]
+    is_interpolated: bool = False
 
     @property
     def text(self) -> str:
         """The choice as it was given."""
         return f"{self.key}={self.value}"
+
+    def series(self, trial: RecordedTrial) -> TractionSeries:
+        """Return what the models get of a trial under the choice."""
+        chosen = trial.interpolated() if self.is_interpolated else trial
+        return chosen.series(self.frame)
 
     def options(self, before: StudyOptions) -> StudyOptions:
         """Return the options of the repeated study, only of the models it touches."""
@@ -212,6 +220,18 @@ def _frame(value: str) -> StudyVariant:
     )
 
 
+def _drift(value: str) -> StudyVariant:
+    is_interpolated = _one_of(value, "interpolated", "first")
+    return StudyVariant(
+        "drift",
+        value,
+        tuple(FITTERS),
+        "terrain",
+        lambda options: options,
+        is_interpolated=is_interpolated,
+    )
+
+
 def _kernel(value: str) -> StudyVariant:
     printed = _one_of(value, "as_printed", "default")
     return StudyVariant(
@@ -248,6 +268,7 @@ _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
     "smoothing": _smoothing,
     "window": _window,
     "frame": _frame,
+    "drift": _drift,
     "kernel": _kernel,
     "static_friction": _static_friction,
 }

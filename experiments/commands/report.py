@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="repeat the study under another choice and show both: smoothing=N, "
-        "window=LOW:HIGH, frame=sole, kernel=as_printed, "
+        "window=LOW:HIGH, frame=sole, drift=interpolated, kernel=as_printed, "
         "static_friction=proportional; more than once for several",
     )
     add_allow_missing(parser)

@@ -207,7 +207,7 @@ def repeated(
     """Return the study once more under a choice."""
     console.say(f"What if {choice.text}: fitting ...")
     series = {
-        name: [t.series(choice.frame) for t in group]
+        name: [choice.series(trial) for trial in group]
         for name, group in analysed.trials.items()
     }
     options = choice.options(analysed.study.options)

@@ -22,6 +22,7 @@ from analysis.study.study import StudyOptions, run_study
         "window=0:0.1",
         "window=nan:0.1",
         "frame=base",
+        "drift=constant",
         "kernel=cubic",
         "static_friction=none",
     ],
@@ -45,6 +46,8 @@ def test_choices_change_what_they_name_and_nothing_else():
     proportional = parse_choice("static_friction=proportional").options(before)
     assert proportional.fit.form.is_proportional
     assert parse_choice("frame=sole").frame == "sole"
+    assert parse_choice("drift=interpolated").is_interpolated
+    assert not parse_choice("drift=first").is_interpolated
 
 
 def test_only_models_that_a_choice_touches_are_fitted_again():
