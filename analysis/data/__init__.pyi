@@ -11,7 +11,16 @@ from .prepare import (
     moving_average,
     prepare_trial,
 )
-from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, suggest
+from .quality import (
+    JOINT7_WARNING,
+    PULLED_WARNING,
+    SENSOR_ERROR,
+    CoverageGrid,
+    coverage,
+    quick_ratio,
+    share_below,
+    suggest,
+)
 from .samples import SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
 from .tables import load_tables
@@ -34,6 +43,8 @@ __all__ = [
     "LEVELS",
     "MINIMUM_KEPT",
     "MINIMUM_TRAVEL_SHARE",
+    "PULLED_WARNING",
+    "SENSOR_ERROR",
     "SMALL",
     "Array",
     "CoverageGrid",
@@ -63,6 +74,7 @@ __all__ = [
     "parse_units",
     "prepare_trial",
     "quick_ratio",
+    "share_below",
     "suggest",
     "summed_up",
     "terrain_kind",

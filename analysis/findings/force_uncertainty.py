@@ -21,7 +21,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from analysis.data import Array, RecordedTrial
+from analysis.data import Array, RecordedTrial, TareBracket
 
 _MEAN_KEEPS = 1.0 / 3.0  # of the variance of a sample, in the mean of a trial
 _LINE_SAMPLE, _LINE_MEAN = 2.0 / 3.0, 1.0 / 2.0  # of a tare's variance, between two
@@ -80,9 +80,13 @@ def tare_changes(trials: Sequence[RecordedTrial]) -> list[Array | None]:
         if _session(first) == _session(second):
             following[k] = second.payload.bias[:3] - first.payload.bias[:3]
     return [
-        following.get(k) if trial.bracket is None else trial.bracket.change[:3]
+        following.get(k) if trial.bracket is None else _of_force(trial.bracket)
         for k, trial in enumerate(trials)
     ]
+
+
+def _of_force(bracket: TareBracket) -> Array:
+    return bracket.change[:3]
 
 
 def uncertainties_of(

@@ -20,7 +20,6 @@ from .models import (
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
 from .study import (
-    LIFTED_WARNING,
     Study,
     StudyOptions,
     TerrainResult,
@@ -35,7 +34,6 @@ __all__ = [
     "GP_SE",
     "GP_SE_NOISE",
     "GP_SE_TUSTIN",
-    "LIFTED_WARNING",
     "NAMES",
     "TITLES",
     "TUSTIN",

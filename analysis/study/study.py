@@ -8,6 +8,8 @@ import numpy as np
 from acquisition import SettingsError
 from analysis.data import (
     MINIMUM_KEPT,
+    PULLED_WARNING,
+    SENSOR_ERROR,
     PreparedTrial,
     PrepareOptions,
     SampleTable,
@@ -17,6 +19,7 @@ from analysis.data import (
     find_slips,
     kind_title,
     prepare_trial,
+    share_below,
     summed_up,
     terrain_kind,
 )
@@ -24,8 +27,6 @@ from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask, fit_terrain
-
-LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +109,12 @@ class TerrainResult:
     @property
     def lifted_share(self) -> float:
         """Share of the kept samples with F_n <= 0: the foot off the ground."""
-        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
-        return lifted / self.kept if self.kept else 0.0
+        return share_below(self.trials, 0.0)
+
+    @property
+    def pulled_share(self) -> float:
+        """Share of the kept samples with F_n below zero beyond the sensor's error."""
+        return share_below(self.trials, -SENSOR_ERROR)
 
     def models(self, name: str) -> list[ModelFold]:
         """Return the folds of the model `name`."""
@@ -260,11 +265,11 @@ def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     warnings = []
-    if result.lifted_share > LIFTED_WARNING:
+    if result.pulled_share > PULLED_WARNING:
         warnings.append(
-            f"{result.terrain}: F_n <= 0 in {result.lifted_share:.1%} of the kept "
-            f"samples (limit {LIFTED_WARNING:.0%}). Suspect the tare or the plane of "
-            "the terrain."
+            f"{result.terrain}: F_n <= -{SENSOR_ERROR:g} N, beyond the sensor's error, "
+            f"in {result.pulled_share:.1%} of the kept samples (limit "
+            f"{PULLED_WARNING:.0%}). Suspect the tare or the plane of the terrain."
         )
     short = [k + 1 for k, t in enumerate(result.trials) if not t.is_countable]
     if short:
