@@ -63,6 +63,8 @@ TORQUE_ERRORS = ErrorScale(
 )
 PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth adds
 
+NO_SHIFT: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 _SLOW_NS = 10_000_000  # between two updates of what changes over seconds
 _CREEP_TIME = 20.0  # s
 _LAGGING = 0.05  # of the span: a larger change of load pulls the reading along
@@ -79,6 +81,7 @@ class SensorErrors:
 
     Attributes:
         warmth: how far the sensor is from its usual temperature [degrees Celsius].
+        shift: what a fault has added to the zero [N, N m].
     """
 
     def __init__(
@@ -97,7 +100,7 @@ class SensorErrors:
         self.warmth = self._warmth_sd * normal()
         self._walk = [scale.walk * normal() for scale in scales]
         self._drifts = [scale.drift * normal() for scale in scales]
-        self._jump = np.zeros(6)
+        self.shift = NO_SHIFT
         self._slow = [0.0] * 6
         self._slow_ns: int | None = None
         self._t_ns: int | None = None
@@ -106,11 +109,6 @@ class SensorErrors:
     def draw_from(self, rng: np.random.Generator) -> None:
         """Draw everything random from `rng` from now on; the process goes on."""
         self._normals = NormalStream(rng)
-
-    def jump(self, step: Sequence[float]) -> None:
-        """Shift the zero by `step` [N, N m], six numbers, for good: a fault."""
-        self._jump = self._jump + step
-        self._slow = [a + b for a, b in zip(self._slow, step, strict=True)]
 
     def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
         """Return what is shown at `t_ns` under `wrench` [N, N m], shape (6,)."""
@@ -152,7 +150,7 @@ class SensorErrors:
             keep, kick = exact_step(scale.walk, scale.walk_time, dt)
             walk.append(keep * value + kick * normal())
         self._walk = walk
-        zero = np.array(walk) + self.warmth * np.array(PER_DEGREE) + self._jump
+        zero = np.array(walk) + self.warmth * np.array(PER_DEGREE) + self.shift
         self._slow = (zero + self._load_errors.update(dt, wrench)).tolist()
 
 

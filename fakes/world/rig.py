@@ -26,11 +26,11 @@ from fakes.world.faults import (
     BodyFaults,
     bus_sensor_faults,
     clear_network_faults,
+    clear_stream_faults,
     network_faults,
     stream_faults,
 )
 from ft_sensor import TerrainFrame
-from wam.bus import SENSOR_NODE
 from wam.model import ArmConstants, ArmModel, Array, Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
@@ -178,11 +178,10 @@ class FakeRig:
 
     def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
-        self.stream.recover()
+        clear_stream_faults(self.stream)
         if self._cable is not None:
             self._cable.plug_in()
         self._body.clear_faults()
-        self.network.silence(SENSOR_NODE, is_mute=False)
         clear_network_faults(self.network)
         self._let_lag(0)
 

@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from fakes.sensor.errors import FORCE_ERRORS, ErrorScale, LoadErrors, SensorErrors
+from fakes.sensor.errors import (
+    FORCE_ERRORS,
+    NO_SHIFT,
+    ErrorScale,
+    LoadErrors,
+    SensorErrors,
+)
 
 MS, S = 1_000_000, 1_000_000_000
 NOTHING = {"walk": 0.0, "drift": 0.0, "white": 0.0, "resolution": 0.0}
@@ -92,13 +98,15 @@ def test_a_tare_removes_what_is_there_at_its_moment():
     assert np.std(remains) == pytest.approx(0.31, rel=0.13)
 
 
-def test_a_jump_stays_and_comes_only_when_asked_for():
+def test_a_shifted_zero_stays_until_the_shift_ends():
     errors = make_errors()
-    assert errors.apply(0, FREE)[0] == pytest.approx(0.0, abs=0.1)
-    before = errors.apply(MS, FREE)
-    errors.jump((1.5, 0.0, 0.0, 0.0, 0.0, 0.0))
-    assert errors.apply(2 * MS, FREE)[0] == pytest.approx(before[0] + 1.5)
-    assert errors.apply(S, FREE)[0] == pytest.approx(before[0] + 1.5, abs=0.01)
+    before = errors.apply(0, FREE)[0]
+    errors.shift = (1.5, 0.0, 0.0, 0.0, 0.0, 0.0)
+    # It shows within 10 ms.
+    assert errors.apply(10 * MS, FREE)[0] == pytest.approx(before + 1.5, abs=0.01)
+    assert errors.apply(S, FREE)[0] == pytest.approx(before + 1.5, abs=0.01)
+    errors.shift = NO_SHIFT
+    assert errors.apply(2 * S, FREE)[0] == pytest.approx(before, abs=0.01)
 
 
 def load_errors(**scale) -> LoadErrors:
