@@ -92,8 +92,8 @@ def add_analysis(parser: ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="repeat the study under another choice and show both: smoothing=N, "
-        "window=LOW:HIGH, lag=MS, frame=sole, kernel=as_printed, "
-        "static_friction=proportional; more than once for several",
+        "window=LOW:HIGH, lag=MS, frame=sole, drift=interpolated, "
+        "kernel=as_printed, static_friction=proportional; more than once for several",
     )
 
 

@@ -12,10 +12,20 @@ from .prepare import (
     moving_average,
     prepare_trial,
 )
-from .quality import JOINT7_WARNING, CoverageGrid, coverage, quick_ratio, suggest
+from .quality import (
+    JOINT7_WARNING,
+    PULLED_WARNING,
+    SENSOR_ERROR,
+    CoverageGrid,
+    coverage,
+    quick_ratio,
+    share_below,
+    suggest,
+)
 from .samples import SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
 from .tables import load_tables
+from .tare_bracket import TareBracket
 from .terrain_kinds import (
     BIG,
     FLAT,
@@ -35,6 +45,8 @@ __all__ = [
     "LEVELS",
     "MINIMUM_KEPT",
     "MINIMUM_TRAVEL_SHARE",
+    "PULLED_WARNING",
+    "SENSOR_ERROR",
     "SMALL",
     "Array",
     "CoverageGrid",
@@ -48,6 +60,7 @@ __all__ = [
     "SampleTable",
     "Slip",
     "Smoothed",
+    "TareBracket",
     "TractionSeries",
     "TrainingSet",
     "coverage",
@@ -65,6 +78,7 @@ __all__ = [
     "parse_units",
     "prepare_trial",
     "quick_ratio",
+    "share_below",
     "suggest",
     "summed_up",
     "terrain_kind",

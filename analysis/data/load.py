@@ -4,7 +4,7 @@ The analysis starts again from joint positions and raw wrench with the calibrati
 the file carries, so a better calibration can be applied years later.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -15,6 +15,7 @@ from acquisition import Flag, Record, SettingsError, TrialFileError
 from acquisition.trial_file import TrialReader
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
+from analysis.data.tare_bracket import TareBracket, read_bracket
 from ft_sensor import Payload, TerrainFrame, traction
 from ft_sensor.calibration import payload_from_toml, terrain_from_toml
 from wam.model import ArmConstants, ArmModel, Body, Tool, load_constants
@@ -46,6 +47,7 @@ class RecordedTrial:
         payload: calibration and tare that were applied.
         constants: the arm model that was applied.
         sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
+        bracket: the tares before and after it; None where one is not known.
     """
 
     path: Path
@@ -63,6 +65,7 @@ class RecordedTrial:
     payload: Payload
     constants: ArmConstants
     sole_point: Array
+    bracket: TareBracket | None = None
 
     @property
     def name(self) -> str:
@@ -113,6 +116,23 @@ class RecordedTrial:
         age = float(np.median(ages[fresh])) * 1e-9 if fresh.any() else 0.0
         return age if abs(age) < _LONGEST_AGE else 0.0
 
+    def interpolated(self) -> "RecordedTrial":
+        """Return the trial with the sensor's zero on a line between its two tares.
+
+        The trial itself where one of the tares is not known.
+        """
+        if self.bracket is None:
+            return self
+        drift = self.payload.sign * self.bracket.drift(self.t)
+        force = self.force - self.payload.to_base(drift, self.rotation)
+        axes = self.frame.axes()
+        return replace(
+            self,
+            force=force,
+            traction=traction(axes, self.velocity, force),
+            lateral=force @ axes[1],
+        )
+
     def _on_sole(self) -> Array:
         """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""
         normal = -self.rotation[:, :, 2]
@@ -161,6 +181,12 @@ def load_trial(path: Path) -> RecordedTrial:
         payload=payload,
         constants=at_hand.constants,
         sole_point=at_hand.sole_point,
+        bracket=read_bracket(
+            path,
+            reader.metadata["trial"],
+            payload.bias,
+            int(cycles["host_ns"][0]),
+        ),
     )
     try:
         trial.series()

@@ -26,6 +26,10 @@ _LOAD_WORDS = (
 _AIMS = ((1, 1), (1, 2), (2, 1), (2, 2), (0, 1), (0, 2))
 JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
 ENOUGH = 0.02  # share of the samples a cell should hold
+# In slips the foot hops, and F_n is nothing but the error of a sound sensor. No ground
+# pulls: what is further below zero is the tare's or the plane's.
+SENSOR_ERROR = 0.4  # N
+PULLED_WARNING = 0.03  # share of the kept samples below that
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +77,13 @@ def suggest(grid: CoverageGrid) -> str:
     if shares[emptiest] >= ENOUGH:
         return ""
     return f"{_SPEED_WORDS[emptiest[0]]}, {_LOAD_WORDS[emptiest[1]]}"
+
+
+def share_below(trials: Sequence[PreparedTrial], F_n: float) -> float:
+    """Return the share of the kept samples at `F_n` [N] or below, 0 without samples."""
+    kept = sum(trial.kept for trial in trials)
+    below = sum(int(np.count_nonzero(trial.F_n <= F_n)) for trial in trials)
+    return below / kept if kept else 0.0
 
 
 def quick_ratio(trial: PreparedTrial) -> float:

@@ -5,6 +5,7 @@ from .findings import (
     findings_rows,
     plain_findings,
 )
+from .force_uncertainty import ForceUncertainty, uncertainties_of, uncertainty_of
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
@@ -16,6 +17,7 @@ __all__ = [
     "RESIDUAL_MODELS",
     "SKEW_EDGES",
     "TRACTION_RATIO",
+    "ForceUncertainty",
     "RigTrial",
     "StudyResults",
     "Surface",
@@ -25,4 +27,6 @@ __all__ = [
     "findings_rows",
     "plain_findings",
     "summarise_rig",
+    "uncertainties_of",
+    "uncertainty_of",
 ]

@@ -3,13 +3,18 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, fields
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from acquisition import Flag
 from analysis.data import Array, RecordedTrial, moving_average
+from analysis.findings.force_uncertainty import (
+    ForceUncertainty,
+    tare_changes,
+    uncertainties_of,
+    uncertainty_of,
+)
 from ft_sensor import largest_traction
 from wam.model import GRAVITY
 
@@ -25,6 +30,8 @@ HEALTH_UNITS = {
     "largest_F_t": "N",
     "measurable_F_t": "N",
     "saturated": "1",
+    "noise": "N",
+    "force_uncertainty": "N",
     "floor": "N",
     "load_bias": "N",
     "drag": "N",
@@ -36,7 +43,7 @@ SKEW_EDGES = np.arange(-4.1, 12.2, 0.2)  # ms
 _MOVING = 0.005  # m/s
 _SMOOTHING = 11  # samples, as the models see the trial
 _REST = 0.3  # s at the start of a trial that are at rest by the procedure
-_SHORTEST = 50  # samples that a floor is taken of
+_SHORTEST = 50  # samples that the noise is taken of
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +62,8 @@ class RigTrial:
         skews: cycles by the age of their force sample [SKEW_EDGES], shape (bins,).
         skew: 5 %, 50 % and 95 % of that age: joints later than force [ms].
         tare: force taken off as sensor offset [N], x y z of the sensor.
-        tare_bracket: how far the next trial's tare is from this one's [N]; None where
-            no trial of the session follows.
+        tare_bracket: how far the next tare is from this trial's [N]; None where none
+            followed.
         joint7: largest motion of the locked joint [mrad].
         puck_degc: temperatures of the pucks as last heard [degrees Celsius].
         motor_degc: temperatures of their motors.
@@ -64,7 +71,11 @@ class RigTrial:
         measurable_F_t: largest traction that the sensor can measure at the sole by
             its ranges [N]; None where it did not say.
         saturated: share of cycles whose force sample was out of range [-].
-        floor: standard deviation of smoothed F_t at rest [N]; None without rest.
+        noise: standard deviation of smoothed F_t at rest [N]; None without rest.
+        force_uncertainty: standard uncertainty of mean F_t and F_n by the tares of the
+            session [N]; None without two of them.
+        floor: mean absolute error of smoothed F_t by noise and tares [N], by noise
+            alone where the tares are not known; None without rest.
         load_bias: median F_n of the moving foot less the set load [N].
         drag: what the joints' Coulomb friction asks of the hand along x_T [N], by the
             figures of the arm model, median over the moving samples.
@@ -88,6 +99,8 @@ class RigTrial:
     largest_F_t: float
     measurable_F_t: float | None
     saturated: float
+    noise: float | None
+    force_uncertainty: float | None
     floor: float | None
     load_bias: float | None
     drag: float | None
@@ -102,26 +115,28 @@ class RigTrial:
 
 def summarise_rig(trials: Sequence[RecordedTrial]) -> list[RigTrial]:
     """Return the health of every trial, sessions in the order they are given."""
-    following: dict[int, Array] = {}
-    for k, pair in enumerate(pairwise(trials)):
-        first, second = (trial.metadata["trial"].get("session") for trial in pair)
-        if first == second:
-            following[k] = pair[1].payload.bias[:3]
-    return [health_of(trial, following.get(k)) for k, trial in enumerate(trials)]
+    known = uncertainties_of(trials)
+    return [
+        health_of(trial, change, uncertainty_of(trial, known))
+        for trial, change in zip(trials, tare_changes(trials), strict=True)
+    ]
 
 
-def health_of(trial: RecordedTrial, next_tare: Array | None) -> RigTrial:
+def health_of(
+    trial: RecordedTrial, change: Array | None, uncertainty: ForceUncertainty | None
+) -> RigTrial:
     """Return the health of one trial.
 
     Args:
         trial: as loaded.
-        next_tare: force offset [N] of the trial after it, shape (3,); None without.
+        change: of the force's zero until the next tare [N], shape (3,); None without.
+        uncertainty: of the forces of its session; None where it is not known.
     """
     gaps = np.diff(trial.t) * 1e3
     age = _ages(trial)
     q7 = trial.cycles["position"][:, 6]
     tare = trial.payload.bias[:3]
-    bracket = None if next_tare is None else float(np.linalg.norm(next_tare - tare))
+    noise = _noise(trial)
     is_moving = np.abs(np.nan_to_num(trial.traction[:, 0])) > _MOVING
     is_saturated = (trial.cycles["flags"] & int(Flag.FT_SATURATED)) != 0
     provenance = trial.metadata["provenance"]
@@ -136,14 +151,16 @@ def health_of(trial: RecordedTrial, next_tare: Array | None) -> RigTrial:
         skews=np.histogram(age, SKEW_EDGES)[0].astype(np.float64),
         skew=_three(np.quantile(age, (0.05, 0.5, 0.95)) if age.size else np.zeros(3)),
         tare=_three(tare),
-        tare_bracket=bracket,
+        tare_bracket=None if change is None else float(np.linalg.norm(change)),
         joint7=float(np.abs(q7 - q7[0]).max() * 1e3),
         puck_degc=_row(provenance.get("pucks:temperature_degc", "")),
         motor_degc=_row(provenance.get("pucks:motor_temperature_degc", "")),
         largest_F_t=float(np.abs(trial.traction[:, 1]).max()),
         measurable_F_t=_measurable(provenance.get("ft_sensor:ranges", ""), trial),
         saturated=float(np.mean(is_saturated)),
-        floor=_floor(trial),
+        noise=noise,
+        force_uncertainty=None if uncertainty is None else uncertainty.mean,
+        floor=_floor(noise, uncertainty),
         load_bias=_load_bias(trial, is_moving),
         drag=_drag(trial, is_moving),
         lateral=float(np.abs(trial.lateral[is_moving]).mean())
@@ -159,8 +176,15 @@ def _ages(trial: RecordedTrial) -> Array:
     return (arm - ft)[is_known].astype(np.float64) * 1e-6
 
 
-def _floor(trial: RecordedTrial) -> float | None:
-    """Return the spread of smoothed F_t [N] before the foot moves: noise and drift."""
+def _floor(noise: float | None, uncertainty: ForceUncertainty | None) -> float | None:
+    """Return the mean absolute error [N] that no model can be better than."""
+    if noise is None:
+        return None
+    return (uncertainty or ForceUncertainty(0, 0.0)).floor(noise)
+
+
+def _noise(trial: RecordedTrial) -> float | None:
+    """Return the spread of smoothed F_t [N] before the foot moves."""
     at_rest = trial.t < _REST
     if np.count_nonzero(at_rest) < _SHORTEST:
         return None

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from acquisition import RATE_HZ
+from analysis.data import PULLED_WARNING, SENSOR_ERROR
 from analysis.figures import ReportSection
 from analysis.report.page_model import ReportTable
 from analysis.study import (
     FITTERS,
-    LIFTED_WARNING,
     TITLES,
     TUSTIN,
     Study,
@@ -53,7 +53,8 @@ def summary(study: Study) -> ReportTable:
         note="MAE: mean absolute error on trials that were left out of the fit, mean "
         "over trials ± its standard error. Constant: always the median F_t of the "
         "other trials. F_n ≤ 0: share of the kept samples with the foot off the "
-        f"ground or the tare wrong; above {LIFTED_WARNING:.0%} is a warning.",
+        "ground, where it hops in a slip, or the tare wrong; a warning where F_n is "
+        f"below -{SENSOR_ERROR:g} N in more than {PULLED_WARNING:.0%}.",
         section=ReportSection.SUMMARY,
     )
 

@@ -13,8 +13,12 @@ _SATURATED = 1e-9  # share of cycles
 _REACH_NOTE = (
     "Measurable: by the sensor's ranges and the lever of the foot; – where it "
     "did not say them: without a sample out of range it is at least what was seen. "
-    "Floor: standard deviation of smoothed "
-    "F_t with the foot at rest; no model can be better than that and the drift. "
+    "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
+    "from the changes between the tares of its session; "
+    "with the zero between two tares (drift=interpolated) "
+    "it is four fifths of that. Floor: mean |error| of smoothed "
+    "F_t by these changes and by the noise at rest, which no model can be better than; "
+    "by the noise alone where a session has one tare only. "
     "Drag: what the joints' Coulomb friction takes from the hand's push if they "
     "rub as the arm model says. It is not in F_t, which is measured below them, "
     "but tilts the push, so that it biases F_n. Medians over trials."
@@ -60,7 +64,7 @@ def health(rig: Sequence[RigTrial]) -> ReportTable:
             for trial in rig
         ],
         note="Age: how much earlier the force was sampled than the joints answered. "
-        "Change of tare: distance to the offset found before the next trial, which "
+        "Change of tare: distance to the offset of the next tare, which "
         "brackets the drift of the sensor. – where it is not known.",
         section=ReportSection.HEALTH,
     )
@@ -87,6 +91,7 @@ def reach(results: StudyResults) -> ReportTable:
                 _number(_median(trials, lambda trial: trial.measurable_F_t), 0),
                 _number(floor),
                 _number(_median(trials, lambda trial: trial.tare_bracket)),
+                _number(_median(trials, lambda trial: trial.force_uncertainty)),
                 _number(min(errors, default=None)),
                 _number(ratio, 1),
                 _number(_median(trials, lambda trial: trial.load_bias)),
@@ -101,6 +106,7 @@ def reach(results: StudyResults) -> ReportTable:
             "measurable [N]",
             "sensor floor [N]",
             "drift of the tare [N]",
+            "uncertainty of mean F_t, F_n [N]",
             "best model's error [N]",
             "error over floor",
             "F_n above set load [N]",

@@ -30,6 +30,7 @@ VALUES = {
     "window": "slowest:fastest in m/s, e.g. window=0.01:0.2",
     "lag": "-50 to 50 ms that the force is late, e.g. lag=20",
     "frame": "sole or terrain",
+    "drift": "interpolated (between the tares) or first (the tare before the trial)",
     "kernel": "as_printed (eq. 5 without 1 +) or default",
     "static_friction": "proportional (F_s = f_s F_n) or constant",
 }
@@ -49,6 +50,7 @@ class StudyVariant:
         frame: the frame that forces are projected on.
         lag: how late the forces are taken to be [s].
         change: from the options of the study to those of the repeated one.
+        is_interpolated: the sensor's zero lies on a line between two tares.
     """
 
     key: str
@@ -57,6 +59,7 @@ class StudyVariant:
     change: Callable[[StudyOptions], StudyOptions] = lambda options: options
     frame: Frame = "terrain"
     lag: float = 0.0
+    is_interpolated: bool = False
 
     @property
     def text(self) -> str:
@@ -70,12 +73,13 @@ class StudyVariant:
             SettingsError: the choice needs a recording, and the trial is a table.
         """
         if isinstance(trial, RecordedTrial):
-            series = trial.series(self.frame)
-        elif self.frame == "terrain":
+            chosen = trial.interpolated() if self.is_interpolated else trial
+            series = chosen.series(self.frame)
+        elif self.frame == "terrain" and not self.is_interpolated:
             series = trial
         else:
             raise SettingsError(
-                f"--what-if {self.text}: tables have no frame to be changed.",
+                f"--what-if {self.text}: tables have no frame and no tares.",
                 hint="It is a choice of recorded trials: traction report.",
             )
         return series.with_forces_from(self.lag) if self.lag else series
@@ -245,6 +249,16 @@ def _frame(value: str) -> StudyVariant:
     return StudyVariant("frame", value, tuple(FITTERS), frame=frames[value])
 
 
+def _drift(value: str) -> StudyVariant:
+    is_interpolated = _one_of(value, "interpolated", "first")
+    return StudyVariant(
+        "drift",
+        value,
+        tuple(FITTERS),
+        is_interpolated=is_interpolated,
+    )
+
+
 def _kernel(value: str) -> StudyVariant:
     printed = _one_of(value, "as_printed", "default")
     return StudyVariant(
@@ -280,6 +294,7 @@ _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
     "window": _window,
     "lag": _lag,
     "frame": _frame,
+    "drift": _drift,
     "kernel": _kernel,
     "static_friction": _static_friction,
 }

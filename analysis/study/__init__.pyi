@@ -19,7 +19,7 @@ from .models import (
 )
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
-from .study import LIFTED_WARNING, Study, StudyOptions, run_study
+from .study import Study, StudyOptions, run_study
 from .terrain_fit import TerrainResult, mean_of
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "GP_SE",
     "GP_SE_NOISE",
     "GP_SE_TUSTIN",
-    "LIFTED_WARNING",
     "NAMES",
     "TITLES",
     "TUSTIN",

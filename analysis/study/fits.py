@@ -31,6 +31,7 @@ _OTHER_UNITS = {
     "standard_errors": "unit of the measure",
     "cross": "N",
     "lifted_share": "1",
+    "pulled_share": "1",
     "theta": "natural logarithms, inputs standardised, outputs in N",
 }
 
@@ -134,6 +135,7 @@ def _terrain(result: TerrainResult, models: Sequence[str]) -> dict[str, Any]:
         "shares": [asdict(trial.shares) for trial in result.trials],
         "countable": [trial.is_countable for trial in result.trials],
         "lifted_share": result.lifted_share,
+        "pulled_share": result.pulled_share,
         "tustin": {
             "median": tustin_medians(result),
             "folds": folds,

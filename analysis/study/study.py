@@ -8,6 +8,8 @@ import numpy as np
 from acquisition import SettingsError
 from analysis.data import (
     MINIMUM_KEPT,
+    PULLED_WARNING,
+    SENSOR_ERROR,
     PreparedTrial,
     PrepareOptions,
     SampleTable,
@@ -22,8 +24,6 @@ from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
 from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
-
-LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,11 +193,11 @@ def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
     warnings = []
-    if result.lifted_share > LIFTED_WARNING:
+    if result.pulled_share > PULLED_WARNING:
         warnings.append(
-            f"{result.terrain}: F_n <= 0 in {result.lifted_share:.1%} of the kept "
-            f"samples (limit {LIFTED_WARNING:.0%}). Suspect the tare or the plane of "
-            "the terrain."
+            f"{result.terrain}: F_n <= -{SENSOR_ERROR:g} N, beyond the sensor's error, "
+            f"in {result.pulled_share:.1%} of the kept samples (limit "
+            f"{PULLED_WARNING:.0%}). Suspect the tare or the plane of the terrain."
         )
     short = [k + 1 for k, t in enumerate(result.trials) if not t.is_countable]
     if short:

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition import TractionError
-from analysis.data import PreparedTrial, SampleTable, Slip, kind_title
+from analysis.data import (
+    SENSOR_ERROR,
+    PreparedTrial,
+    SampleTable,
+    Slip,
+    kind_title,
+    share_below,
+)
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
 from analysis.tustin import Interval, TustinFit, bootstrap_tustin, fit_tustin
@@ -108,8 +115,12 @@ class TerrainResult:
     @property
     def lifted_share(self) -> float:
         """Share of the kept samples with F_n <= 0: the foot off the ground."""
-        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
-        return lifted / self.kept if self.kept else 0.0
+        return share_below(self.trials, 0.0)
+
+    @property
+    def pulled_share(self) -> float:
+        """Share of the kept samples with F_n below zero beyond the sensor's error."""
+        return share_below(self.trials, -SENSOR_ERROR)
 
     def models(self, name: str) -> list[ModelFold]:
         """Return the folds of the model `name`."""

@@ -10,6 +10,7 @@ from analysis.data import Array, PreparedTrial, Slip, TractionSeries
 LOW_FLOOR = 0.3  # of the peak
 _REST_MARGIN = 0.1  # s before the first motion that no longer counts as rest
 _SHORTEST_REST = 0.2  # s
+_START = 0.4  # s of a trial in which no foot moves yet
 _MOVING = 0.005  # m/s
 
 
@@ -102,12 +103,14 @@ def _of_rest(
     every: Sequence[GroundTrials], plates: Sequence[GroundTrials]
 ) -> dict[str, list[float]]:
     rests = [rest for g in every for rest in _rests(g)]
-    still = [float(rest.mean()) for g in plates for rest in _rests(g)]
+    starts = [
+        float(s.F_t[s.t - s.t[0] < _START].mean()) for g in plates for s in g.series
+    ]
     # Differences of neighbours: neither drift nor load is in them.
     white = [float(np.diff(rest).std() / np.sqrt(2.0)) for rest in rests]
     return {
         "F1": [float(np.median(white))] if white else [],
-        "F2": [float(np.std(still))] if len(still) > 1 else [],
+        "F2": [float(np.std(starts, ddof=1))] if len(starts) > 1 else [],
     }
 
 

@@ -10,7 +10,7 @@ from .sessions import (
     report_sessions,
     tell_missing,
 )
-from .truth_errors import compare_with_truth
+from .truth_errors import compare_with_truth, z_scores
 
 __all__ = [
     "REPORTED",
@@ -25,4 +25,5 @@ __all__ = [
     "play",
     "report_sessions",
     "tell_missing",
+    "z_scores",
 ]

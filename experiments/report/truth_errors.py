@@ -10,6 +10,7 @@ from acquisition import TrialFileError
 from acquisition.trial_file import TrialReader
 from analysis.data import RecordedTrial, moving_average
 from analysis.figures import ReportSection
+from analysis.findings import uncertainties_of, uncertainty_of
 from analysis.report import ReportTable
 from analysis.study import Study, TerrainResult
 
@@ -26,12 +27,14 @@ class TruthErrors:
         v_t: root mean square [m/s].
         F_t: mean absolute [N].
         F_n: mean absolute [N].
+        means: signed mean errors of F_t and F_n over the trial [N].
         parameters: of the simulated ground that were in force [SI], by name.
     """
 
     v_t: float
     F_t: float
     F_n: float
+    means: tuple[float, float] = (0.0, 0.0)
     parameters: Mapping[str, float] = field(default_factory=dict[str, float])
 
 
@@ -58,6 +61,7 @@ def compare_with_truth(trial: RecordedTrial) -> TruthErrors | None:
         v_t=float(np.sqrt(np.nanmean(error[:, 0] ** 2))),
         F_t=float(np.nanmean(np.abs(error[:, 1]))),
         F_n=float(np.nanmean(np.abs(error[:, 2]))),
+        means=(float(np.nanmean(error[:, 1])), float(np.nanmean(error[:, 2]))),
         parameters=_parameters(reader.metadata.get("trial", {})),
     )
 
@@ -101,7 +105,40 @@ def truth_tables(
     }
     if not any(errors.values()):
         return []
-    return [_measured(errors), _recovered(study, errors)]
+    scores = z_scores([trial for group in trials.values() for trial in group])
+    predicted = [_predicted(scores)] if len(scores) else []
+    return [_measured(errors), *predicted, _recovered(study, errors)]
+
+
+def z_scores(trials: Sequence[RecordedTrial]) -> NDArray[np.float64]:
+    """Return the errors of mean F_t and F_n over their standard uncertainty.
+
+    One row per trial that has a truth file and a session with two tares, shape (n, 2).
+    """
+    known = uncertainties_of(trials)
+    pairs = [(uncertainty_of(t, known), compare_with_truth(t)) for t in trials]
+    rows = [
+        [mean / uncertainty.mean for mean in error.means]
+        for uncertainty, error in pairs
+        if uncertainty and error
+    ]
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def _predicted(scores: NDArray[np.float64]) -> ReportTable:
+    return ReportTable(
+        "Uncertainty of the forces against the truth",
+        ("mean of a trial", "trials", "rms of error / uncertainty", "largest"),
+        [_scored(name, scores[:, k]) for k, name in enumerate(("F_t", "F_n"))],
+        note="Simulated trials only. The uncertainty is the one by the changes between "
+        "tares, which a real session has too; where it is right, the rms is 1.",
+        section=ReportSection.REACH,
+    )
+
+
+def _scored(name: str, scores: NDArray[np.float64]) -> tuple[str, ...]:
+    rms, largest = np.sqrt(np.mean(scores**2)), np.abs(scores).max()
+    return name, str(scores.size), f"{rms:.2f}", f"{largest:.1f}"
 
 
 def _measured(errors: Mapping[str, list[tuple[str, TruthErrors]]]) -> ReportTable:

@@ -53,6 +53,7 @@ class Rig:
         model: the arm with its tool.
         payload: what the sensor carries, not tared.
         tared: the same with the bias of the newest tare.
+        tared_ns: when that was taken [ns]; 0 = never.
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
@@ -73,6 +74,7 @@ class Rig:
     gravity_text: str
     simulation: SimulationControl | None
     is_stepped: bool
+    tared_ns: int = 0
 
     @property
     def is_simulated(self) -> bool:

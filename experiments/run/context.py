@@ -39,6 +39,7 @@ class RunContext:
         kept_before: how many trials were kept until then.
         fault_context: where in the session a fault would occur now.
         page: the newest review, line by line.
+        last_recorded: the newest trial that no tare has followed yet.
         is_last: no trial begins after this one.
         estimate: expected duration, as of the first kept trial [s].
     """
@@ -56,6 +57,7 @@ class RunContext:
     kept_before: int
     fault_context: FaultContext = field(default_factory=FaultContext)
     page: tuple[str, ...] = ()
+    last_recorded: TrialName | None = None
     is_last: bool = False
     estimate: float | None = None
 

@@ -175,6 +175,7 @@ def _end(
     except TrialFileError as error:
         raise _lost("write-failed", context, name, error) from error
     archive.write_sidecar(name, verified, outcome)
+    context.last_recorded = name
     details = {"trial": name.number, "attempt": name.attempt}
     context.append(Event.TRIAL_RECORDED, **details)
     written = (

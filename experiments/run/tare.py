@@ -14,7 +14,7 @@ from experiments.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session import Event, TrialName
+from experiments.session import Event, TrialName, write_next_tare
 from ft_sensor import Payload, TareError, TareResult, take_mean
 from ft_sensor.calibration import sensor_from_toml
 from wam.model import Array
@@ -127,7 +127,7 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
     rotation = rig.model.sole_pose(position)[1]
     tared = rig.payload.tared(np.array(result.wrench), rotation)
     _check_residual(rig, tared)
-    rig.tared = tared
+    rig.tared, rig.tared_ns = tared, result.t_ns
     bias = tared.bias.tolist()
     context.loop_client.set_bias(bias)
     context.append(
@@ -136,6 +136,18 @@ def _accept(context: RunContext, name: TrialName, result: TareResult) -> None:
         bias=[round(v, 4) for v in bias],
         spread=round(float(result.spread), 3),
     )
+    _close_bracket(context)
+
+
+def _close_bracket(context: RunContext) -> None:
+    """Write the tare into the sidecar of the trial before it."""
+    name, rig = context.last_recorded, context.rig
+    if name is None:
+        return
+    context.last_recorded = None
+    tare = {"t_ns": rig.tared_ns, "bias": rig.tared.bias.tolist()}
+    folder = context.metadata.folder
+    context.console_loop.run_aside(lambda: write_next_tare(folder, name, tare))
 
 
 def _check_residual(rig: Rig, tared: Payload) -> None:

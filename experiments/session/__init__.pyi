@@ -45,7 +45,7 @@ from .store import (
     list_sessions,
     session_utc_ns,
 )
-from .trial_files import add_remark
+from .trial_files import add_remark, write_next_tare
 from .trial_name import TrialName
 from .unfinished import UnfinishedSession, find_unfinished
 
@@ -100,5 +100,6 @@ __all__ = [
     "trial_path",
     "write_json",
     "write_new_text",
+    "write_next_tare",
     "write_text",
 ]

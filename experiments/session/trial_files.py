@@ -134,14 +134,36 @@ def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> s
     Raises:
         TrialFileError: the disk is full or gone.
     """
-    path = folder.trials / f"{name.kept}.json"
-    if not _is_of(path, name):
-        path = folder.rejected / f"{name.rejected}.json"
+    path = _sidecar_path(folder, name)
     sidecar = find_sidecar(folder, name)
     remark = {"text": text, "who": who, "when": folder.events()[-1]["utc"]}
     notes = [*_list(sidecar, "notes"), remark]
     write_json(path, {**sidecar, "notes": notes})
     return path.stem
+
+
+def write_next_tare(
+    folder: SessionFolder, name: TrialName, tare: Mapping[str, object]
+) -> None:
+    """Write the tare that followed a trial into its sidecar, wherever it stands.
+
+    Args:
+        folder: the session.
+        name: the attempt; one without a sidecar is left alone.
+        tare: `t_ns`, its host time [ns], and `bias`, the reading without load.
+
+    Raises:
+        TrialFileError: the disk is full or gone.
+    """
+    sidecar = find_sidecar(folder, name)
+    if sidecar.get("attempt") == name.attempt:
+        write_json(_sidecar_path(folder, name), {**sidecar, "next_tare": dict(tare)})
+
+
+def _sidecar_path(folder: SessionFolder, name: TrialName) -> Path:
+    """Return where the sidecar of an attempt stands."""
+    path = folder.trials / f"{name.kept}.json"
+    return path if _is_of(path, name) else folder.rejected / f"{name.rejected}.json"
 
 
 def _list(fields: _Facts, key: str) -> list[object]:

@@ -22,7 +22,7 @@ from analysis.validation import (
     measure_models,
     measure_slips,
 )
-from experiments.report import compare_with_truth
+from experiments.report import compare_with_truth, z_scores
 from experiments.session import list_sessions
 
 WHOLE = 10  # trials per terrain from which every band applies
@@ -34,6 +34,7 @@ TRUTH_BANDS = (
     Band("T1", "v_t against the truth, rms, each terrain's worst trial (mm/s)", 0, 1.5),
     Band("T2", "F_t against the truth, mean |error|, all trials (N)", 0.2, 0.6),
     Band("T3", "F_n against the truth, mean |error|, all trials (N)", 0.2, 0.6),
+    Band("T4", "error of mean F_t and F_n / uncertainty by the tares, rms", 0.8, 1.2),
 )
 
 
@@ -198,5 +199,12 @@ def _truth(trials: dict[str, list[RecordedTrial]]) -> list[BandResult]:
         tuple(1e3 * max(e.v_t for e in of) for of in errors.values() if of),
         (float(np.mean([e.F_t for e in every])),),
         (float(np.mean([e.F_n for e in every])),),
+        _predicted([trial for of in trials.values() for trial in of]),
     )
     return [BandResult(*pair) for pair in zip(TRUTH_BANDS, values, strict=True)]
+
+
+def _predicted(trials: Sequence[RecordedTrial]) -> tuple[float, ...]:
+    """Return the rms of the errors over their uncertainty, one value of all forces."""
+    scores = z_scores(trials)
+    return (float(np.sqrt(np.mean(scores**2))),) if scores.size else ()

@@ -83,6 +83,7 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "simulated": "true" if rig.is_simulated else "false",
         "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
+        "tared_ns": str(rig.tared_ns),
     }
     terrain = {"stones": row.stones, "foot": row.foot}
     attachments = {

@@ -1,4 +1,4 @@
-from .errors import FORCE_ERRORS, TORQUE_ERRORS, SensorErrors
+from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, SensorErrors
 from .kinds import SensorChoice, make_stream
 from .port import FakeSerialPort
 from .pty import SerialPty
@@ -6,6 +6,7 @@ from .stream import SensorStream, Source
 
 __all__ = [
     "FORCE_ERRORS",
+    "NO_SHIFT",
     "TORQUE_ERRORS",
     "FakeSerialPort",
     "SensorChoice",

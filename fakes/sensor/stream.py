@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from enum import Enum, auto
 
-from fakes.sensor.errors import SensorErrors
+from fakes.sensor.errors import PER_DEGREE, SensorErrors
 from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
 from ft_sensor import ALL_AXES, Wrench
 from ft_sensor.serial_line import wire_time_ns
@@ -81,7 +81,6 @@ Source = Callable[[int], Sequence[float]]
 
 ROOM = 25.0  # where it stands [degrees Celsius]
 _NO_RANGES: Wrench = (1e9, 1e9, 1e9, 1e9, 1e9, 1e9)
-_PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth adds
 
 
 class SensorStream:
@@ -256,11 +255,12 @@ class SensorStream:
         self._send(t_ns, self.faults.carry(data))
 
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
-        warmth = 0.0
+        warmth = 0.0 if self.errors is None else self.errors.warmth
         if self.warming:
-            warmth = self.warming * (t_ns - self.on_since_ns) * 1e-9
-            pairs = zip(wrench, _PER_DEGREE, strict=True)
-            wrench = [value + warmth * gain for value, gain in pairs]
+            heated = self.warming * (t_ns - self.on_since_ns) * 1e-9
+            warmth += heated
+            pairs = zip(wrench, PER_DEGREE, strict=True)
+            wrench = [value + heated * gain for value, gain in pairs]
         saturated = ALL_AXES if self._is_saturated else 0
         if self.ranges is not _NO_RANGES:
             wrench, beyond = _clipped(wrench, self.ranges)

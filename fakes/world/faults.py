@@ -5,7 +5,7 @@ from collections.abc import Callable
 from acquisition import PERIOD_NS
 from fakes.plant import ArmPlant
 from fakes.pucks import FRAME_NS, NOMINAL_VOLTAGE, BusFaults, PuckNetwork
-from fakes.sensor import SensorStream
+from fakes.sensor import NO_SHIFT, SensorStream
 from wam.bus import MOTOR_NODES, SAFETY_NODE, SENSOR_NODE, position_reply_id
 
 PUCK = 3  # of those that fail alone: its joint carries little, the arm stays up
@@ -60,7 +60,8 @@ def clear_network_faults(network: PuckNetwork) -> None:
     network.faults.clear_faults()
     network.other_master.leave()
     network.reset_monitors()
-    network.silence(SAFETY_NODE, is_mute=False)
+    for node in (SAFETY_NODE, SENSOR_NODE):
+        network.silence(node, is_mute=False)
     network.disobey(is_disobedient=False)
     network.set_bus_voltage(NOMINAL_VOLTAGE)
     for node in MOTOR_NODES:
@@ -165,6 +166,7 @@ class BodyFaults:
 
 
 CLOCK_JUMP_US = 10_000_000
+_JUMP = (1.5, 0.0, -1.5, 0.0, 0.0, 0.0)  # of the zero: no tare hides so much [N, N m]
 
 
 def stream_faults(
@@ -187,8 +189,21 @@ def stream_faults(
         "ft-not-a-number": lambda: setattr(faults, "is_nonsense", True),
         "ft-unplugged": unplug,
         "ft-reboot": lambda: stream.reset(now_ns()),
+        "ft-jump": lambda: _shift_zero(stream),
         "ft-clock-jump": lambda: stream.jump_clock(CLOCK_JUMP_US),
     }
+
+
+def clear_stream_faults(stream: SensorStream) -> None:
+    """End every fault of a sensor on a serial port but a pulled cable."""
+    stream.recover()
+    if stream.errors is not None:
+        stream.errors.shift = NO_SHIFT
+
+
+def _shift_zero(stream: SensorStream) -> None:
+    if stream.errors is not None:
+        stream.errors.shift = _JUMP
 
 
 def bus_sensor_faults(network: PuckNetwork) -> dict[str, Callable[[], None]]:

@@ -19,18 +19,18 @@ from fakes.pucks import (
     PendantAction,
     PuckNetwork,
 )
-from fakes.randomness import trial_generators
+from fakes.randomness import TrialGenerators, trial_generators
 from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
     bus_sensor_faults,
     clear_network_faults,
+    clear_stream_faults,
     network_faults,
     stream_faults,
 )
 from ft_sensor import TerrainFrame
-from wam.bus import SENSOR_NODE
 from wam.model import ArmConstants, ArmModel, Array, Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
@@ -129,7 +129,7 @@ class FakeRig:
         chosen = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:
             chosen = replace(chosen, has_sensor=True)
-        self.rake(0)
+        self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
         self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
@@ -178,11 +178,10 @@ class FakeRig:
 
     def clear_faults(self) -> None:
         """End every fault that can be ended without the arm."""
-        self.stream.recover()
+        clear_stream_faults(self.stream)
         if self._cable is not None:
             self._cable.plug_in()
         self._body.clear_faults()
-        self.network.silence(SENSOR_NODE, is_mute=False)
         clear_network_faults(self.network)
         self._let_lag(0)
 
@@ -199,15 +198,21 @@ class FakeRig:
             self.stream.go_silent()
 
     def rake(self, trial: int) -> None:
-        """Rake the bed for `trial`: everything random starts anew."""
+        """Rake the bed for `trial`: ground and hand start anew.
+
+        The sensor's errors go on; what they draw from here on is the trial's own.
+        """
+        self.random = self._rake(trial)
+        self.errors.draw_from(self.random.sensor)
+
+    def _rake(self, trial: int) -> TrialGenerators:
         scene = self.scene
-        self.random = trial_generators(scene.seed, scene.terrain, trial)
+        random = trial_generators(scene.seed, scene.terrain, trial)
         self.ground = Container(
-            make_terrain(
-                scene.stones, scene.foot, scene.frame.incline, self.random.ground
-            )
+            make_terrain(scene.stones, scene.foot, scene.frame.incline, random.ground)
         )
         self.plant.terrain = self.ground
+        return random
 
 
 def _place(number: int, travel: float) -> tuple[float, float]:
@@ -242,11 +247,7 @@ class LocalSimulation:
         self.rig.rake(trial)
 
     def lift(self) -> None:
-        """Let the hand carry the foot above the far end and hold it still for a tare.
-
-        The sensor shows its offset and noise only, until the next push.
-        """
-        self.rig.errors.settle()
+        """Let the hand carry the foot above the far end and hold it still."""
         self.rig.plant.hand.lift_to_start()
 
     def rest(self) -> None:
@@ -272,11 +273,9 @@ class LocalSimulation:
         self.rig.plant.hand.touch(x, y, ground)
 
     def push(self) -> None:
-        """Let the hand push the foot across; the tare error of a trial begins here."""
-        rig = self.rig
-        rig.errors.new_trial(rig.random.sensor)
-        rig.plant.hand.push(self._pace, rig.random.hand)
-        rig.plant.start_truth()
+        """Let the hand push the foot across."""
+        self.rig.plant.hand.push(self._pace, self.rig.random.hand)
+        self.rig.plant.start_truth()
 
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""

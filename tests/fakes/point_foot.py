@@ -27,6 +27,7 @@ GROUNDS = {
 }
 SUBSTEPS, DT = 4, 0.0005
 PERIOD = SUBSTEPS * DT
+CYCLES = round(1.0 / PERIOD)  # in a second
 MASS_X, MASS_Z = 4.0, 3.5  # the arm's inertia at the foot, with the forearm [kg]
 COULOMB, VISCOUS = 0.5, 2.0  # joint drag seen at the foot: N, N s/m
 RESIDUAL, RESIDUAL_LENGTH = 0.15, 0.12  # of gravity compensation: N rms, m
@@ -52,8 +53,7 @@ class PointFoot:
             for _ in range(2)
         ]
         self.errors = SensorErrors(random.sensor, FORCE_ERRORS)
-        self.errors.settle()
-        self.errors.new_trial(random.sensor)
+        self.tare = self._take_tare()
         self.x = self.vx = self.vz = 0.0
         self.z = self.ground.surface(0.0) - self.weight / self.ground.stiffness
         self.push = Push(Pace(), random.hand, self.view(), DT)
@@ -86,9 +86,19 @@ class PointFoot:
         F_t, F_n = (sum(column) / SUBSTEPS for column in zip(*forces, strict=True))
         ax, az = (self.vx - before[0]) / PERIOD, (self.vz - before[1]) / PERIOD
         felt = (F_t + TOOL_MASS * ax, 0.0, F_n - TOOL_MASS * az, 0.0, 0.0, 0.0)
-        t_ns = len(self.rows) * round(PERIOD * 1e9)
-        shown = self.errors.apply(t_ns, felt)
-        self.rows.append((math.floor(self.x / STEP) * STEP, shown[0], shown[2]))
+        shown = self.errors.apply(self._t_ns(len(self.rows)), felt)
+        F_t, _, F_n = np.array(shown[:3]) - self.tare
+        self.rows.append((math.floor(self.x / STEP) * STEP, F_t, F_n))
+
+    def _take_tare(self) -> np.ndarray:
+        """Return the force that the sensor shows in the second before the last."""
+        before = range(-2 * CYCLES, -CYCLES)
+        shown = [self.errors.apply(self._t_ns(k), (0.0,) * 6)[:3] for k in before]
+        return np.mean(shown, axis=0)
+
+    @staticmethod
+    def _t_ns(row: int) -> int:
+        return row * round(PERIOD * 1e9)
 
     def run(self) -> TractionSeries:
         """Push across the container and return what was recorded."""

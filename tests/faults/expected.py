@@ -348,6 +348,10 @@ TABLE: dict[str, Row] = {
         20, _FLAGGED, _refused("The F/T sensor sends raw gauge data or absurd forces")
     ),
     "ft-unplugged": _lost_sensor(_FEW, _NO_DATA),
+    "ft-jump": _row(
+        Cell(End.TOLD, "Known-pose residual"),
+        tare=Cell(End.TOLD, "Force varied "),
+    ),
     "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up anew")),
     "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
     "not-a-number": _ending(

@@ -246,7 +246,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "temperature",
             "two tares bracket a session; drift in the review",
             "none on the arm: force commands nothing",
-            ("ft-reboot",),
+            ("ft-jump", "ft-reboot"),
             "0.5 N in a tare",
             ("tests/ft_sensor/test_tare.py::test_touching_is_refused_in_numbers",),
         ),

@@ -313,6 +313,15 @@ def test_a_tare_is_bracketed_by_the_next_of_its_session(trial):
     shift = after.payload.bias[:3] - trial.payload.bias[:3]
     assert first.tare_bracket == pytest.approx(np.linalg.norm(shift))
     assert second.tare_bracket is None
+    # Both trials are of one session: what its tares show counts for both.
+    assert first.force_uncertainty == second.force_uncertainty
+    assert first.force_uncertainty > 0.1
+
+
+def test_without_a_second_tare_the_floor_is_that_of_the_noise(trial):
+    (alone,) = summarise_rig([as_left(trial)])
+    assert alone.force_uncertainty is None
+    assert alone.floor == pytest.approx(np.sqrt(2 / np.pi) * alone.noise)
 
 
 def test_the_largest_traction_follows_from_the_sensors_ranges(trial):

@@ -26,6 +26,7 @@ from analysis.study.study import StudyOptions, run_study
         "window=0:0.1",
         "window=nan:0.1",
         "frame=base",
+        "drift=constant",
         "kernel=cubic",
         "static_friction=none",
         "lag=x",
@@ -52,6 +53,8 @@ def test_choices_change_what_they_name_and_nothing_else():
     proportional = parse_choice("static_friction=proportional").options(before)
     assert proportional.fit.form.is_proportional
     assert parse_choice("frame=sole").frame == "sole"
+    assert parse_choice("drift=interpolated").is_interpolated
+    assert not parse_choice("drift=first").is_interpolated
     assert parse_choice("lag=-12.5").lag == -0.0125
 
 

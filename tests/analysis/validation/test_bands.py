@@ -171,3 +171,19 @@ def test_a_study_without_plates_has_no_such_measures(toy_measures):
     study, _ = toy_measures
     stones = {n: r for n, r in study.terrains.items() if n in ("S0", "B0")}
     assert measure_models(replace(study, terrains=stones)) == {}
+
+
+def resting(level, later):
+    """A trial of 0.4 s at `level` [N], then of a push back at `later` [N]."""
+    t = np.arange(1000) * 0.002
+    v_t = np.where(t < 1.0, 0.0, 0.03)
+    F_t = np.where(t < 0.4, level, later)
+    return TractionSeries("TF", "TF-1", t, v_t, np.full(1000, 3.0), F_t, "none")
+
+
+def test_the_force_at_rest_is_that_of_the_first_four_tenths_of_a_second():
+    levels = (0.1, 0.5, 0.3)
+    plate = ground([resting(level, 9.0) for level in levels], is_plate=True)
+    stones = ground([PointFoot("S0", 1, 1).run()], is_plate=False)
+    (found,) = measure_slips({"S0": stones, "TF": plate})["F2"]
+    assert found == pytest.approx(np.std(levels, ddof=1))

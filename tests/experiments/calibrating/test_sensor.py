@@ -16,6 +16,8 @@ from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import load_settings
 from fakes.plant import hand
 from fakes.plant.plant import PlantOptions
+from fakes.sensor.errors import FORCE_ERRORS as FORCE
+from fakes.sensor.errors import TORQUE_ERRORS as TORQUE
 from fakes.sensor.errors import SensorErrors
 from ft_sensor.calibration.files import terrain_from_toml, terrain_to_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml, sensor_to_toml
@@ -52,11 +54,24 @@ class OtherRig(fakes.world.FakeRig):
         super().__init__(scene, constants, other, clock, options, network)
 
 
-class DriftingErrors(SensorErrors):
-    """A sensor that goes on drifting while it is calibrated."""
+class SteadyErrors(SensorErrors):
+    """A sensor that hardly drifts: what is left are the errors of the method."""
 
-    def recover_session(self):
-        """Do not settle."""
+    def __init__(self, rng):
+        super().__init__(rng, *(_drifting(s, 0.02) for s in (FORCE, TORQUE)))
+
+
+class DriftingErrors(SensorErrors):
+    """A sensor that drifts five times as far as a sound one."""
+
+    def __init__(self, rng):
+        super().__init__(rng, *(_drifting(s, 5.0) for s in (FORCE, TORQUE)))
+
+
+def _drifting(scale, factor):
+    shares = dict.fromkeys(("creep", "hysteresis", "cross_talk"), 0.0)
+    drift, walk = factor * scale.drift, factor * scale.walk
+    return replace(scale, drift=drift, walk=walk, **shares)
 
 
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
@@ -74,7 +89,8 @@ def calibrated(tmp_path_factory):
     """Return (what was said, file) of a calibration of another foot, turned sensor."""
     folder = tmp_path_factory.mktemp("sensor")
     out = folder / "ft_sensor.toml"
-    done = calibrate("sensor", folder, "--poses", 6, "--out", out)
+    options = ("--poses", 6, "--out", out)
+    done = calibrate("sensor", folder, *options, errors=SteadyErrors)
     assert done.code == 0, done.err
     return done, out
 
@@ -88,6 +104,16 @@ def test_six_orientations_recover_payload_mounting_and_sign(calibrated):
     assert found.fit.sign == -1.0
     assert found.fit.residual < 0.05
     assert (found.foot, found.is_simulated) == ("tread", True)
+
+
+def test_a_sensor_with_its_usual_drift_is_calibrated(tmp_path):
+    out = tmp_path / "ft_sensor.toml"
+    done = calibrate("sensor", tmp_path, "--poses", 6, "--out", out)
+    assert done.code == 0, done.err
+    fit = sensor_from_toml(out.read_text(), out.name).fit
+    assert 0.05 < fit.residual < 0.3
+    # 0.22 N of drift in each of six poses: 9 g, at 3 sigma.
+    assert fit.mass == pytest.approx(MASS, abs=0.03)
 
 
 def test_the_person_sees_what_was_found_and_how_to_use_it(calibrated):
@@ -142,7 +168,7 @@ def test_drift_is_told_and_refused_unless_forced(tmp_path):
     options = ("--poses", 6, "--out", out)
     done = calibrate("sensor", tmp_path, *options, errors=DriftingErrors)
     assert done.code == 2
-    assert "N rms unexplained (limit 0.15)" in done.err
+    assert "N rms unexplained (limit 0.3)" in done.err
     assert "drift" in done.err
     assert not out.exists()
     forced = calibrate("sensor", tmp_path, *options, "--force", errors=DriftingErrors)

@@ -139,3 +139,12 @@ def test_terrains_side_by_side_give_the_same_bits_as_one_by_one(tmp_path):
         found.append(digests(data / "rehearsal_1"))
     assert found[0] == found[1]
     assert len(found[0]["TF"]) == 2
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1800)
+def test_the_tares_predict_the_errors_of_eighty_trials(tmp_path):
+    traction("rehearse", "--seed", 11, "--data", tmp_path)
+    found = json.loads((tmp_path / "rehearsal_11" / "bands.json").read_text())
+    (ratio,) = next(b["values"] for b in found["bands"] if b["id"] == "T4")
+    assert 0.8 <= ratio <= 1.2

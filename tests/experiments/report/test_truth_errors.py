@@ -8,6 +8,7 @@ import pytest
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
 from analysis.data.prepare import PrepareOptions, moving_average, prepare_trial
+from experiments.report.truth_errors import z_scores
 
 WIDTH = 11  # samples, the smoothing of the analysis
 
@@ -48,8 +49,16 @@ def test_measured_forces_follow_the_true_ones(recorded):
         _, measured, true = compare(recorded, name)
         errors.append(np.abs(measured[:, 1:] - true[:, 1:]).mean(axis=0))
         assert true[:, 2].max() > 2.0
-    # bias and drift of the sensor, drawn anew per trial, are 0.4 N in the mean
+    # what a tare leaves of the sensor's zero is 0.3 to 0.4 N in the mean
     assert np.mean(errors, axis=0).max() <= 0.6
+
+
+def test_the_tares_of_a_session_predict_the_error_of_its_forces(recorded):
+    trials = [load_trial(recorded.folder / "trials" / f"T0{k}.mcap") for k in (1, 2)]
+    scores = z_scores(trials)
+    assert scores.shape == (2, 2)
+    # Four errors; in 80 trials their rms is 1, see test_rehearse.
+    assert 0.1 < np.sqrt(np.mean(scores**2)) < 3.0
 
 
 def test_recovered_friction_is_near_the_true_one(pair):

@@ -270,7 +270,7 @@ def test_a_prompt_stream_is_not_called_bursty(kind):
 def test_warmth_moves_the_zero_slowly(kind):
     bench = SensorBench(kind).opened()
     early = np.mean([s.wrench for s in bench.run(500 * MS)], axis=0)
-    bench.device.warming = 2.0  # degrees per second since it was switched on
+    bench.device.warming = 6.0  # degrees per second since it was switched on
     late = np.mean([s.wrench for s in bench.run(500 * MS)], axis=0)
     assert late[2] - early[2] > 0.3  # 0.15 N per degree, drift is 0.22 N rms
 
