@@ -23,10 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.clock import SystemClock
 from tests.mutation_targets import EQUIVALENT, TESTS
 
 ROOT = Path(__file__).parents[1]
-LONGEST = 120.0  # s; a mutation that hangs is noticed
+# A mutation that hangs is noticed: beyond 10 s and eight times what is usual.
+LONGEST, TIMES = 10.0, 8.0
 REQUIRED = 0.95  # share of mutations that the tests have to notice
 LIBRARIES = ("hypothesis", "mcap", "pinocchio", "pydantic", "pytest", "scipy.linalg")
 _COPIED = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")
@@ -140,6 +142,7 @@ class MutatedTree:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        self._longest: dict[str, float] = {}
         for name in (*_COPIED, "tests"):
             shutil.copytree(ROOT / name, folder / name, ignore=_CACHES)
         shutil.copy(ROOT / "pyproject.toml", folder)
@@ -148,25 +151,33 @@ class MutatedTree:
 
     def is_sound(self, path: str) -> bool:
         """Return whether the tests of a module pass as it is; keep their bytecode."""
-        return self._exit_code(TESTS[path], keeps_bytecode=True) == 0
+        started_ns = SystemClock().now_ns()
+        code = self._exit_code(TESTS[path], 60.0 * TIMES, keeps_bytecode=True)
+        self._longest[path] = max(
+            LONGEST, TIMES * ((SystemClock().now_ns() - started_ns) * 1e-9)
+        )
+        return code == 0
 
     def is_killed(self, mutation: Mutation) -> bool:
         """Return whether the tests of the module notice."""
         target = self._folder / mutation.path
         sound = target.read_text()
         target.write_text(mutation.source)
+        tests, longest = TESTS[mutation.path], self._longest[mutation.path]
         try:
-            return self._exit_code(TESTS[mutation.path], keeps_bytecode=False) != 0
+            return self._exit_code(tests, longest, keeps_bytecode=False) != 0
         finally:
             target.write_text(sound)
 
-    def _exit_code(self, tests: tuple[str, ...], *, keeps_bytecode: bool) -> int | None:
+    def _exit_code(
+        self, tests: tuple[str, ...], longest: float, *, keeps_bytecode: bool
+    ) -> int | None:
         """Return what pytest returned; None = it ran too long."""
         process = self._processes.Process(
             target=run_tests, args=(self._folder, tests, keeps_bytecode)
         )
         process.start()
-        process.join(LONGEST)
+        process.join(longest)
         if process.exitcode is None:
             os.killpg(process.pid or 0, signal.SIGKILL)
             process.join()

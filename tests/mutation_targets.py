@@ -73,8 +73,8 @@ TESTS = {
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
     ),
-    f"{_RUN}/activation.py": (f"{_RUN_TESTS}/test_ready.py",),
-    f"{_RUN}/stop.py": (f"{_RUN_TESTS}/test_stopping.py",),
+    f"{_RUN}/activation.py": (f"{_RUN_TESTS}/test_activation.py",),
+    f"{_RUN}/stop.py": (f"{_RUN_TESTS}/test_stop_flag.py",),
     f"{_RUN}/ready.py": (f"{_RUN_TESTS}/test_flow_steps.py",),
     f"{_RUN}/tare.py": (f"{_RUN_TESTS}/test_tare.py",),
     "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
