@@ -35,9 +35,8 @@ TESTS = {
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
     ),
     f"{_CONTROL}/position_hold.py": (
+        f"{_CONTROL_TESTS}/test_position_hold.py",
         f"{_CONTROL_TESTS}/test_controller.py",
-        f"{_CONTROL_TESTS}/test_hold_stability.py",
-        f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
     ),
     f"{_CONTROL}/joint_lock.py": (f"{_CONTROL_TESTS}/test_joint_lock.py",),
     f"{_CONTROL}/joint_move.py": (f"{_CONTROL_TESTS}/test_joint_move.py",),

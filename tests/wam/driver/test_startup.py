@@ -132,3 +132,10 @@ def test_the_absolute_angle_outlives_the_zeroing():
     before = [p.mech for p in arm.start().pucks]
     arm.define_position(arm.transmission.joints([0.0] * 7))
     assert [p.mech for p in arm.start().pucks] == before == list(rig.motors.position)
+
+
+def test_a_node_that_is_no_motor_is_named():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.set_property(4, "ROLE", int(PuckRole.SAFETY))
+    with pytest.raises(PreflightError, match=r"Node 4 is not a motor puck"):
+        start(rig)

@@ -151,3 +151,11 @@ def test_the_driver_has_the_matrix_of_the_arm_model():
 def test_constants_that_make_no_transmission_are_refused(j2mp, cts):
     with pytest.raises(SettingsError):
         Transmission(j2mp, cts, IPNM)
+
+
+@pytest.mark.parametrize("least", [1, 2])
+def test_the_least_constants_of_a_transmission_are_one(least):
+    wam = Transmission(J2MP, (least, *CTS[1:]), (least, *IPNM[1:]))
+    assert wam.exact_units(TAU)[0] == pytest.approx(-least * TAU[0] / 42.0)
+    with pytest.raises(SettingsError):
+        Transmission(J2MP, CTS, (0, *IPNM[1:]))
