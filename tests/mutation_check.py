@@ -99,9 +99,11 @@ def _is_removable(statement: ast.stmt) -> bool:
 
 
 def _skipped(tree: ast.Module) -> set[int]:
-    """Return nodes that no test can see: annotations, and what they hold."""
+    """Return nodes that no test should see: annotations and the text of messages."""
     hidden: set[int] = set()
     for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            hidden |= {id(n) for n in ast.walk(node)}
         for name in ("annotation", "returns", "decorator_list"):
             part = getattr(node, name, None)
             for root in part if isinstance(part, list) else [part]:

@@ -71,7 +71,7 @@ def test_one_second_is_enough():
     assert measure(samples(noise(800))).samples == 800
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 780])
+@pytest.mark.parametrize("count", [0, 1, 2, 780, 799])
 def test_less_than_a_second_is_refused(count):
     with pytest.raises(TareError, match="too few"):
         measure(samples(noise(count)))
@@ -106,3 +106,9 @@ def test_a_flagged_sample_is_refused(flag):
 def test_a_non_finite_sample_is_refused():
     with pytest.raises(TareError, match="non-finite"):
         measure(samples([*noise(1599), float("nan")]))
+
+
+def test_two_samples_a_second_apart_are_too_few_in_each_window():
+    far = [replace(sample, t_ns=k * 10**9) for k, sample in enumerate(samples([4, 4]))]
+    with pytest.raises(TareError, match="Only 0"):
+        measure(far)

@@ -718,3 +718,19 @@ def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench)
     bench.enter(ArmState.HOLD)
     assert bench.arm.asked_ns > asked_ns
     assert bench.state is ArmState.HOLD
+
+
+def test_nothing_is_known_before_the_first_cycle(bench):
+    assert bench.cycle.replies_ns == 0
+    status = bench.cycle.status
+    assert (status.state, status.safety) == (ArmState.IDLE, SafetyMode.UNKNOWN)
+    assert (status.verdict, status.ft_age_ns) == (None, 0)
+
+
+def test_the_wait_for_the_first_force_begins_with_the_first_cycle(bench):
+    bench.cycle.is_recording = True
+    bench.cycle.request(ArmState.FLOAT)
+    bench.run(force=None)
+    assert (bench.cycle.status.ft_age_ns, bench.reason) == (0, "")
+    bench.run(2, force=None)
+    assert bench.cycle.status.ft_age_ns == 2 * PERIOD_NS

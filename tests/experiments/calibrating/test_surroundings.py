@@ -8,10 +8,10 @@ from experiments.calibrating.surroundings import container_box, free_space, read
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.settings.load import load_settings
 from tests.experiments.program import traction, write_config
-from wam.calibration.free_space import UPRIGHT
+from wam.calibration.free_space import UPRIGHT, FreeSpace, check_poses
 from wam.calibration.poses import choose_orientations, choose_poses, plan_halts
 from wam.model.arm_model import ArmModel
-from wam.model.clearance import BASE_HEIGHT, CLEARANCE_MARGIN
+from wam.model.clearance import BASE_HEIGHT, CLEARANCE_MARGIN, BodyGap
 from wam.model.constants import load_constants
 
 SETTINGS = load_settings(None)
@@ -118,3 +118,22 @@ def test_too_few_poses_and_a_terrain_take_none(tmp_path):
         done = traction("calibrate", what, *options)
         assert done.code == 2
         assert "2 poses" in done.err
+
+
+@pytest.mark.parametrize("side", [-1.0, 0.0, 1.0])
+def test_a_pose_is_looked_at_from_both_sides_it_is_approached_from(side):
+    """A thin post 31 mm from the foot: 30 mrad towards it and it is too close."""
+
+    class Post:
+        def nearest(self, q):
+            at = float(np.round((q - SAFE[1])[0], 3))
+            is_close = at == side * 0.03
+            return BodyGap("the foot", "the post", 0.02 if is_close else 1.0)
+
+        def first_hit(self, start, goal):
+            return None
+
+    row = ROWS["TF"]
+    space = FreeSpace(-5.0, Post())
+    with pytest.raises(SettingsError, match=r"Pose 1 .* 20 mm from the post"):
+        check_poses(model_of(row), [np.array(SAFE[1])], space)

@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from acquisition.trial_file.recover import ROOM
 from acquisition.trial_file.verify import verify_file
+from experiments.session import crash_recovery
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import read_json, sha256_of, write_json
 from experiments.session.journal import Journal, open_journal
@@ -235,3 +237,24 @@ def test_a_torn_line_is_ended_before_the_next_one(crashed):
     assert torn == '{"event": "trial-rec'
     assert json.loads(last)["text"] == "after the kill"
     assert open_journal(crashed.folder, Now()).state == book.state
+
+
+def test_a_recorder_that_still_writes_is_waited_for(crashed, monkeypatch):
+    looks = [True, True, False]
+    monkeypatch.setattr(crash_recovery, "is_claimed", lambda _: looks.pop(0))
+    recover_session(crashed)
+    assert looks == []
+    assert crashed.state.running is None
+
+
+def test_what_a_killed_process_left_in_a_session_is_swept(crashed):
+    folder = crashed.folder
+    gone = 2**22 + 1  # no process has this number
+    left = folder.trials / f"{ROOM}-{gone}-abcdefgh"
+    left.mkdir()
+    (left / "half.json").write_text("{")
+    (folder.trials / "T09.json.tmp").write_text("{")
+    (folder.trials / "notes.odt.tmp").write_text("a person's")
+    recover_session(crashed)
+    assert not left.exists()
+    assert [p.name for p in folder.trials.iterdir()] == ["notes.odt.tmp"]

@@ -268,3 +268,14 @@ def test_every_opening_has_a_bracket_of_its_own():
 def test_a_damaged_tare_changes_nothing(bias):
     sound = [*BEGIN, tared(0.1, 0.2, 0.3)]
     assert replay([*sound, {"event": "tared", "bias": bias}]) == replay(sound)
+
+
+def test_a_session_without_events_wants_and_has_nothing():
+    state = replay([])
+    assert (state.wanted, state.rejected, state.openings, state.tares) == (0, 0, 0, 0)
+    assert (state.kept, state.running, state.redoing, state.ended) == (
+        (),
+        None,
+        None,
+        "",
+    )

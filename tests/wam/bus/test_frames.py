@@ -260,3 +260,19 @@ def test_sensor_frames_of_another_length_are_refused(decode, length):
 def test_the_seven_motors_report_under_their_own_identifiers():
     found = [frames.position_reply_id(node) for node in frames.MOTOR_NODES]
     assert found == [0x423, 0x443, 0x463, 0x483, 0x4A3, 0x4C3, 0x4E3]
+
+
+def test_groups_have_the_numbers_of_the_wire():
+    assert {group.name: int(group) for group in Group} == {
+        "BUS": 0,
+        "LOWER_TORQUE": 1,
+        "WRIST_TORQUE": 2,
+        "POSITION": 3,
+        "ARM": 4,
+        "HAND": 5,
+        "PROPERTY": 6,
+        "JOINT_ENCODER": 7,
+        "FORCE": 10,
+        "TORQUE": 11,
+        "ACCELERATION": 12,
+    }

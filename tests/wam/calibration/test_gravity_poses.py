@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.calibration.free_space import OFFSET, UPRIGHT, FreeSpace, is_clear, lowest
+from wam.calibration.free_space import (
+    OFFSET,
+    UPRIGHT,
+    FreeSpace,
+    check_poses,
+    elbow_of,
+    is_clear,
+    lowest,
+)
 from wam.calibration.poses import (
     APPROACH_SPEED,
     MARGIN,
@@ -135,3 +143,30 @@ def test_a_container_that_is_too_high_is_refused(model):
 def test_an_arm_that_cannot_rise_is_refused(model, poses):
     with pytest.raises(SettingsError, match="cannot rise"):
         plan_halts(model, np.array(TWISTED), poses, SPACE)
+
+
+def test_the_elbow_is_where_the_upper_arm_ends(model):
+    """On the sphere of the upper arm, lower by the offset of the elbow's axis."""
+    constants = model.constants
+    q = np.zeros((2, 7))
+    q[:, 0], q[:, 1] = (0.7, -1.1), (0.4, 1.2)
+    found = elbow_of(constants, q)
+    for row, (q1, q2) in zip(found, q[:, :2], strict=True):
+        out = 0.55 * np.sin(q2)
+        expected = [out * np.cos(q1), out * np.sin(q1), 0.55 * np.cos(q2) - 0.045]
+        assert row == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_pose_beyond_a_stop_is_refused_with_its_joint(model, joint, side):
+    constants = model.constants
+    stops = constants.q_lower if side == "lower" else constants.q_upper
+    inward = 1.0 if side == "lower" else -1.0
+    low = FreeSpace(-5.0)
+    pose = np.array(UPRIGHT)
+    pose[joint] = stops[joint] + inward * (OFFSET + 1e-6)
+    check_poses(model, [pose], low)
+    pose[joint] = stops[joint] + inward * (OFFSET - 1e-6)
+    with pytest.raises(SettingsError, match=f"Pose 2 .* joint {joint + 1} is beyond"):
+        check_poses(model, [np.array(UPRIGHT), pose], low)

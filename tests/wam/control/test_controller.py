@@ -237,3 +237,24 @@ def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
         before = sys.getallocatedblocks()
         compute(2000)
         assert sys.getallocatedblocks() - before < 100  # less than one in 20 cycles
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
+    foot_model, way
+):
+    """Joints that carry weight and are braked with all there is, either way."""
+    law = with_walls(foot_model)
+    law.enter(ArmState.HOLD, reading(0.0))
+    tau, gravity = law.torque(reading(5.0, qd=np.full(7, -way * 100.0)))
+    assert abs(gravity[1]) > 5.0
+    assert tau[:6] == pytest.approx(np.full(6, way * 0.9 * 40.0))
+
+
+def test_an_arm_that_floated_is_held_where_it_is_then(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.enter(ArmState.FLOAT, reading(1.0))
+    there = DOWN + np.array([0.1, -0.1, 0.1, 0.1, -0.1, 0.1, 0.0])
+    law.enter(ArmState.HOLD, reading(2.0, q=there))
+    tau, gravity = law.torque(reading(9.0, q=there))
+    assert tau[:6] == pytest.approx(gravity[:6], abs=1e-9)

@@ -54,8 +54,9 @@ def test_the_pd_part_is_clipped_joint_by_joint():
     error = np.full(7, 1.0)
     tau = joint_pd(np.full(7, 1e4), np.zeros(7), error, np.zeros(7))
     assert tau == pytest.approx(TORQUE_LIMIT)
-    assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), error, error) == pytest.approx(
-        np.full(7, 5.0)
+    half = 0.5 * error
+    assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), half, error) == pytest.approx(
+        np.full(7, 4.0)
     )
 
 

@@ -164,3 +164,13 @@ def test_the_damper_of_a_wall_is_as_strong_as_it_was_chosen():
         q = np.array([-1.0 + DEPTH - depth, *np.zeros(6)])
         braked = pushed(walls, q, qd)[0] - pushed(walls, q)[0]
         assert braked == pytest.approx(-share * damping * speed)
+
+
+def test_beyond_the_stop_the_damper_grows_no_more():
+    damping, speed = 3.0, -0.4
+    walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
+    pushed(walls, np.zeros(7))
+    q, qd = at(-1.0 - DEPTH / 2), at(speed)
+    assert pushed(walls, q, qd)[3] - pushed(walls, q)[3] == pytest.approx(
+        -damping * speed
+    )

@@ -139,3 +139,32 @@ def test_a_node_that_is_no_motor_is_named():
     rig.network.set_property(4, "ROLE", int(PuckRole.SAFETY))
     with pytest.raises(PreflightError, match=r"Node 4 is not a motor puck"):
         start(rig)
+
+
+SLEEP = bytes.fromhex("85 00 00 00 00 00")
+
+
+def test_a_puck_that_does_not_wake_is_named():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.link.send(5, SLEEP)
+    rig.rest(600 * MS)
+    receive = rig.network.receive
+    rig.network.receive = lambda t, i, d: (
+        None if i == 5 and bytes(d[:1]) == b"\x85" else receive(t, i, d)
+    )
+    with pytest.raises(PreflightError, match="Puck 5 does not wake up"):
+        start(rig)
+
+
+def test_pucks_are_woken_one_after_the_other_and_left_alone_while_they_boot():
+    rig = Rig(counts=HOME_COUNTS)
+    for node in (2, 5):
+        rig.link.send(node, SLEEP)
+    rig.rest(600 * MS)
+    rig.sent.clear()
+    start(rig)
+    woken = [t for t, i, d in rig.sent if i in (2, 5) and len(d) == 6 and d[0] == 0x85]
+    assert len(woken) == 2
+    assert woken[1] - woken[0] >= 10 * MS
+    after = min(t for t, *_ in rig.sent if t > woken[1])
+    assert after - woken[1] >= 1000 * MS
