@@ -1,8 +1,127 @@
-"""`python -m experiments` is `traction`."""
+# PYTHON_ARGCOMPLETE_OK
+"""The command line: parse, run one command, turn errors into messages and codes."""
 
+import argparse
+import importlib
 import sys
+from collections.abc import Mapping, Sequence
 
-from experiments.cli import main
+from acquisition import TractionError
+from experiments.arguments import add_global_options
+
+COMMANDS = {
+    "check": "is the rig fit to run? one graded page",
+    "run": "record a session of trials on one terrain",
+    "resume": "continue the session that is not finished",
+    "redo": "record any one trial of a session once more",
+    "status": "the matrix board, counted from verified files",
+    "note": "write a remark on a session or a trial",
+    "verdict": "keep or reject a recorded trial, days later",
+    "zero": "set the home position after confirmation",
+    "bench": "what the loop achieves on this machine",
+    "calibrate": "guided calibrations of the rig",
+    "fake": "serve the simulated arm to other programs over CAN",
+    "replay": "show a trial again, or a bus log in words",
+    "export": "trials as CSV tables with units and checksums",
+    "init": "write rig.toml and matrix.toml to be edited",
+    "verify": "hold kept trials against the checksums of the journal",
+    "recover": "save what is sound of trials that were not ended",
+    "rehearse": "the whole study simulated, held against what it has to show",
+    "report": "fit and compare models of recorded sessions, write the report",
+    "identify": "which terrain is this? probabilities over time",
+    "fit": "the same for tables that Traction did not record",
+}
+EXIT_CODES = """\
+exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
+4 device fault, 5 session left unfinished on purpose, 6 data failed verification,
+130 interrupted outside a session"""
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Keeps the examples as they are written."""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands; imports no slow library."""
+    parser = argparse.ArgumentParser(
+        prog="traction",
+        description="Measures how a robotic foot grips loose stones.",
+        epilog="rehearse without hardware: traction run S0 --fake --fast\n\n"
+        + EXIT_CODES,
+        formatter_class=_Formatter,
+    )
+    add_global_options(parser)
+    parser.add_argument("--version", action="version", version=f"traction {_version()}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for name, help_text in COMMANDS.items():
+        module = importlib.import_module(f"experiments.commands.{name}")
+        child = commands.add_parser(
+            name,
+            help=help_text,
+            description=help_text[0].upper() + help_text[1:] + ".",
+            epilog=f"examples:\n{module.EXAMPLES}\n\n{EXIT_CODES}",
+            formatter_class=_Formatter,
+        )
+        add_global_options(child, is_after_command=True)
+        module.add_arguments(child)
+        child.set_defaults(run=module.run)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    parser = build_parser()
+    try:
+        import argcomplete
+
+        argcomplete.autocomplete(parser)
+    except ImportError:
+        pass
+    args = parser.parse_args(arguments)
+    try:
+        code = args.run(args)
+    except TractionError as error:
+        print(error, file=sys.stderr)  # noqa: T201
+        if args.verbose and error.__cause__ is not None:
+            print(f"cause: {error.__cause__!r}", file=sys.stderr)  # noqa: T201
+        return error.exit_code
+    except KeyboardInterrupt:
+        return _tell("nothing-lost", {})
+    except BrokenPipeError:
+        return 0
+    except Exception:
+        return _report_bug()
+    return int(code)
+
+
+def _report_bug() -> int:
+    """Write the traceback to a log and say where it is."""
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="traction-bug-", suffix=".log", delete=False
+    ) as log:
+        log.write(traceback.format_exc())
+    return _tell("command-bug", {"error": repr(sys.exc_info()[1]), "log": log.name})
+
+
+def _tell(name: str, details: Mapping[str, object]) -> int:
+    """Print a message of the catalogue and return its exit code."""
+    from experiments.messages import CATALOGUE
+
+    print(CATALOGUE[name].text(details), file=sys.stderr)  # noqa: T201
+    return CATALOGUE[name].exit_code
+
+
+def _version() -> str:
+    from importlib import metadata
+
+    try:
+        return metadata.version("traction")
+    except metadata.PackageNotFoundError:
+        return "unknown"
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import ArmReading, Sample, WrenchSample
+from acquisition.control_loop import FootObserver
 from wam.model import GRAVITY, ArmModel, Array, Tool
 
 Floats = NDArray[np.float64]
@@ -144,8 +145,8 @@ def traction(axes: Array, velocity: Floats, force: Floats) -> Floats:
     return np.stack([v_t, -(force @ axes[0]), force @ axes[2]], axis=-1)
 
 
-class LiveFoot:
-    """Foot pose and traction of a sample (implements FootObserver)."""
+class LiveFoot(FootObserver):
+    """Foot pose and traction of a sample."""
 
     def __init__(
         self, model: ArmModel, payload: Payload, terrain: TerrainFrame

@@ -23,10 +23,14 @@ TESTS = {
     ),
     f"{_LOOP}/states.py": (f"{_LOOP_TESTS}/test_states.py",),
     f"{_LOOP}/faults.py": (f"{_LOOP_TESTS}/test_faults.py",),
-    f"{_LOOP}/contact.py": (f"{_LOOP_TESTS}/test_contact.py",),
-    f"{_LOOP}/limits.py": (f"{_LOOP_TESTS}/test_guard.py",),
-    f"{_LOOP}/torque_limiter.py": (f"{_LOOP_TESTS}/test_torque_limiter.py",),
-    f"{_LOOP}/wrench_feed.py": (f"{_LOOP_TESTS}/test_cycle.py",),
+    f"{_LOOP}/contact.py": (
+        f"{_LOOP_TESTS}/test_contact.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
+    f"{_LOOP}/limits.py": (
+        f"{_LOOP_TESTS}/test_torque_limiter.py",
+        f"{_LOOP_TESTS}/test_guard.py",
+    ),
     "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
     f"{_FILE}/salvage.py": _SALVAGED,
     f"{_FILE}/recover.py": _SALVAGED,
@@ -34,12 +38,11 @@ TESTS = {
         f"{_CONTROL_TESTS}/test_controller.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
     ),
-    f"{_CONTROL}/position_hold.py": (
+    f"{_CONTROL}/position_control.py": (
         f"{_CONTROL_TESTS}/test_position_hold.py",
-        f"{_CONTROL_TESTS}/test_controller.py",
+        f"{_CONTROL_TESTS}/test_joint_move.py",
     ),
     f"{_CONTROL}/joint_lock.py": (f"{_CONTROL_TESTS}/test_joint_lock.py",),
-    f"{_CONTROL}/joint_move.py": (f"{_CONTROL_TESTS}/test_joint_move.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
     f"{_DRIVER}/status_poller.py": (
@@ -50,10 +53,10 @@ TESTS = {
         f"{_DRIVER_TESTS}/test_arm.py",
         f"{_DRIVER_TESTS}/test_lost_replies.py",
     ),
-    f"{_DRIVER}/zero_check.py": ("tests/experiments/preflight/test_zero_check.py",),
     f"{_DRIVER}/startup.py": (
         f"{_DRIVER_TESTS}/test_startup.py",
         f"{_DRIVER_TESTS}/test_home_check.py",
+        "tests/experiments/preflight/test_zero_check.py",
         f"{_DRIVER_TESTS}/test_generations.py",
         f"{_DRIVER_TESTS}/test_safety_limits.py",
     ),
@@ -72,9 +75,11 @@ TESTS = {
     "experiments/session/crash_recovery.py": (
         "tests/experiments/session/test_crash_recovery.py",
     ),
-    f"{_RUN}/activation.py": (f"{_RUN_TESTS}/test_activation.py",),
     f"{_RUN}/stop.py": (f"{_RUN_TESTS}/test_stop_flag.py",),
-    f"{_RUN}/ready.py": (f"{_RUN_TESTS}/test_flow_steps.py",),
+    f"{_RUN}/ready.py": (
+        f"{_RUN_TESTS}/test_activation.py",
+        f"{_RUN_TESTS}/test_flow_steps.py",
+    ),
     f"{_RUN}/tare.py": (f"{_RUN_TESTS}/test_tare.py",),
     "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
 }

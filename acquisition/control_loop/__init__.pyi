@@ -9,6 +9,7 @@ from .faults import (
     to_plain,
     verdict_for,
 )
+from .law import ControlLaw, FootObserver
 from .limits import GuardLimits
 from .loop import Loop, LoopStats, Tick
 from .realtime import Grant, RealtimeRequest, choose_cores, die_with_parent, request
@@ -20,10 +21,12 @@ __all__ = [
     "Action",
     "ArmState",
     "CircuitCauses",
+    "ControlLaw",
     "ControlStatus",
     "Cycle",
     "CycleOutputs",
     "Fault",
+    "FootObserver",
     "Grant",
     "GuardLimits",
     "GuardVerdict",

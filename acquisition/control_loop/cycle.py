@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.control_loop.contact import Contact, contact_of
+from acquisition.control_loop.contact import Contact, WrenchFeed, contact_of
 from acquisition.control_loop.faults import (
     Action,
     CircuitCauses,
@@ -15,7 +15,7 @@ from acquisition.control_loop.faults import (
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
 from acquisition.control_loop.law import ControlLaw, FootObserver
-from acquisition.control_loop.limits import GuardLimits
+from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import (
     REQUESTS,
@@ -25,8 +25,6 @@ from acquisition.control_loop.states import (
     ArmState,
     ControlStatus,
 )
-from acquisition.control_loop.torque_limiter import bounded_torque
-from acquisition.control_loop.wrench_feed import WrenchFeed
 from acquisition.devices import (
     Arm,
     ArmReading,

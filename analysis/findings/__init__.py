@@ -1,7 +1,7 @@
 """Everything a report shows, computed once and free of layout.
 
 `findings` joins the results of a study with trends, residuals, surfaces and the health
-of the rig; `as_numbers` writes them as plain values. Begin with `findings`.
+of the rig and writes them as plain values. Begin with `findings`.
 """
 
 import lazy_loader

@@ -1,5 +1,10 @@
-from .as_numbers import findings_rows, plain_findings
-from .findings import RESIDUAL_MODELS, StudyResults, compute_results
+from .findings import (
+    RESIDUAL_MODELS,
+    StudyResults,
+    compute_results,
+    findings_rows,
+    plain_findings,
+)
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend

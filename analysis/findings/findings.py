@@ -2,8 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from analysis.findings.rig_health import RigTrial
+import numpy as np
+
+from analysis.data import LEVELS
+from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.surfaces import (
     CoverageMap,
     Surface,
@@ -14,6 +18,7 @@ from analysis.findings.surfaces import (
     surfaces,
 )
 from analysis.findings.trends import (
+    TREND_UNITS,
     NoiseSummary,
     ResidualBand,
     Trend,
@@ -21,8 +26,8 @@ from analysis.findings.trends import (
     residual_band,
     trends_of,
 )
-from analysis.study import GP_SE, TUSTIN, Study
-from analysis.terrains import Identification, identify_study
+from analysis.study import GP_SE, TUSTIN, CsvRow, Study
+from analysis.terrains import Confusion, Identification, identify_study
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 
@@ -85,3 +90,178 @@ def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
         coverage=coverages(study, edges),
         rig=rig,
     )
+
+
+_DIGITS = 5  # of the surfaces in fits.json
+
+
+def plain_findings(results: StudyResults) -> dict[str, Any]:
+    """Return the findings as plain values for fits.json, with units."""
+    return {
+        "identification": _identification(results.identification),
+        "noise": {summary.terrain: _noise(summary) for summary in results.noise},
+        "trends": {
+            name: {key: _trend(trend) for key, trend in trends.items()}
+            for name, trends in results.trends.items()
+        },
+        "residuals": {
+            name: {model: _residuals(band) for model, band in bands.items()}
+            for name, bands in results.residuals.items()
+        },
+        "surfaces": _surfaces(results),
+        "coverage": _coverage(results),
+        "rig": [trial.numbers() for trial in results.rig],
+        "units": {
+            "nlpd_constant": "log N",
+            "nlpd_chosen": "log N",
+            "trend means, slope, slope_error, spread": TREND_UNITS,
+            "residual quantiles, bias, sd": "N",
+            "F_n": "N",
+            "v_t": "m/s",
+            "mean": "N",
+            "variance": "N^2",
+            "rig": HEALTH_UNITS,
+        },
+    }
+
+
+def findings_rows(results: StudyResults) -> list[CsvRow]:
+    """Return the findings as lines of fits.csv."""
+    rows: list[CsvRow] = []
+    for s in results.noise:
+        rows += [
+            CsvRow(s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
+            CsvRow(s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
+        ]
+    for name, trends in results.trends.items():
+        for key, trend in trends.items():
+            values = {"slope per trial": trend.slope, "slope error": trend.slope_error}
+            values["spread of trial means"] = trend.spread
+            rows += [
+                CsvRow(name, "", "", f"{key} {what}", value, TREND_UNITS[key])
+                for what, value in values.items()
+                if value is not None
+            ]
+    for name, bands in results.residuals.items():
+        for model, band in bands.items():
+            rows.append(CsvRow(name, model, "", "residual bias", band.bias, "N"))
+            rows.append(CsvRow(name, model, "", "residual sd", band.sd, "N"))
+    return rows + _recognised(results.identification) + _rig_rows(results.rig)
+
+
+def _recognised(
+    identification: Identification | None,
+) -> list[CsvRow]:
+    if identification is None:
+        return []
+    rules = {
+        "log density": identification.by_density,
+        "smallest error": identification.by_error,
+    }
+    return [
+        CsvRow("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
+        for rule, sizes in rules.items()
+        for size, levels in sizes.items()
+        for level in LEVELS
+        if np.isfinite(share := levels[level].accuracy)
+    ]
+
+
+def _rig_rows(
+    rig: Sequence[RigTrial],
+) -> list[CsvRow]:
+    return [
+        CsvRow(
+            trial.terrain,
+            "",
+            "",
+            f"{trial.name} {key}",
+            float(value),
+            HEALTH_UNITS[key],
+        )
+        for trial in rig
+        for key, value in trial.numbers().items()
+        if key in HEALTH_UNITS and isinstance(value, int | float)
+    ]
+
+
+def _noise(summary: NoiseSummary) -> dict[str, Any]:
+    return {
+        "folds": summary.counts,
+        "nlpd_constant": summary.before,
+        "nlpd_chosen": summary.after,
+        "paired": summary.paired._asdict(),
+    }
+
+
+def _residuals(band: ResidualBand) -> dict[str, Any]:
+    return {
+        "v_t": band.v.tolist(),
+        "quantiles": band.quantiles.tolist(),
+        "bias": band.bias,
+        "sd": band.sd,
+    }
+
+
+def _surfaces(results: StudyResults) -> dict[str, Any]:
+    return {
+        "F_n": _short(results.axes.F_n),
+        "v_t": _short(results.axes.v_t),
+        "terrains": {
+            s.terrain: {"mean": _short(s.mean), "variance": _short(s.variance)}
+            for s in results.surfaces
+        },
+    }
+
+
+def _coverage(results: StudyResults) -> dict[str, Any]:
+    return {
+        "F_n_edges": _short(results.edges.F_n),
+        "v_t_edges": _short(results.edges.v_t),
+        "terrains": {
+            c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
+            for c in results.coverage
+        },
+    }
+
+
+def _identification(identification: Identification | None) -> dict[str, Any] | None:
+    if identification is None:
+        return None
+    return {
+        "windows_samples": list(identification.by_density),
+        "by_density": _confusions(identification.by_density),
+        "by_error": _confusions(identification.by_error),
+        "neighbour_correlation": dict(identification.rho),
+    }
+
+
+def _confusions(sizes: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
+    return {
+        str(size): {
+            level: {
+                "names": list(confusion.names),
+                "counts": confusion.counts.tolist(),
+                "recognised": confusion.accuracy,
+            }
+            for level, confusion in levels.items()
+        }
+        for size, levels in sizes.items()
+    }
+
+
+def _trend(trend: Trend) -> dict[str, Any]:
+    return {
+        "trials": trend.trials.astype(int).tolist(),
+        "means": trend.means.tolist(),
+        "slope": trend.slope,
+        "slope_error": trend.slope_error,
+        "spread": trend.spread,
+    }
+
+
+def _short(values: np.ndarray) -> Any:  # noqa: ANN401
+    """Return an array as nested lists of few digits."""
+    if values.ndim > 1:
+        return [_short(row) for row in values]
+    return [float(f"{value:.{_DIGITS}g}") for value in values.tolist()]

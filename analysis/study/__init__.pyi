@@ -1,7 +1,5 @@
-from .atomic_files import write_atomic
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
-from .fold_store import ResultStore
 from .jobs import Store, Workers, available_cores, run_tasks
 from .metrics import PairedComparison, Prediction, compare
 from .models import (
@@ -20,6 +18,7 @@ from .models import (
     TustinModel,
 )
 from .noise_selection import NAMES
+from .store import ResultStore, write_atomic
 from .study import (
     LIFTED_WARNING,
     Study,

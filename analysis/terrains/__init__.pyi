@@ -1,8 +1,8 @@
 from .database import load
-from .estimates import SlipRisk, TractionEstimate, TractionEstimates
 from .export import database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .recognition import Recognition, recognise
+from .table import SlipRisk, TractionEstimate, TractionEstimates
 
 __all__ = [
     "KEPT_PER_SECOND",

@@ -25,8 +25,7 @@ import numpy as np
 from acquisition import SettingsError
 from analysis.data import Array
 from analysis.study import Prediction
-from analysis.terrains.estimates import SlipRisk, TractionEstimate, TractionEstimates
-from analysis.terrains.table import Table
+from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
 FORMAT, VERSION = "traction-terrain-db", 1
 _LARGEST = 6_000_000  # bytes; in memory it takes thirty times as much

@@ -1,7 +1,7 @@
 """How well the terrains of a study can be told apart, by models that never saw a trial.
 
 Windows of motion are attributed to a terrain by two rules: the largest log density of
-`analysis.terrains.scores`, and the smallest mean absolute error, which is the paper's.
+`recognition`, and the smallest mean absolute error, which is the paper's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.data import PreparedTrial, groups_of
 from analysis.study import GP_SE, Study, TerrainResult, run_tasks
-from analysis.terrains.scores import (
+from analysis.terrains.recognition import (
     Expert,
     Predictor,
     TerrainScores,

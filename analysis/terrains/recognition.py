@@ -1,10 +1,144 @@
-"""One trial against a terrain database: probabilities over time, and a verdict."""
+"""One trial against known terrains: log densities, probabilities over time, a verdict.
 
+Neighbouring samples repeat each other, so a sample is judged by what it adds: with the
+standardised residual z_i = (y_i - m_i) / s_i and its correlation rho from one sample to
+the next
+
+    ll = sum_i log N(z_i; rho z_{i-1}, 1 - rho^2) - log s_i
+
+(a first-order process; after a gap, and at first, log N(z_i; 0, 1)). Single terms are
+held above a floor, which keeps one spike from deciding. The posterior is the softmax of
+ll / tau: what is left of the correlation makes plain sums overconfident.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.data import PreparedTrial
+import numpy as np
+
+from analysis.data import Array, PreparedTrial
+from analysis.study import Prediction
 from analysis.terrains.database import KnownTerrain, TerrainDatabase
-from analysis.terrains.scores import Expert, TerrainScores, score_trial
+
+TAU = 10.0  # samples that count as one
+_SMALLEST_SD = 1e-6  # N
+_SPIKE = 10.0  # standard deviations beyond which a larger error adds nothing
+Predictor = Callable[[Array, Array], Prediction]
+
+
+@dataclass(frozen=True, slots=True)
+class Expert:
+    """The prediction of one terrain's model.
+
+    Attributes:
+        predict: F_t of given (F_n, v_t).
+        rho: correlation of its standardised residual from one sample to the next.
+    """
+
+    predict: Predictor
+    rho: float
+
+
+def log_densities(trial: PreparedTrial, prediction: Prediction, rho: float) -> Array:
+    """Return the log density of every kept sample given the one before, shape (n,)."""
+    sd = np.maximum(prediction.sd, _SMALLEST_SD)
+    z = (trial.F_t - prediction.mean) / sd
+    before = np.where(_is_next(trial), rho, 0.0)
+    spread = 1.0 - before**2
+    innovation = z.copy()
+    innovation[1:] -= before[1:] * z[:-1]
+    squares = np.minimum(innovation**2 / spread, _SPIKE**2)
+    return -0.5 * (squares + np.log(2.0 * np.pi * spread)) - np.log(sd)
+
+
+def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Prediction]]) -> float:
+    """Return rho of trials under their own terrain's models, 0 to 0.99."""
+    products = squares = 0.0
+    for trial, prediction in pairs:
+        z = (trial.F_t - prediction.mean) / np.maximum(prediction.sd, _SMALLEST_SD)
+        is_next = _is_next(trial)[1:]
+        products += float((z[1:] * z[:-1])[is_next].sum())
+        squares += float((z[:-1] ** 2)[is_next].sum())
+    return min(max(products / squares, 0.0), 0.99) if squares > 0.0 else 0.0
+
+
+def _is_next(trial: PreparedTrial) -> np.ndarray:
+    """Return which kept samples follow the one before without a gap, shape (n,)."""
+    steps = np.diff(trial.indices)
+    usual = int(steps.min()) if steps.size else 1
+    return np.concatenate([[False], steps == usual])[: trial.kept]
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainScores:
+    """How a trial fits each terrain, sample by sample.
+
+    Attributes:
+        terrains: names, m of them.
+        log_density: of every kept sample, shape (n, m).
+        error: absolute error of every kept sample [N], shape (n, m).
+        strain: squared error over the predicted variance, shape (n, m); 1 on average
+            where the model is right.
+    """
+
+    terrains: tuple[str, ...]
+    log_density: Array
+    error: Array
+    strain: Array
+
+    def windows(self, size: int) -> "list[slice]":
+        """Return consecutive windows of `size` kept samples; a rest is left out."""
+        return [
+            slice(k, k + size) for k in range(0, len(self.log_density) - size + 1, size)
+        ]
+
+    def posterior(self, rows: slice) -> Array:
+        """Return the probability of each terrain after the samples `rows`, (m,)."""
+        total = self.log_density[rows].sum(axis=0) / TAU
+        weight = np.exp(total - total.max())
+        return weight / weight.sum()
+
+    def least_error(self, rows: slice) -> str:
+        """Return the terrain whose model is nearest on average: the paper's rule."""
+        return self.terrains[int(self.error[rows].mean(axis=0).argmin())]
+
+    def likeliest(self, rows: slice) -> str:
+        """Return the terrain of the largest log density."""
+        return self.terrains[int(self.log_density[rows].sum(axis=0).argmax())]
+
+    def likeliest_group(self, rows: slice, groups: Mapping[str, str]) -> str:
+        """Return the group whose terrains have most of the posterior together.
+
+        Args:
+            rows: the samples that decide.
+            groups: group by name of the terrain.
+        """
+        total: dict[str, float] = {}
+        for name, share in zip(self.terrains, self.posterior(rows), strict=True):
+            group = groups[name]
+            total[group] = total.get(group, 0.0) + float(share)
+        return max(total, key=lambda name: total[name])
+
+
+def score_trial(trial: PreparedTrial, experts: Mapping[str, Expert]) -> TerrainScores:
+    """Return how `trial` fits the prediction of every expert."""
+    predictions = [
+        (expert.predict(trial.F_n, trial.v_t), expert.rho)
+        for expert in experts.values()
+    ]
+    empty = np.zeros((trial.kept, 0))
+    density = [log_densities(trial, p, rho) for p, rho in predictions]
+    error = [np.abs(trial.F_t - p.mean) for p, _ in predictions]
+    strain = [
+        ((trial.F_t - p.mean) / np.maximum(p.sd, _SMALLEST_SD)) ** 2
+        for p, _ in predictions
+    ]
+    columns = [
+        np.column_stack(values) if values else empty
+        for values in (density, error, strain)
+    ]
+    return TerrainScores(tuple(experts), *columns)
+
 
 NONE = "none"  # of the known terrains
 

@@ -1,4 +1,4 @@
-"""A table of traction over load and velocity, read at any point between its own."""
+"""What a terrain database answers, and the table that it is read from."""
 
 from bisect import bisect_right
 from dataclasses import dataclass
@@ -79,3 +79,57 @@ def _blend(
     left = low[j] + b * (low[j + 1] - low[j])
     right = high[j] + b * (high[j + 1] - high[j])
     return left + a * (right - left)
+
+
+@dataclass(frozen=True, slots=True)
+class TractionEstimate:
+    """What is to be expected of a terrain at one point.
+
+    Attributes:
+        mean: traction [N].
+        sd: its standard deviation [N], noise included.
+        is_extrapolated: the point lies outside the table: the values are of its edge.
+    """
+
+    mean: float
+    sd: float
+    is_extrapolated: bool = False
+
+    def quantile(self, share: float) -> float:
+        """Return the traction [N] that is not reached with probability `share`."""
+        from scipy.special import ndtri
+
+        return self.mean + self.sd * float(ndtri(share))
+
+
+@dataclass(frozen=True, slots=True)
+class TractionEstimates:
+    """What is to be expected of a terrain at many points, arrays of shape (n,).
+
+    Attributes:
+        mean: traction [N].
+        sd: its standard deviation [N], noise included.
+        is_extrapolated: which points lie outside the table.
+    """
+
+    mean: Array
+    sd: Array
+    is_extrapolated: NDArray[np.bool_]
+
+
+class SlipRisk(float):
+    """A probability of slipping, a number that knows where it comes from.
+
+    Attributes:
+        is_extrapolated: the point lies outside the table: the risk is that of its edge,
+            and nobody has measured it.
+    """
+
+    __slots__ = ("is_extrapolated",)
+    is_extrapolated: bool
+
+    def __new__(cls, probability: float, *, is_extrapolated: bool) -> "SlipRisk":
+        """Return the risk `probability` (0 to 1)."""
+        risk = super().__new__(cls, probability)
+        risk.is_extrapolated = is_extrapolated
+        return risk

@@ -1,5 +1,5 @@
-from .activation import activate
 from .console_loop import TICK, ConsoleLoop
+from .ready import activate
 from .resume import (
     ResumeChoice,
     ResumeRequest,

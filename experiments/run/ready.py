@@ -1,10 +1,11 @@
-"""Between two trials: the terrain is reset; notes, pauses, and a look at the last."""
+"""Before a trial: arm activated, terrain reset; notes, pauses, a look at the last."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition import SessionError
+from acquisition import MOTOR_FRESH_SHIFT, SafetyMode, SessionError
 from acquisition.control_loop import ArmState
+from experiments.messages import preflight_error, pucks_have
 from experiments.operator import (
     NOTE_KEYS,
     KeyAction,
@@ -14,10 +15,57 @@ from experiments.operator import (
     ready_lines,
     screen_keys,
 )
+from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import LONGEST_TEXT, Event, TrialName, add_remark, clean_text
 from experiments.trial import review_trial
+
+PATIENCE = 120.0  # how long a person may take to activate the arm [s]
+_READY_SECONDS = 0.1  # from the request for hold to its first torques
+
+
+def activate(console_loop: ConsoleLoop) -> None:
+    """Get torques ready, then wait for the pendant and for [space].
+
+    Raises:
+        PreflightError: no torques can be made ready, or the arm was not activated
+            within two minutes.
+        StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
+    """
+    control, clock = console_loop.loop_client, console_loop.rig.clock
+    control.request(ArmState.HOLD)
+    control.advance(_READY_SECONDS)
+    _require_torques(console_loop)
+    console_loop.console.say(
+        "Press Shift-activate on the pendant, support the arm, then [space]."
+    )
+    is_ready = False
+    start_ns = clock.now_ns()
+    while True:
+        is_ready = console_loop.tick(Prompt.SUPPORT) == " " or is_ready
+        if is_ready and control.status.safety is SafetyMode.ACTIVE:
+            return
+        if (clock.now_ns() - start_ns) * 1e-9 > PATIENCE:
+            raise preflight_error("not-active", seconds=PATIENCE)
+
+
+def _require_torques(console_loop: ConsoleLoop) -> None:
+    """Refuse to ask for the pendant while the arm would be active and fall.
+
+    Hold begins with a complete reading; without one no torque would be there.
+    """
+    control = console_loop.loop_client
+    loop = control.loop
+    if loop.control.state is ArmState.HOLD or loop.control.verdict is not None:
+        return  # ready, or the next tick tells why not
+    if loop.control.safety is SafetyMode.E_STOP:
+        raise preflight_error("no-power")
+    silent = ~int(control.latest()["flags"][0]) >> MOTOR_FRESH_SHIFT & 0x7F
+    detail = f"{pucks_have(silent)} not answered for {_READY_SECONDS * 1e3:.0f} ms."
+    if loop.is_bus_down:
+        detail = "The CAN interface refuses to send and receive."
+    raise preflight_error("not-ready", detail=detail)
 
 
 def wait_ready(context: RunContext, name: TrialName) -> None:

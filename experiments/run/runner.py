@@ -16,10 +16,9 @@ from experiments.operator import (
     key_action,
     screen_keys,
 )
-from experiments.run.activation import activate
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, open_context
-from experiments.run.ready import take_note, wait_ready
+from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.run.tare import take_end_tare, take_tare

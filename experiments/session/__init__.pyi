@@ -7,7 +7,6 @@ from .annotations import (
     parse_trial,
     trial_path,
 )
-from .board_notes import board_notes
 from .crash_recovery import recover_session
 from .data_files import (
     read_json,
@@ -20,6 +19,7 @@ from .journal import Journal, open_journal
 from .kept_files import (
     Deviation,
     KeptDataError,
+    board_notes,
     check_kept,
     compare_kept,
     compare_trial,

@@ -1,4 +1,4 @@
-"""The kept trials as the journal has them, held against the files on the disk."""
+"""Kept trials as the journal has them against the files: what is missing or changed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,9 +9,10 @@ from acquisition import SessionError, TrialFileError
 from acquisition.trial_file import is_there
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
-from experiments.session.store import SessionFolder
+from experiments.session.store import JOURNAL_FILE, SessionFolder, list_sessions
 from experiments.session.trial_files import decision_of, find_sidecar
 from experiments.session.trial_name import TrialName
+from experiments.settings import MatrixSettings
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -168,3 +169,44 @@ def _changed(size: int, before: object) -> str:
     if type(before) is not int or size == before:
         return "is changed: its checksum is wrong"
     return f"is changed: {size} bytes, {before} were kept"
+
+
+def board_notes(
+    data: Path,
+    matrix: MatrixSettings,
+    where: Mapping[str, str],
+    board: Sequence[object],
+) -> list[str]:
+    """Return why a board shows less than somebody may expect, a line for each reason.
+
+    Args:
+        data: the data folder.
+        matrix: the terrains.
+        where: the conditions that the board was counted with.
+        board: its rows.
+    """
+    sessions = data / "sessions"
+    if not data.is_dir():
+        return [f"There is no data folder {data}: nothing is counted."]
+    if not sessions.is_dir():
+        return [f"There are no sessions in {data} yet."]
+    notes: list[str] = []
+    known = list_sessions(data)
+    named = {session.path for session in known}
+    for path in sorted(sessions.iterdir()):
+        if path not in named and (path / JOURNAL_FILE).is_file():
+            notes.append(
+                f"{path} has a journal, but not the name of a session: it is not "
+                "counted. Give it back its name."
+            )
+    terrains = {row.name for row in matrix.terrains}
+    notes += [
+        f"{session.path.name}: {session.terrain} is no terrain of the matrix; it is "
+        "not counted."
+        for session in known
+        if session.terrain not in terrains
+    ]
+    if where and not board:
+        asked = ",".join(f"{key}={value}" for key, value in where.items())
+        notes.append(f"Nothing matches --where {asked}.")
+    return notes

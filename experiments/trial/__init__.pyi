@@ -1,9 +1,9 @@
-from .files import TrialArchive
-from .header import (
+from .files import (
     TIME_LIMIT,
     EndDetector,
     PaceMonitor,
     SessionMetadata,
+    TrialArchive,
     collect_metadata,
     trial_header,
 )

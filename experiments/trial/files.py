@@ -1,25 +1,191 @@
-"""What is written of a recorded trial: the sealed file, its sidecar, the flight."""
+"""One trial on its way to the disk: header, end conditions, sidecar, flight record."""
 
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import TrialFileError
-from acquisition.trial_file import TrialHeader, VerifiedFile
+from acquisition import TrialFileError, utc_offset_ns
+from acquisition.ipc import last_frames
+from acquisition.recording import seal
+from acquisition.trial_file import (
+    FLIGHT_TOPICS,
+    TRUTH_TOPICS,
+    TrialHeader,
+    TrialWriter,
+    VerifiedFile,
+)
 from analysis.data import CoverageGrid, suggest
+from experiments import provenance
 from experiments.rig import Rig
 from experiments.session import (
     KEEP,
+    SessionFolder,
     TrialName,
     TrialOutcome,
+    iso_utc,
     read_json,
     sidecar_of,
     write_json,
 )
-from experiments.trial.header import SessionMetadata, write_flight, write_truth
 from experiments.trial.quality import Review
+from ft_sensor.calibration import payload_to_toml, terrain_to_toml
+from wam.model import urdf
+
+TIME_LIMIT = 30.0  # s
+AFTER_TRAVEL = 0.4  # a trial goes on this long after the foot has crossed [s]
+FLIGHT_SECONDS = 2.0
+PACE_SECONDS, PACE_LIMIT = 1.0, 0.2  # s, m/s
+
+
+@dataclass(frozen=True, slots=True)
+class SessionMetadata:
+    """What every trial of a session repeats in its metadata."""
+
+    folder: SessionFolder
+    operator: str
+    seed: int | None
+    provenance: dict[str, str]
+    diff: str
+
+
+def collect_metadata(
+    folder: SessionFolder, operator: str, seed: int | None, devices: Mapping[str, str]
+) -> SessionMetadata:
+    """Return the facts of a session; asks git once."""
+    details = provenance.collect()
+    details.update(devices)
+    return SessionMetadata(folder, operator, seed, details, provenance.diff_patch())
+
+
+def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHeader:
+    """Return everything that is known about a trial before its first cycle."""
+    row = rig.row
+    offset, uncertainty = utc_offset_ns(rig.clock)
+    assert rig.model.tool is not None
+    trial = {
+        "session": details.folder.id,
+        "trial": name.kept,
+        "attempt": str(name.attempt),
+        "terrain": row.name,
+        "incline_deg": repr(row.incline_deg),
+        "stone_size": row.stones,
+        "tread": "true" if row.foot == "tread" else "false",
+        "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
+        "foot_mass_kg": repr(rig.model.tool.foot.mass),
+        "gravity_model": rig.settings.rig.gravity.model,
+        "operator": details.operator,
+        "notes": "",
+        "simulated": "true" if rig.is_simulated else "false",
+        "seed": "" if details.seed is None else str(details.seed),
+        "started_utc": iso_utc(rig.clock.utc_ns()),
+    }
+    terrain = {"stones": row.stones, "foot": row.foot}
+    attachments = {
+        "config.toml": rig.settings.rig_text,
+        "matrix.toml": rig.settings.matrix_text,
+        "arm_model.toml": rig.model.constants.text,
+        "robot.urdf": urdf(rig.model.constants),
+        "ft_calibration.toml": payload_to_toml(rig.tared, rig.model.tool.sole),
+        "terrain.toml": terrain_to_toml(row.name, rig.frame, terrain),
+        "diff.patch": details.diff,
+    }
+    attachments.update(rig.settings.calibrations)
+    if rig.gravity_text:
+        attachments["gravity.toml"] = rig.gravity_text
+    return TrialHeader(
+        trial=trial,
+        utc_offset_ns=offset,
+        offset_uncertainty_ns=uncertainty,
+        provenance={**details.provenance, **rig.backend.loop_client.device_metadata()},
+        attachments={key: text.encode() for key, text in attachments.items()},
+        robot_description=attachments["robot.urdf"],
+    )
+
+
+@dataclass(slots=True)
+class EndDetector:
+    """Decides when a running trial is over, from time and travel.
+
+    Attributes:
+        travel: length of the container [m].
+        crossed_at: when the foot had crossed it [s since start], None before.
+    """
+
+    travel: float
+    crossed_at: float | None = None
+
+    def reason(self, elapsed: float, displacement: float) -> str:
+        """Return why the trial ends now, "" while it goes on."""
+        if self.crossed_at is None and displacement >= self.travel:
+            self.crossed_at = elapsed
+        if self.crossed_at is not None and elapsed >= self.crossed_at + AFTER_TRAVEL:
+            return "travel"
+        return "time-limit" if elapsed >= TIME_LIMIT else ""
+
+
+@dataclass(slots=True)
+class PaceMonitor:
+    """Notices a foot that is pushed too fast, not one that slips.
+
+    A slip is over after centimetres; a second at 0.2 m/s is a push that leaves no time
+    to stick, which is all that the friction models live on.
+    """
+
+    _path: deque[tuple[float, float]] = field(
+        default_factory=deque[tuple[float, float]]
+    )
+
+    def is_too_fast(self, elapsed: float, displacement: float) -> bool:
+        """Return whether the last second was too fast; then not again for a second.
+
+        Args:
+            elapsed: since the start of the trial [s], growing.
+            displacement: of the foot along the container [m].
+        """
+        path = self._path
+        path.append((elapsed, displacement))
+        while elapsed - path[0][0] > PACE_SECONDS:
+            start = path.popleft()
+            if displacement - start[1] > PACE_LIMIT * (elapsed - start[0]):
+                path.clear()
+                return True
+        return False
+
+
+def write_truth(rig: Rig, header: TrialHeader, path: Path) -> VerifiedFile | None:
+    """Write what the simulation knows beside a trial; None on the real rig."""
+    if rig.simulation is None:
+        return None
+    records = rig.simulation.take_truth()
+    if len(records) < 2:
+        return None
+    parameters = {f"true:{k}": v for k, v in rig.simulation.parameters().items()}
+    truth_header = TrialHeader(
+        trial={**header.trial, **parameters},
+        utc_offset_ns=header.utc_offset_ns,
+        offset_uncertainty_ns=header.offset_uncertainty_ns,
+        provenance=header.provenance,
+        attachments=header.attachments,
+        robot_description="",
+    )
+    writer = TrialWriter(path, truth_header, TRUTH_TOPICS)
+    writer.write_truth(records)
+    return seal(writer, "simulation")
+
+
+def write_flight(rig: Rig, header: TrialHeader, path: Path, reason: str) -> None:
+    """Write the last two seconds with raw frames after a fault."""
+    writer = TrialWriter(path, header, FLIGHT_TOPICS)
+    writer.write_cycles(rig.backend.loop_client.last(FLIGHT_SECONDS))
+    writer.write_can(last_frames(rig.shared.frames, FLIGHT_SECONDS))
+    writer.write_event(rig.clock.now_ns(), 40, "fault", reason)
+    seal(writer, reason)
+
 
 CELLS = (4, 4)  # speeds, loads of a coverage
 MANY = 1_000_000_000  # samples, more than any trial has

@@ -1,19 +1,183 @@
 """Beds of stones: an uneven surface that sinks under the foot, and its jams."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from fakes.ground.contact import DAMPING_MASS, NO_CONTACT, Contact, Motion
 from fakes.ground.footing import Footing
-from fakes.ground.jam import JamSequence
 from fakes.ground.profile import GRID, locate, smooth_profile, value_at
 from fakes.ground.stone_sizes import StoneParameters, slope_factor
+from fakes.randomness import DrawnAhead, NormalStream
+
+_PHI = math.radians(35.0)  # friction angle of the bed
+_THETA = (math.radians(30.0), math.radians(52.0))  # of the flank that is ridden up
+_STEEPEST = 1.40  # rad
+_MU_R, _B_G, _C_T = 0.28, 4.0, 20.0  # rolling stones; N s/m; N s/m
+_V_C, _A_C = 0.020, 0.14  # creep [m/s], its sensitivity to load
+_LAM0, _LAM1 = 0.4, 2.0  # shuffles per second
+_S_LO, _S_HI = 0.7, 2.2  # capacity of a contact, in shares of the jam
+_Q0, _TAU = 0.75, 0.4  # strength of a fresh jam, time of ageing [s]
+_TOUCH = 0.05  # N, below which no stone engages
+_LITTLE = 1e-9  # N, keeps the load finite
+
+
+@dataclass(slots=True)
+class _Stone:
+    """One contact of a jam."""
+
+    weight: float
+    k: float
+    capacity: float
+    engage_at: float
+    anchor: float | None = None
+
+
+class JamSequence:
+    """One locked configuration of stones after another.
+
+    Attributes:
+        releases: how many have collapsed.
+    """
+
+    def __init__(
+        self, parameters: StoneParameters, strength: float, rng: np.random.Generator
+    ) -> None:
+        """Form the first jam, right before the foot.
+
+        Args:
+            parameters: of the stones.
+            strength: mean capacity of a jam here and in this trial [N].
+            rng: of this trial's ground.
+        """
+        self._p = parameters
+        self._strength = strength
+        self._rng = rng
+        self._normals = NormalStream(rng)
+        self._chances = DrawnAhead(rng)
+        self._c_t = _C_T / parameters.N
+        self._b_g = _B_G / parameters.N
+        self.releases = 0
+        self._form(0.0, 0.0)
+
+    def step(
+        self, dt: float, motion: tuple[float, float], F_n: float, sunk: float
+    ) -> float:
+        """Advance by `dt` [s] and return the force against x [N].
+
+        Args:
+            dt: time step [s].
+            motion: x [m] and vx [m/s] of the sole.
+            F_n: normal force [N].
+            sunk: share of the final slip sinkage, for the next jam.
+        """
+        x, vx = motion
+        capacity = self._capacity(dt, F_n)
+        load = self._elastic / capacity
+        creep = _V_C * math.exp((load - 1.0) / _A_C) * dt if 0.3 < load < 1.5 else 0.0
+        skin = _MU_R * F_n / self._weights  # per share of the load
+        elastic = rolling = 0.0
+        pushed = detached = 0
+        for stone in self._stones:
+            anchor = stone.anchor
+            if anchor is None:
+                rolling += stone.weight
+                detached += 1
+                if x > stone.engage_at and F_n > _TOUCH:
+                    stone.anchor = x
+                continue
+            anchor += creep
+            force = stone.k * (x - anchor)
+            if force > stone.capacity:
+                self._break(stone, x)
+                rolling += stone.weight
+                continue
+            if force > 0.0:
+                pushed += 1
+            elif force < -skin * stone.weight:
+                # the flank separates: only skin friction resists backward motion
+                force = -skin * stone.weight
+                anchor = x - force / stone.k
+            stone.anchor = anchor
+            elastic += force
+        self._elastic = elastic
+        self._is_loaded = detached < len(self._stones)
+        if self._is_loaded:
+            self._collapse_or_shuffle(dt, x, elastic / capacity, sunk)
+        total = elastic + (self._c_t * pushed + self._b_g * detached) * vx
+        if rolling:
+            total += skin * rolling * math.tanh(vx / 0.01)
+        return total
+
+    def lose_contact(self) -> None:
+        """Let go of the foot, which has left the ground."""
+        self._elastic = 0.0
+        self._is_loaded = False
+        for stone in self._stones:
+            stone.anchor = None
+
+    def _capacity(self, dt: float, F_n: float) -> float:
+        """Return the force that the jam can bear now [N]."""
+        if self._is_loaded:
+            self._age += dt
+        aged = _Q0 + (1.0 - _Q0) * (1.0 - math.exp(-self._age / _TAU))
+        strength, grip = self._J * aged, F_n * self._T
+        capacity = strength if strength < grip else grip
+        return capacity if capacity > _LITTLE else _LITTLE
+
+    def _collapse_or_shuffle(
+        self, dt: float, x: float, load: float, sunk: float
+    ) -> None:
+        if load > 1.0:
+            self._chances.give_back()
+            p = self._p
+            run_out = p.run * p.d50 * float(self._rng.gamma(p.k_run, 1.0 / p.k_run))
+            self.releases += 1
+            self._form(x + run_out, sunk)
+        elif self._chances.next() < (_LAM0 + _LAM1 * load * load) * dt:
+            self._shuffle(x)
+
+    def _shuffle(self, x: float) -> None:
+        """Let one attached contact lose some of its stretch."""
+        attached = [(s, s.anchor) for s in self._stones if s.anchor is not None]
+        if attached:
+            self._chances.give_back()
+            stone, anchor = attached[int(self._rng.integers(len(attached)))]
+            stone.anchor = anchor + float(self._rng.uniform(0.3, 1.0)) * (x - anchor)
+
+    def _break(self, stone: _Stone, x: float) -> None:
+        self._chances.give_back()
+        p = self._p
+        stone.anchor = None
+        stone.engage_at = x + p.gap * p.d50 * float(self._rng.gamma(2.0, 0.5))
+        stone.capacity = self._J / p.N * float(self._rng.uniform(_S_LO, _S_HI))
+
+    def _form(self, x: float, sunk: float) -> None:
+        """Form a jam that begins at `x` [m]."""
+        p, rng = self._p, self._rng
+        gamma = float(rng.gamma(p.k_J, 1.0 / p.k_J))
+        self._J = self._strength * gamma * (0.8 + 0.4 * sunk)
+        self._T = math.tan(min(_PHI + float(rng.uniform(*_THETA)), _STEEPEST))
+        self._age = self._elastic = 0.0
+        self._is_loaded = False
+        self._stones = [self._stone(x) for _ in range(p.N)]
+        self._weights = sum(stone.weight for stone in self._stones)
+
+    def _stone(self, x: float) -> _Stone:
+        p, rng = self._p, self._rng
+        return _Stone(
+            weight=float(rng.gamma(p.k_w, 1.0 / p.k_w)) + 0.05,
+            k=p.K_t / p.N * math.exp(p.sigma_k * self._normals.next()),
+            capacity=self._J / p.N * float(rng.uniform(_S_LO, _S_HI)),
+            engage_at=x + float(rng.random()) * p.disp * p.d50,
+        )
+
 
 _S_H, _L_H = 0.07, 0.40  # height of the surface and its correlation length [d50]
 _L_S = 0.06  # slip over which the bed sinks [m]
 _FIRM = 5.0  # normal force from which it sinks fully [N]
-_STEEPEST = 0.5  # slope that a foot can feel
+_STEEPEST_SLOPE = 0.5  # slope that a foot can feel
 _MU_LATERAL = 0.6
 
 
@@ -85,7 +249,7 @@ class StoneBed:
             rate = vx * (self._sink_limit - sink) / _L_S
             self._sink = sink + dt * rate * (F_n / _FIRM if F_n < _FIRM else 1.0)
         F_t = self._jams.step(dt, (x, vx), F_n, sunk)
-        if not -_STEEPEST <= slope <= _STEEPEST:
-            slope = math.copysign(_STEEPEST, slope)
+        if not -_STEEPEST_SLOPE <= slope <= _STEEPEST_SLOPE:
+            slope = math.copysign(_STEEPEST_SLOPE, slope)
         F_t += F_n * slope
         return self._footing.step(dt, motion, F_t, F_n, _MU_LATERAL)

@@ -6,11 +6,10 @@ as far as hosts have described them.
 
 from acquisition import SafetyMode
 from fakes.pucks.bank import MotorSide, PuckBank
-from fakes.pucks.bus_faults import BusFaults
+from fakes.pucks.bus_faults import BusFaults, OtherMaster
 from fakes.pucks.event_queue import NEVER, EventQueue, OutFrame
 from fakes.pucks.ft_puck import ForceTorquePuck, Load
 from fakes.pucks.options import NetworkOptions
-from fakes.pucks.other_master import OtherMaster
 from fakes.pucks.safety_module import (
     TORQUE_GROUPS,
     FakeSafetyModule,

@@ -27,7 +27,7 @@ def peak():
 
 atexit.register(peak)
 """
-START = PEAK + "from experiments.cli import main; sys.exit(main())"
+START = PEAK + "from experiments.__main__ import main; sys.exit(main())"
 READ = (
     PEAK
     + """from pathlib import Path

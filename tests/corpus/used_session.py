@@ -10,7 +10,7 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.trial_file import publish
 from acquisition.trial_file.verify import verify_file
-from experiments.cli import main
+from experiments.__main__ import main
 from experiments.session.data_files import write_json
 from experiments.session.journal import Journal
 from experiments.session.sidecar import TrialOutcome, sidecar_of

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import main
+from experiments.__main__ import main
 from experiments.operator.prompts import AutoOperator
 from fakes.world.rig import FakeRig
 from tests.experiments.built import watch_builds

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli import COMMANDS, EXIT_CODES, build_parser
+from experiments.__main__ import COMMANDS, EXIT_CODES, build_parser
 from experiments.messages import CATALOGUE
 from tests.experiments.program import traction
 
@@ -80,7 +80,7 @@ def test_version_is_told():
 def test_the_parser_is_built_without_a_slow_library():
     slow = ("numpy", "pinocchio", "scipy", "matplotlib", "pydantic", "rich", "can")
     code = (
-        "import sys; import experiments.cli; experiments.cli.build_parser(); "
+        "import sys; import experiments.__main__; experiments.__main__.build_parser(); "
         f"print([name for name in {slow} if name in sys.modules])"
     )
     done = subprocess.run(

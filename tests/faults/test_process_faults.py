@@ -74,7 +74,7 @@ def idle(hand, asked):
     if not is_held or marker.with_suffix(".over").exists():
         follow(hand, asked)
 AutoOperator.answer, SimulatedHand.follow = waiting, idle
-from experiments.cli import main
+from experiments.__main__ import main
 sys.exit(main())
 """
 SLOW_DISK = """

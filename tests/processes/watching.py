@@ -41,7 +41,7 @@ while True:
         print(end, flush=True)
 """
 STALL = 6.0  # ms, of a sleep of 1 ms: three cycles
-START = "import sys; from experiments.cli import main; sys.exit(main())"
+START = "import sys; from experiments.__main__ import main; sys.exit(main())"
 
 
 def wait(seconds):

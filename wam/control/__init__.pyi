@@ -1,6 +1,6 @@
 from .controller import FootController
 from .joint_lock import LockGains
-from .joint_move import TOP_SPEED, JointMove
+from .position_control import TOP_SPEED, JointMove
 from .soft_walls import SoftWalls, Walls
 
 __all__ = [

@@ -3,10 +3,9 @@
 import numpy as np
 
 from acquisition import ArmReading, Vector
-from acquisition.control_loop import ArmState
+from acquisition.control_loop import ArmState, ControlLaw
 from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
-from wam.control.joint_move import TOP_SPEED, JointMove, joint_pd
-from wam.control.position_hold import PositionHold
+from wam.control.position_control import TOP_SPEED, JointMove, PositionHold, joint_pd
 from wam.control.soft_walls import SoftWalls
 from wam.model import ArmModel, VirtualMass, compensation
 
@@ -15,8 +14,8 @@ _STANDING = frozenset({ArmState.HOLD, ArmState.DAMP, ArmState.GUIDE})
 _POWERED = frozenset({ArmState.FLOAT, *_STANDING})
 
 
-class FootController:
-    """Torques of float, guide, hold and damp (implements ControlLaw).
+class FootController(ControlLaw):
+    """Torques of float, guide, hold and damp.
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
     their bounce. hold and damp: gravity, joint damping and springs of bounded torque

@@ -11,8 +11,14 @@ from .safety_module import (
     encode_pendant,
 )
 from .settings import ArmSettings
-from .startup import HOME_LIMIT, ArmInfo, check_home, home_error
-from .zero_check import check_zero, zero_error
+from .startup import (
+    HOME_LIMIT,
+    ArmInfo,
+    check_home,
+    check_zero,
+    home_error,
+    zero_error,
+)
 
 __all__ = [
     "COUNTS_PER_SPEED",

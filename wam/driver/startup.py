@@ -1,4 +1,4 @@
-"""The start-up of a WAM: who is on the bus, is it healthy, is it the right arm."""
+"""The start-up of a WAM: who is on the bus, healthy, the right arm, and zeroed?"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
 from wam.driver.safety_module import PendantWord, SafetyModule
 from wam.driver.settings import ArmSettings
-from wam.model import Array
+from wam.model import ArmConstants, Array
 
 HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
 
@@ -231,4 +231,46 @@ def _check_firmware(who: str, actual: int, needed: int) -> None:
         raise DeviceFaultError(
             f"{who} has firmware {actual}; {needed} or later is needed.",
             hint="Ask Barrett for newer firmware.",
+        )
+
+
+def zero_error(
+    constants: ArmConstants,
+    cts: Sequence[int],
+    counts: Sequence[int],
+    mech: Sequence[int],
+    mech_at_home: Sequence[int],
+) -> Array:
+    """Return how far the joints are from where their positions put them [rad], (7,).
+
+    Motors are known within their turn only: an error of joint 1 modulo 0.15 rad, of
+    joint 4 modulo 0.35 rad.
+
+    Args:
+        constants: of the arm.
+        cts: counts per motor turn, seven.
+        counts: positions that the pucks tell [counts], seven.
+        mech: absolute motor angles at the same place [counts], seven.
+        mech_at_home: absolute motor angles where home was defined [counts], seven.
+    """
+    turn = np.array(cts, dtype=np.float64)
+    home = turn / (2.0 * np.pi) * (constants.j2mp @ constants.home)
+    travelled = np.array(counts, dtype=np.float64) - home
+    wanted = (np.array(mech_at_home) + travelled) % turn
+    return home_error(constants.j2mp, cts, mech, wanted.tolist())
+
+
+def check_zero(error: Array) -> None:
+    """Refuse an arm that is zeroed elsewhere than last time.
+
+    Raises:
+        PreflightError: a joint is more than 0.03 rad off.
+    """
+    joint = int(np.abs(error).argmax())
+    if abs(error[joint]) > HOME_LIMIT:
+        raise PreflightError(
+            f"Joint {joint + 1} is {error[joint]:+.3f} rad from where its position "
+            f"puts it (limit {HOME_LIMIT}), says its motor's absolute encoder.",
+            arm_state="idle",
+            hint="The zero is wrong: put the arm at home, then: traction zero.",
         )

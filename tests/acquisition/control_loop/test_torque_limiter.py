@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from acquisition.control_loop.torque_limiter import bounded_torque
+from acquisition.control_loop.limits import bounded_torque
 
 LIMITS = (20.0, 45.0, 15.0, 15.0, 2.5, 2.5, 1.3)
 STEP = np.array(LIMITS) * ([0.1] * 6 + [0.3])

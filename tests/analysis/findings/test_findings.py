@@ -9,8 +9,7 @@ import pytest
 
 from analysis.figures.confusion import shares_of
 from analysis.figures.trials import way_of
-from analysis.findings.as_numbers import findings_rows, plain_findings
-from analysis.findings.findings import compute_results
+from analysis.findings.findings import compute_results, findings_rows, plain_findings
 from analysis.findings.surfaces import cell_edges, coverages
 from analysis.findings.trends import (
     fit_trend,

@@ -12,9 +12,9 @@ from analysis.figures.style import render, styled
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
 from analysis.report.paper_tables import choices, summary, table_one, verdicts
-from analysis.study.atomic_files import write_atomic
 from analysis.study.fits import to_fits
 from analysis.study.models import FitOptions
+from analysis.study.store import write_atomic
 from analysis.study.study import StudyOptions, run_study
 
 OPTIONS = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)

@@ -17,12 +17,12 @@ from analysis.study.study import StudyOptions, run_study
 from analysis.terrains.database import load
 from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
-from analysis.terrains.recognition import recognise
-from analysis.terrains.scores import (
+from analysis.terrains.recognition import (
     Expert,
     TerrainScores,
     log_densities,
     neighbour_correlation,
+    recognise,
     score_trial,
 )
 from analysis.terrains.table import Table

@@ -22,7 +22,7 @@ from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.preflight import preflight
 from experiments.rig import backend as inline_crew
-from experiments.run import activation
+from experiments.run import ready
 from experiments.run import tare as taring
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
@@ -208,7 +208,7 @@ def refused(act, code=2, words="") -> Case:
 
 
 def _never_active(scene):
-    scene.patch.setattr(activation, "PATIENCE", 0.3)
+    scene.patch.setattr(ready, "PATIENCE", 0.3)
     return resume(scene, press=lambda a, _: "" if a.prompt is Prompt.SUPPORT else None)
 
 

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from experiments.cli import main
+from experiments.__main__ import main
 from tests.experiments.program import traction, write_config
 
 

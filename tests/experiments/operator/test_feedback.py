@@ -16,7 +16,7 @@ from experiments.operator.feedback import (
     find_speech,
 )
 from experiments.settings.rig import OperatorSection
-from experiments.trial.header import PaceMonitor
+from experiments.trial.files import PaceMonitor
 
 
 class Terminal(io.StringIO):

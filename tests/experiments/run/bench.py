@@ -16,7 +16,7 @@ from experiments.run.stop import StopFlag
 from experiments.session.journal import Journal
 from experiments.session.states import Event
 from experiments.session.store import create_session
-from experiments.trial.header import SessionMetadata
+from experiments.trial.files import SessionMetadata
 from fakes.clock import SteppedClock
 
 

@@ -8,7 +8,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, Sample
 from experiments.operator.prompts import Prompt
-from experiments.run.activation import PATIENCE, activate
+from experiments.run.ready import PATIENCE, activate
 from experiments.run.stop import ArmFaultError
 from tests.experiments.run.bench import Keys, make_loop
 

@@ -16,7 +16,7 @@ from experiments.session.store import (
     list_sessions,
 )
 from experiments.session.trial_name import TrialName
-from experiments.trial.header import EndDetector
+from experiments.trial.files import EndDetector
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z
 

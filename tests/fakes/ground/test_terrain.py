@@ -5,10 +5,9 @@ import pytest
 
 from fakes.ground.contact import NO_CONTACT
 from fakes.ground.footing import Footing, stretched
-from fakes.ground.plate import PLATES, Plate
 from fakes.ground.stone_sizes import STONES, slope_factor
 from fakes.ground.stones import StoneBed
-from fakes.ground.terrain import make_terrain
+from fakes.ground.terrain import PLATES, Plate, make_terrain
 from fakes.randomness import trial_generator
 
 DT = 0.0005

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from fakes.ground.plate import PLATES, Plate
-from fakes.ground.terrain import FREE, Container
+from fakes.ground.terrain import FREE, PLATES, Container, Plate
 from fakes.plant.hand import LIFT, Hand, HandPhase
 from fakes.plant.push import PACES, HandView, Pace
 from tests.fakes.scenes import float_for, make_plant, release, sole

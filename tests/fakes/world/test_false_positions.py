@@ -5,9 +5,9 @@ import pytest
 
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
 from acquisition.control_loop.guard import GuardLimits
+from acquisition.control_loop.limits import TORQUE_STEP
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
-from acquisition.control_loop.torque_limiter import TORQUE_STEP
 from tests.fakes.scenes import CONSTANTS, MODEL, make_rig
 from wam.bus.frames import decode_position, encode_position, position_reply_id
 from wam.bus.link import CanLink

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from acquisition.control_loop.limits import TORQUE_STEP
 from acquisition.control_loop.states import ArmState
-from acquisition.control_loop.torque_limiter import TORQUE_STEP
 from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import SPEED, TORQUE, HoldBench
-from wam.control.position_hold import TORQUE_LIMIT
+from wam.control.position_control import TORQUE_LIMIT
 
 pytestmark = pytest.mark.slow
 

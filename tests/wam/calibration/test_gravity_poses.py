@@ -22,7 +22,7 @@ from wam.calibration.poses import (
     plan_halts,
     way_seconds,
 )
-from wam.control.joint_move import JointMove
+from wam.control.position_control import JointMove
 from wam.model.arm_model import ArmModel
 from wam.model.constants import load_constants
 from wam.model.moments import regressor

@@ -13,7 +13,7 @@ import pytest
 from fakes.plant.model import arm_and_hand
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from wam.control.joint_lock import LockGains
-from wam.control.position_hold import PositionHold
+from wam.control.position_control import PositionHold
 from wam.driver.settings import ArmSettings
 from wam.model.arm_model import drive_inertia_matrix
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wam.control.joint_move import TORQUE_LIMIT, JointMove, joint_pd
+from wam.control.position_control import PD_TORQUE_LIMIT, JointMove, joint_pd
 
 ANGLES = st.lists(st.floats(-2.5, 2.5), min_size=7, max_size=7).map(np.array)
 
@@ -53,7 +53,7 @@ def test_a_long_move_takes_length_over_speed_and_one_ramp():
 def test_the_pd_part_is_clipped_joint_by_joint():
     error = np.full(7, 1.0)
     tau = joint_pd(np.full(7, 1e4), np.zeros(7), error, np.zeros(7))
-    assert tau == pytest.approx(TORQUE_LIMIT)
+    assert tau == pytest.approx(PD_TORQUE_LIMIT)
     half = 0.5 * error
     assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), half, error) == pytest.approx(
         np.full(7, 4.0)

@@ -8,7 +8,7 @@ from acquisition.control_loop.states import ArmState
 from tests.acquisition.control_loop.test_cycle import Bench, Law
 from tests.wam.control.test_controller import DOWN, reading
 from wam.control.controller import FootController
-from wam.control.joint_move import JointMove
+from wam.control.position_control import JointMove
 from wam.control.soft_walls import SoftWalls, Walls
 
 GOAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.devices import ArmReading
-from wam.control.position_hold import PositionHold
+from wam.control.position_control import PositionHold
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()

@@ -2,7 +2,7 @@
 
 An interrupted study resumes where it stopped, and a study repeated with one choice
 changed repeats only what that choice touches. A file that is damaged, foreign or of
-another version counts as not there.
+another version counts as not there. Files are written whole or not at all.
 
 Values become JSON and come back exactly: dataclasses, named tuples, arrays, numbers.
 Nothing is ever unpickled: a type is found by name in a table of the types that may
@@ -13,6 +13,8 @@ import base64
 import hashlib
 import json
 import math
+import os
+import tempfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -20,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from acquisition import SettingsError
 from analysis.data import SampleTable
 from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise
-from analysis.study.atomic_files import write_atomic
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
@@ -194,3 +196,32 @@ def _field_names(kind: type) -> tuple[str, ...] | None:
     if is_dataclass(kind):
         return tuple(item.name for item in fields(kind))
     return getattr(kind, "_fields", None)
+
+
+def write_atomic(path: Path, content: bytes) -> None:
+    """Write `content` to `path`: a reader sees the old file or the new, never a part.
+
+    Missing folders are made.
+
+    Raises:
+        SettingsError: the folder cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        temporary = Path(name)
+        try:
+            with os.fdopen(descriptor, "wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            temporary.chmod(0o644)  # mkstemp makes it private
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+    except OSError as error:
+        raise SettingsError(
+            f"{path}: cannot be written ({error.strerror}).",
+            hint="Name a folder that you may write to, with space left.",
+        ) from error

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.fold_store import ResultStore, decode, encode, task_key
 from analysis.study.jobs import run_tasks
 from analysis.study.models import FitOptions
+from analysis.study.store import ResultStore, decode, encode, task_key
 
 ANY = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
