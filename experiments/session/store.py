@@ -126,11 +126,7 @@ class SessionFolder:
             digest: what computes the checksum of a file; None = `sha256_of`.
         """
         digest = digest or sha256_of
-        recorded = {
-            (event.get("trial"), event.get("attempt")): event["sha256"]
-            for event in self.events()
-            if isinstance(event.get("sha256"), str) and _is_pair(event)
-        }
+        recorded = self.recorded_sums()
         kept: list[Path] = []
         for sidecar in list_folder(self.trials, "T*.json"):
             if not _TRIAL_FILE.match(sidecar.name):
@@ -145,6 +141,14 @@ class SessionFolder:
             if fields.get("verdict") == "keep" and is_sound:
                 kept.append(path)
         return kept
+
+    def recorded_sums(self) -> dict[tuple[int, int], str]:
+        """Return the SHA-256 in the journal of every (trial, attempt) that has one."""
+        return {
+            (event["trial"], event["attempt"]): event["sha256"]
+            for event in self.events()
+            if isinstance(event.get("sha256"), str) and _is_pair(event)
+        }
 
     def rejected_sidecars(self) -> list[dict[str, Any]]:
         """Return the sidecars of rejected and interrupted trials."""

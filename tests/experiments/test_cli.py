@@ -142,4 +142,4 @@ def test_a_disk_that_refuses_anything_is_no_bug(monkeypatch, number, code):
     done = traction("status")
     assert done.code == code
     assert os.strerror(number) in done.err
-    assert ("/data/sessions cannot be used" in done.err) is (code == 6)
+    assert ("/data/sessions: cannot be used" in done.err) is (code == 6)

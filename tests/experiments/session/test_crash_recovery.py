@@ -258,3 +258,31 @@ def test_what_a_killed_process_left_in_a_session_is_swept(crashed):
     recover_session(crashed)
     assert not left.exists()
     assert [p.name for p in folder.trials.iterdir()] == ["notes.odt.tmp"]
+
+
+@pytest.mark.parametrize("damaged", [b"{", b"", b"[]", None])
+def test_a_recording_whose_sidecar_is_damaged_is_put_aside_all_the_same(
+    tmp_path, damaged
+):
+    book = make_session(tmp_path)
+    folder = book.folder
+    sidecar = folder.trials / "T02.json"
+    sidecar.unlink() if damaged is None else sidecar.write_bytes(damaged)
+    book.append(Event.REDO, trial=2, reason="wet")
+    book.append(Event.ACTIVATED)
+    book.append(Event.SET_ASIDE, trial=2, attempt=1, reason="redone", who="mk")
+    assert contents(folder)["2.1"] == "rejected/T02a.mcap"
+    assert contents(folder)["truth 2.1"] == "rejected/T02a.truth.mcap"
+    assert read_json(folder.rejected / "T02a.json")["reason"] == "redone"
+    assert not sidecar.exists()
+
+
+def test_a_damaged_sidecar_does_not_move_the_recording_of_another_attempt(tmp_path):
+    """T01b was kept and its sidecar is damaged: T01a was rejected before."""
+    book = make_session(tmp_path)
+    folder = book.folder
+    (folder.trials / "T01.json").write_bytes(b"{")
+    (folder.rejected / "T01a.mcap").unlink()
+    recover_session(open_journal(folder, Now()))
+    assert (folder.trials / "T01.mcap").read_text() == "1.2"
+    assert not (folder.rejected / "T01a.mcap").exists()
