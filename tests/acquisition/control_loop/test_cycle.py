@@ -734,3 +734,37 @@ def test_the_wait_for_the_first_force_begins_with_the_first_cycle(bench):
     assert (bench.cycle.status.ft_age_ns, bench.reason) == (0, "")
     bench.run(2, force=None)
     assert bench.cycle.status.ft_age_ns == 2 * PERIOD_NS
+
+
+class Loaded(Observer):
+    """Shows the whole wrench that it is given, and takes the tare."""
+
+    def set_bias(self, bias):
+        self.bias = bias
+
+    def observe(self, reading, wrench, sample):
+        if wrench is not None:
+            sample.wrench[:] = wrench.wrench
+        return super().observe(reading, wrench, sample)
+
+
+@pytest.mark.parametrize("is_tared", [True, False])
+def test_a_load_is_judged_once_it_is_known(bench, is_tared):
+    bench.observer = Loaded()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    if is_tared:
+        bench.cycle.set_bias((0.0,) * 6)
+        assert bench.observer.bias == (0.0,) * 6
+    bench.run(10, force=200.0)
+    assert bench.reason == ("contact-force" if is_tared else "")
+
+
+def test_a_load_is_not_judged_from_a_force_that_is_not_fresh(bench):
+    bench.observer = Loaded()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.set_bias((0.0,) * 6)
+    bench.run(2, force=200.0)
+    bench.run(10, force=None)
+    assert bench.reason == ""

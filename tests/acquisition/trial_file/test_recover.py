@@ -388,3 +388,16 @@ def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):
     whole = content[: -len(message_record(99))]
     data = with_chunk(whole, len(whole), compression="")
     assert len(salvaged_messages(data, tmp_path / "T01.mcap")[0]) == 1
+
+
+def test_what_begins_otherwise_is_no_mcap_file(tmp_path):
+    data = b"x" * len(MAGIC_BYTES) + channel_record(1, 0) + message_record(1)
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert list(salvage) == []
+    assert "no MCAP file" in salvage.reason
+    assert salvage.kept_bytes == 0
+
+
+def test_a_file_that_is_whole_lost_no_second(put, sealed):
+    recovery = recover_file(put(sealed, "T09.mcap"))
+    assert (recovery.seconds_dropped, recovery.bytes_dropped) == (0.0, 0)

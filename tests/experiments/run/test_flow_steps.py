@@ -11,7 +11,7 @@ from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, screen_keys
 from experiments.operator.prompts import Prompt
 from experiments.run import ready
 from experiments.run.console_loop import TICK
-from experiments.run.ready import take_note, wait_ready
+from experiments.run.ready import ready_view, take_note, wait_ready
 from experiments.run.runner import ask_verdict
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialOutcome
@@ -214,3 +214,22 @@ def test_a_live_screen_stays_and_is_gone_with_the_trial(tmp_path, monkeypatch):
     assert panels
     assert screen_keys(Prompt.READY) in panels[0]
     assert ends == [0, len(panels)]
+
+
+def test_without_a_terminal_the_screen_is_printed_line_by_line(tmp_path, capsys):
+    context = make_context(tmp_path, Keys(" "))
+    wait_ready(context, FIRST)
+    out = capsys.readouterr().out
+    assert screen_keys(Prompt.READY) in out
+    assert f"of {ready_view(context).wanted}" in out
+
+
+def test_a_note_is_seen_while_it_is_typed(tmp_path, monkeypatch):
+    context = make_context(tmp_path, Keys(lines=[None, "wet"]))
+    context.operator.draft = "we"
+    panels = []
+    monkeypatch.setattr(context.console, "is_live", True)
+    monkeypatch.setattr(context.console, "panel", panels.append)
+    take_note(context, FIRST, is_on_trial=False)
+    assert panels[0][0].startswith("Note: we")
+    assert NOTE_KEYS in panels[0]

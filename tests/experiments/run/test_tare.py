@@ -278,3 +278,31 @@ def test_a_last_tare_that_is_refused_costs_the_bracket_only(tmp_path, capsys):
     context.loop_client.is_valid = False
     take_end_tare(context)
     assert "flagged" in capsys.readouterr().out
+
+
+def test_other_texts_of_the_settings_are_no_calibration():
+    text = calibration("tread")["calibration:ft_sensor.toml"]
+    assert known_bias({"rig": text}, "tread", is_simulated=False) is None
+    container = {"calibration:terrain.toml": "name = 1"}
+    assert known_bias(container, "tread", is_simulated=False) is None
+
+
+def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
+    context = lifted(tmp_path)
+    due = []
+    context.console_loop.faults = SimpleNamespace(
+        inject_due=lambda *given: due.append(given)
+    )
+    take_tare(context, TrialName(4, 1))
+    assert due[0] == (FaultTrigger.TARE, 4, 0.0)
+
+
+def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
+    context = lifted(tmp_path)
+    context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1 * (s > 0.8)
+    take_tare(context, TrialName(1, 1))
+    (event,) = events(context, Event.TARED)
+    assert event["bias"][0] == round(context.loop_client.bias[0], 4)
+    assert event["bias"][0] != round(event["bias"][0], 3)
+    assert event["spread"] == pytest.approx(0.1, abs=0.02)
+    assert event["spread"] == round(event["spread"], 3)

@@ -279,3 +279,9 @@ def test_a_session_without_events_wants_and_has_nothing():
         None,
         "",
     )
+
+
+@pytest.mark.parametrize("value", [0, -1, 2.5, True, "3", None])
+def test_a_number_of_trials_that_is_none_counts_as_zero(value):
+    started = {"event": "session-started", "terrain": "TF", "trials": value}
+    assert replay([started]).wanted == 0

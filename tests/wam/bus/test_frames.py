@@ -276,3 +276,10 @@ def test_groups_have_the_numbers_of_the_wire():
         "TORQUE": 11,
         "ACCELERATION": 12,
     }
+
+
+@pytest.mark.parametrize("number", [-1, 128])
+def test_a_property_has_a_number_of_seven_bits(number):
+    assert frames.encode_get(127) == b"\x7f"
+    with pytest.raises(ValueError, match="0 to 127"):
+        frames.encode_get(number)

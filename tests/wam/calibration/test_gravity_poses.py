@@ -170,3 +170,41 @@ def test_a_pose_beyond_a_stop_is_refused_with_its_joint(model, joint, side):
     pose[joint] = stops[joint] + inward * (OFFSET - 1e-6)
     with pytest.raises(SettingsError, match=f"Pose 2 .* joint {joint + 1} is beyond"):
         check_poses(model, [np.array(UPRIGHT), pose], low)
+
+
+def test_the_upright_pose_has_elbow_and_foot_high():
+    assert UPRIGHT == (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)
+
+
+def test_no_pose_is_further_from_upright_than_it_may_be(poses):
+    most = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
+    assert (np.abs(np.array(poses) - UPRIGHT) <= most + 1e-12).all()
+    assert (np.ptp(np.array(poses)[:, 1:], axis=0) > 0.5 * most[1:]).all()
+
+
+def test_a_pose_that_cannot_be_reached_from_the_one_before_is_reached_by_upright(model):
+    """The way from one side to the other dips; by the upright pose it does not."""
+    low, other = (np.array(UPRIGHT) + d for d in ([0] * 7, [0] * 7))
+    low[[1, 3]] += (0.9, 0.9)
+    other[[1, 3]] += (-0.9, 0.4)
+
+    class Space(FreeSpace):
+        def is_clear(self, model, start, goal):
+            return bool((start == UPRIGHT).all() or (goal == UPRIGHT).all())
+
+    halts = plan_halts(
+        model, np.array(UPRIGHT), [low, other], Space(-5.0), is_two_sided=False
+    )
+    places = ["upright" if (halt.q == UPRIGHT).all() else halt.pose for halt in halts]
+    assert places == ["upright", 0, "upright", 1, "upright", "upright"]
+
+
+def test_a_leg_is_as_fast_as_the_sole_may_be(model):
+    """A swing of joint 1 alone: the sole goes on a circle of known radius."""
+    q = np.array([0.0, 1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    x, y, _ = model.sole_pose(q)[0]
+    goal = q.copy()
+    goal[0] += 1.0
+    assert leg_speed(model, q, goal) == pytest.approx(
+        POINT_SPEED / np.hypot(x, y), rel=0.01
+    )

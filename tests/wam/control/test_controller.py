@@ -258,3 +258,27 @@ def test_an_arm_that_floated_is_held_where_it_is_then(law):
     law.enter(ArmState.HOLD, reading(2.0, q=there))
     tau, gravity = law.torque(reading(9.0, q=there))
     assert tau[:6] == pytest.approx(gravity[:6], abs=1e-9)
+
+
+def test_a_move_later_than_the_start_of_the_clock_goes_on_the_same(law):
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(DOWN, 0.5, reading(3.0))
+    sagged = DOWN.copy()
+    sagged[1] += 0.001
+    before = law.torque(reading(4.0, q=sagged))[0]
+    law.move_to(DOWN + 0.01, 0.5, reading(4.0, q=sagged))
+    assert law.torque(reading(4.0, q=sagged))[0] == pytest.approx(before, abs=1e-9)
+
+
+def test_a_move_in_place_of_another_begins_on_its_way(law):
+    """Half-way of a long move another one begins: the goal of the PD does not jump."""
+    goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(goal, 0.5, reading(3.0))
+    q = DOWN + np.array([0, 0, 0, 0.2, 0, 0, 0])
+    half = reading(3.0 + 0.5 * 2.0 * np.sqrt(0.4 / 0.5), q=q)
+    at_rest = law.torque(half)[1]
+    law.move_to(DOWN, 0.5, half)
+    assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)
+    law.enter(ArmState.HOLD, half)
+    assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)

@@ -194,3 +194,10 @@ def test_a_reference_is_drawn_along_at_the_largest_torque(lock, side):
     assert lock.torque(0.4 + side, 0.0, FULL) == pytest.approx(-side * 1.3)
     reference = lock.reference(FULL + S)
     assert reference == pytest.approx(0.4 + side * (1.0 - 1.3 / 20.0))
+
+
+def test_a_fresh_lock_has_its_reference_at_zero():
+    lock = JointLock()
+    assert lock.reference(0) == lock.reference(START) == 0.0
+    lock.engage(0.0, START)
+    assert lock.torque(0.01, 0.0, START) == 0.0

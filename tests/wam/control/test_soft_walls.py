@@ -174,3 +174,8 @@ def test_beyond_the_stop_the_damper_grows_no_more():
     assert pushed(walls, q, qd)[3] - pushed(walls, q)[3] == pytest.approx(
         -damping * speed
     )
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_no_wall_is_armed_at_first(joint):
+    assert not pushed(SoftWalls(WALLS), at(1.95, joint)).any()

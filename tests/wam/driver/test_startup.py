@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from acquisition.devices import SafetyMode
-from acquisition.errors import PreflightError
+from acquisition.errors import DeviceFaultError, PreflightError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import property_reply_id
@@ -168,3 +168,12 @@ def test_pucks_are_woken_one_after_the_other_and_left_alone_while_they_boot():
     assert woken[1] - woken[0] >= 10 * MS
     after = min(t for t, *_ in rig.sent if t > woken[1])
     assert after - woken[1] >= 1000 * MS
+
+
+@pytest.mark.parametrize("name", ["CTS", "IPNM"])
+@pytest.mark.parametrize("value", [0, -5])
+def test_a_puck_without_its_constants_is_refused(name, value):
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.set_property(6, name, value)
+    with pytest.raises(DeviceFaultError, match=f"Puck 6 .*{name} {value}"):
+        start(rig)

@@ -159,3 +159,21 @@ def test_the_least_constants_of_a_transmission_are_one(least):
     assert wam.exact_units(TAU)[0] == pytest.approx(-least * TAU[0] / 42.0)
     with pytest.raises(SettingsError):
         Transmission(J2MP, CTS, (0, *IPNM[1:]))
+
+
+def test_the_least_transmission_that_can_be_inverted_is_taken():
+    assert Transmission(np.eye(7), CTS, IPNM).joints([4096] + [0] * 6)[
+        0
+    ] == pytest.approx(2 * np.pi)
+    with pytest.raises(SettingsError, match="inverted"):
+        Transmission(0.99 * np.eye(7), CTS, IPNM)
+
+
+@pytest.mark.parametrize("motor", range(7))
+def test_every_motor_has_its_own_limit_of_torque(motor):
+    """Each motor's share of a torque that is far beyond all of them."""
+    wam = Transmission(np.eye(7), CTS, IPNM)
+    tau = np.zeros(7)
+    tau[motor] = 1e3
+    assert wam.command(tau, ZERO).units[motor] == LIMITS[motor]
+    assert wam.command(-tau, ZERO).units[motor] == -LIMITS[motor]

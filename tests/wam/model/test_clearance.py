@@ -76,6 +76,7 @@ def test_a_way_through_an_obstacle_is_hit_though_both_ends_are_free(example_tool
     hit = clearance.first_hit(start, goal)
     assert hit is not None
     assert hit.second == "the post"
+    assert 0.0 < hit.distance < CLEARANCE_MARGIN
     assert clearance.first_hit(start, start) is None
 
 
