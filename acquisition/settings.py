@@ -72,7 +72,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         level = [inner for value in level for inner in _inner(value)]
         if any(type(v) is int and abs(v) > _LARGEST_WHOLE for v in level):
             raise ValueError(f"it {_TOO_LARGE}")
-    if level:
+    if any(isinstance(value, dict | list) for value in level):
         raise ValueError("it nests too deeply")
     return table
 
