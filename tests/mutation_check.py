@@ -119,9 +119,11 @@ def _skipped(tree: ast.Module) -> set[int]:
 
 def _is_start_of_time(node: ast.AST) -> bool:
     """Return whether a time begins at 0 ns: one at 1 ns is the same."""
-    if not isinstance(node, ast.Assign) or not isinstance(node.value, ast.Constant):
+    if not isinstance(node, ast.Assign | ast.AnnAssign):
         return False
-    return node.value.value == 0 and ast.unparse(node.targets[0]).endswith("_ns")
+    target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+    is_zero = isinstance(node.value, ast.Constant) and node.value.value == 0
+    return is_zero and ast.unparse(target).endswith("_ns")
 
 
 def mutations(path: str) -> list[Mutation]:

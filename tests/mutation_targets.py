@@ -13,6 +13,7 @@ _SALVAGED = (
     f"{_FILE_TESTS}/test_recover.py",
     f"{_FILE_TESTS}/test_damaged_files.py",
     f"{_FILE_TESTS}/test_hostile_files.py",
+    "tests/corpus/test_stated_limits.py",
 )
 
 TESTS = {
@@ -21,7 +22,10 @@ TESTS = {
         f"{_LOOP_TESTS}/test_cycle.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
     ),
-    f"{_LOOP}/states.py": (f"{_LOOP_TESTS}/test_states.py",),
+    f"{_LOOP}/states.py": (
+        f"{_LOOP_TESTS}/test_states.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
     f"{_LOOP}/faults.py": (f"{_LOOP_TESTS}/test_faults.py",),
     f"{_LOOP}/contact.py": (
         f"{_LOOP_TESTS}/test_contact.py",
@@ -186,4 +190,42 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if (clock.now_ns() - start_ns) * 1e-09 > PATIENCE: -> "
         "if (clock.now_ns() - start_ns) * 1e-09 >= PATIENCE:",
     ): _AT_REST,
+    (
+        f"{_LOOP}/contact.py",
+        "if max((dist(point.sole, seen.sole) for point in points)) >= STANDING: -> "
+        "if max((dist(point.sole, seen.sole) for point in points)) > STANDING:",
+    ): _AT_REST,
+    (
+        "acquisition/ipc/loop_server.py",
+        "elif now_ns - self._orphaned_ns > ORPHAN_NS: -> "
+        "elif now_ns - self._orphaned_ns >= ORPHAN_NS:",
+    ): _BELOW,
+    (
+        "acquisition/ipc/loop_server.py",
+        "if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0: -> "
+        "if console_ns >= LONELY_NS and self._cycles % _BELL_EVERY == 0:",
+    ): _BELOW,
+    (
+        "wam/bus/frames.py",
+        "if not -TORQUE_LIMIT <= value <= TORQUE_LIMIT: -> "
+        "if not +TORQUE_LIMIT <= value <= TORQUE_LIMIT:",
+    ): "what is within the limits is clipped to itself",
+    (
+        "wam/calibration/poses.py",
+        "heights = np.min([lowest(model, drawn + side) for side in sides], axis=0) -> "
+        "heights = np.min([lowest(model, drawn - side) for side in sides], axis=0)",
+    ): "the sides are the same on both sides",
 }
+# What is no number makes any sum of it none, whatever the signs.
+_VERDICTS = (
+    "verdicts = (_check_safety(limits, seen), _check_silence(limits, seen), "
+    "_check_master(seen.reading.foreign_id), _check_numbers({}, seen), "
+    "_check_position(limits, state, q), _check_speed(limits, seen, qd), "
+    "_check_torque(limits, tau), _check_trial(limits, seen), load, "
+    "_check_cadence(limits, state, now))"
+)
+for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):
+    _text = _VERDICTS.format("sum(q) + sum(qd) + sum(tau)")
+    EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_VERDICTS.format(_sum)}"] = (
+        "of no number every sum and difference is none"
+    )

@@ -5,7 +5,12 @@ import pytest
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
-from acquisition.control_loop.faults import CircuitCauses, ReplySilence
+from acquisition.control_loop.faults import (
+    CircuitCauses,
+    Fault,
+    ReplySilence,
+    verdict_for,
+)
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState
@@ -768,3 +773,25 @@ def test_a_load_is_not_judged_from_a_force_that_is_not_fresh(bench):
     bench.run(2, force=200.0)
     bench.run(10, force=None)
     assert bench.reason == ""
+
+
+def test_of_two_equal_verdicts_the_guards_own_is_told(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.law.offset = 0.06
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "joint7-slip")
+
+
+def test_a_fault_of_the_same_severity_does_not_replace_the_first(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    bench.arm.qd = np.zeros(7)
+    bench.observer.speed = 2.0
+    bench.run(3)
+    assert bench.reason == "overspeed"
+    bench.enter(ArmState.HOLD)
+    bench.run(2)
+    assert bench.reason == "foot-speed"  # it was there all the time

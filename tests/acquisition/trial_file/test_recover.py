@@ -401,3 +401,11 @@ def test_what_begins_otherwise_is_no_mcap_file(tmp_path):
 def test_a_file_that_is_whole_lost_no_second(put, sealed):
     recovery = recover_file(put(sealed, "T09.mcap"))
     assert (recovery.seconds_dropped, recovery.bytes_dropped) == (0.0, 0)
+
+
+def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
+    content = chunk_content(compression="") + b"\x05\x10"
+    data = with_chunk(content, len(content), compression="")
+    found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
+    assert found == []
+    assert "ends in a record" in salvage.reason

@@ -285,3 +285,19 @@ def test_a_session_without_events_wants_and_has_nothing():
 def test_a_number_of_trials_that_is_none_counts_as_zero(value):
     started = {"event": "session-started", "terrain": "TF", "trials": value}
     assert replay([started]).wanted == 0
+
+
+@pytest.mark.parametrize("verdict", ["", "maybe", None, 1])
+def test_a_verdict_that_is_neither_keep_nor_reject_is_refused(verdict):
+    fields = {"trial": 1, "attempt": 1}
+    events = [
+        {"event": "session-started", "terrain": "TF", "trials": 1},
+        {"event": "activated"},
+        {"event": "trial-started", **fields},
+        {"event": "trial-recorded", **fields},
+        {"event": "trial-kept", **fields},
+        {"event": "session-ended", "reason": "complete"},
+    ]
+    changed = {"event": "verdict-changed", **fields, "verdict": verdict}
+    assert refusal(replay(events), changed) == "a verdict is keep or reject"
+    assert refusal(replay(events), {**changed, "verdict": "reject"}) == ""

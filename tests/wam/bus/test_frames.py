@@ -283,3 +283,15 @@ def test_a_property_has_a_number_of_seven_bits(number):
     assert frames.encode_get(127) == b"\x7f"
     with pytest.raises(ValueError, match="0 to 127"):
         frames.encode_get(number)
+
+
+@pytest.mark.parametrize("can_id", [0, 0x7FF])
+def test_identifiers_have_eleven_bits(can_id):
+    address = frames.split_id(can_id)
+    assert (
+        frames.compose_id(address.sender, address.to, is_group=address.is_group)
+        == can_id
+    )
+    for beyond in (-1, 0x800):
+        with pytest.raises(ValueError, match="11-bit"):
+            frames.split_id(beyond)

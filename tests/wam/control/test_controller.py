@@ -282,3 +282,24 @@ def test_a_move_in_place_of_another_begins_on_its_way(law):
     assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)
     law.enter(ArmState.HOLD, half)
     assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)
+
+
+@pytest.mark.parametrize(("state", "offset"), [("HOLD", 0.065), ("FLOAT", 0.5)])
+def test_joint_7_stays_where_a_person_turns_it_in_hold_and_not_in_a_trial(
+    law, state, offset
+):
+    law.enter(ArmState[state], reading(0.0))
+    law.torque(reading(9.0, q=moved(0.5)))
+    assert law.joint7_offset(reading(9.0, q=moved(0.5))) == pytest.approx(offset)
+
+
+def test_a_hold_in_the_middle_of_a_move_begins_with_the_torque_of_the_move(law):
+    """The PD of the move pulls back by 1 mrad; its goal is far away."""
+    goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(goal, 0.5, reading(3.0))
+    q = DOWN + np.array([0, 0, 0, 0.2 + 0.001, 0, 0, 0])
+    half = reading(3.0 + 0.5 * 2.0 * np.sqrt(0.4 / 0.5), q=q)
+    law.enter(ArmState.HOLD, half)
+    tau, gravity = law.torque(half)
+    assert tau[3] - gravity[3] == pytest.approx(-0.5, abs=0.05)  # 500 N m/rad

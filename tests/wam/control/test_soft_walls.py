@@ -179,3 +179,9 @@ def test_beyond_the_stop_the_damper_grows_no_more():
 @pytest.mark.parametrize("joint", range(7))
 def test_no_wall_is_armed_at_first(joint):
     assert not pushed(SoftWalls(WALLS), at(1.95, joint)).any()
+
+
+@pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
+def test_the_slightest_touch_of_a_wall_is_pushed_back(stop, sign):
+    inside = stop + sign * (DEPTH - 0.002)
+    assert pushed(armed(), at(inside))[3] == pytest.approx(sign * LIMIT / 0.2 * 0.002)
