@@ -162,7 +162,8 @@ class MutatedTree:
         self._longest: dict[str, float] = {}
         for name in (*_COPIED, "tests"):
             shutil.copytree(ROOT / name, folder / name, ignore=_CACHES)
-        shutil.copy(ROOT / "pyproject.toml", folder)
+        for name in ("pyproject.toml", "SECURITY.md"):
+            shutil.copy(ROOT / name, folder)
         self._processes = multiprocessing.get_context("forkserver")
         self._processes.set_forkserver_preload(list(LIBRARIES))
 

@@ -154,7 +154,9 @@ def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
     assert asked == {(Prompt.LIFT, 3, 2)}
 
 
-@pytest.mark.parametrize(("height", "waits"), [(0.031, False), (0.029, True)])
+@pytest.mark.parametrize(
+    ("height", "waits"), [(0.031, False), (0.03, True), (0.029, True)]
+)
 def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
     tmp_path, height, waits
 ):

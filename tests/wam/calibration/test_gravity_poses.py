@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
+from wam.calibration import free_space
 from wam.calibration.free_space import (
     OFFSET,
     UPRIGHT,
@@ -208,3 +209,23 @@ def test_a_leg_is_as_fast_as_the_sole_may_be(model):
     assert leg_speed(model, q, goal) == pytest.approx(
         POINT_SPEED / np.hypot(x, y), rel=0.01
     )
+
+
+@pytest.mark.parametrize(
+    ("heights", "is_free"),
+    [
+        ([0.5, 0.5, 0.5, 0.5], True),
+        ([0.5, 0.2, 0.5, 0.5], False),
+        ([0.5, 0.5, 0.2, 0.5], False),
+        ([0.2, 0.25, 0.5, 0.5], True),
+        ([0.5, 0.5, 0.25, 0.2], True),
+        ([0.5, 0.331, 0.329, 0.5], True),
+        ([0.5, 0.327, 0.5, 0.5], False),
+        ([0.2, 0.197, 0.5, 0.5], False),
+    ],
+)
+def test_a_way_is_no_lower_than_the_floor_or_its_ends(
+    model, monkeypatch, heights, is_free
+):
+    monkeypatch.setattr(free_space, "lowest", lambda *_: np.array(heights))
+    assert is_clear(model, np.zeros(7), np.ones(7), 0.33) is is_free

@@ -203,3 +203,38 @@ def test_a_way_is_looked_at_from_end_to_end_in_equal_steps():
 
 def test_the_margin_is_thirty_millimetres():
     assert pytest.approx(0.03) == CLEARANCE_MARGIN
+
+
+class Staged(ArmClearance):
+    """Gaps that are given for each look at the way of joint 1 from 0 to 1 rad."""
+
+    def __init__(self, tool, gaps):
+        super().__init__(CONSTANTS, tool)
+        self.gaps = gaps
+
+    def distances(self, q):
+        count = len(straight_way(np.zeros(7), np.eye(7)[0]))
+        return np.array([self.gaps.get(round(q[0] * (count - 1)), 0.5)])
+
+
+LAST = len(straight_way(np.zeros(7), np.eye(7)[0])) - 1
+
+
+@pytest.mark.parametrize(
+    ("gaps", "is_hit"),
+    [
+        ({}, False),
+        ({1: 0.029}, True),
+        ({LAST - 1: 0.029}, True),
+        ({LAST // 2: 0.031}, False),
+        ({0: 0.01, 1: 0.0081}, False),
+        ({0: 0.01, 1: 0.0079}, True),
+        ({LAST: 0.01, LAST - 1: 0.0081}, False),
+        ({LAST: 0.01, 7: 0.0079}, True),
+    ],
+)
+def test_on_a_way_nothing_is_closer_than_the_margin_or_its_ends(
+    example_tool, gaps, is_hit
+):
+    hit = Staged(example_tool, gaps).first_hit(np.zeros(7), np.eye(7)[0])
+    assert (hit is not None) is is_hit
