@@ -63,6 +63,40 @@ def add_seed(parser: ArgumentParser) -> None:
     )
 
 
+def add_analysis(parser: ArgumentParser) -> None:
+    """Declare the choices of an analysis."""
+    group = parser.add_argument_group("choices of the analysis")
+    group.add_argument(
+        "--smooth",
+        type=int,
+        metavar="N",
+        help="width of the moving average, samples at 500 Hz, odd (11: 22 ms)",
+    )
+    group.add_argument(
+        "--every",
+        type=int,
+        metavar="N",
+        help="one sample of N is kept, samples at 500 Hz (5: 10 ms)",
+    )
+    group.add_argument(
+        "--window", metavar="LOW:HIGH", help="velocities that count [m/s] (0.005:0.2)"
+    )
+    group.add_argument(
+        "--bounds",
+        metavar="NAME=LOW:HIGH,..",
+        help="box of the Tustin fit: mu, F_s, v_s, delta_s, b",
+    )
+    group.add_argument(
+        "--what-if",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="repeat the study under another choice and show both: smoothing=N, "
+        "window=LOW:HIGH, lag=MS, frame=sole, kernel=as_printed, "
+        "static_friction=proportional; more than once for several",
+    )
+
+
 def add_reopening(parser: ArgumentParser) -> None:
     """Declare what every command takes that opens a session once more."""
     parser.add_argument(

@@ -1,7 +1,8 @@
 from .columns import parse_columns, parse_units
 from .events import Slip, find_slips
+from .lag import ForceLag, force_lag
 from .load import Frame, RecordedTrial, load_trial
-from .plausibility import Doubt, doubts_of, doubts_of_record, summed_up
+from .plausibility import LATEST_MS, Doubt, doubts_of, doubts_of_record, summed_up
 from .prepare import (
     MINIMUM_KEPT,
     MINIMUM_TRAVEL_SHARE,
@@ -30,6 +31,7 @@ __all__ = [
     "BIG",
     "FLAT",
     "JOINT7_WARNING",
+    "LATEST_MS",
     "LEVELS",
     "MINIMUM_KEPT",
     "MINIMUM_TRAVEL_SHARE",
@@ -37,6 +39,7 @@ __all__ = [
     "Array",
     "CoverageGrid",
     "Doubt",
+    "ForceLag",
     "Frame",
     "Indices",
     "PrepareOptions",
@@ -51,6 +54,7 @@ __all__ = [
     "doubts_of",
     "doubts_of_record",
     "find_slips",
+    "force_lag",
     "groups_of",
     "kind_title",
     "load_tables",

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Record, SettingsError, TrialFileError
+from acquisition import Flag, Record, SettingsError, TrialFileError
 from acquisition.trial_file import TrialReader
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
@@ -21,6 +21,7 @@ from wam.model import ArmConstants, ArmModel, Body, Tool, load_constants
 
 Array = NDArray[np.float64]
 Frame = Literal["terrain", "sole"]
+_LONGEST_AGE = 0.1  # s; stamps further apart are none
 _LARGEST_ANGLE = 10.0  # rad, beyond every joint stop
 _LONGEST_NUMBER = 20  # digits of 64 bits
 
@@ -99,8 +100,18 @@ class RecordedTrial:
         """
         v_t, F_t, F_n = (self.traction if frame == "terrain" else self._on_sole()).T
         return TractionSeries(
-            self.terrain, self.name, self.t, v_t, F_n, F_t, self.stones
+            *(self.terrain, self.name, self.t, v_t, F_n, F_t),
+            stones=self.stones,
+            stamped_lag=self.stamped_lag,
         )
+
+    @property
+    def stamped_lag(self) -> float:
+        """How much older than the joints the forces are by their time stamps [s]."""
+        ages = self.cycles["arm_ns"].astype(float) - self.cycles["ft_ns"].astype(float)
+        fresh = (self.cycles["flags"] & Flag.FT_FRESH) != 0
+        age = float(np.median(ages[fresh])) * 1e-9 if fresh.any() else 0.0
+        return age if abs(age) < _LONGEST_AGE else 0.0
 
     def _on_sole(self) -> Array:
         """Return v_t, F_t, F_n by the sole's own axes, shape (n, 3)."""

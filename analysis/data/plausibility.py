@@ -18,6 +18,7 @@ SLOWEST = 0.005  # m/s; a slower foot sticks, and its forces may point anywhere
 PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
 FEWEST = 20  # moving samples below which nothing is judged
 FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
+LATEST_MS = 3.0  # of the force against the motion, its time stamps' age apart
 FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
@@ -30,8 +31,8 @@ class Doubt:
     """One reason why a trial cannot be what it says it is.
 
     Attributes:
-        name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment"
-            or "unit".
+        name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment",
+            "unit", "lag" or "swapped".
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
@@ -54,11 +55,12 @@ def doubts_of(trial: PreparedTrial) -> list[Doubt]:
     units = list(_units(smooth))
     if units:
         return units
+    late = list(_timing(trial))
     rubbing = (np.abs(smooth.v_t) > SLOWEST) & (np.abs(smooth.F_n) > PRESSED)
     if np.count_nonzero(rubbing) < FEWEST:
-        return []
+        return late
     v, load, along = smooth.v_t[rubbing], smooth.F_n[rubbing], smooth.F_t[rubbing]
-    return [*_normal(load), *_signs(v, load, along)]
+    return [*late, *_normal(load), *_signs(v, load, along)]
 
 
 def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
@@ -118,6 +120,27 @@ def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
         f"these look like {looks}",
         f"--unit {name}={looks}",
     )
+
+
+def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
+    if trial.is_load_driven:
+        yield Doubt(
+            "swapped",
+            "the motion follows F_n and not F_t",
+            "the columns F_t and F_n are swapped",
+            "--columns F_n=...,F_t=...",
+        )
+    if trial.lag is None:
+        return
+    late = (trial.lag.seconds - trial.stamped_lag) * 1e3
+    if abs(late) > LATEST_MS:
+        yield Doubt(
+            "lag",
+            f"the force is {abs(late):.0f} ms {'late' if late > 0 else 'early'} "
+            f"against the motion (limit {LATEST_MS:g})",
+            "a filter in the sensor, the latency of its port, or two clocks",
+            f"--what-if lag={trial.lag.seconds * 1e3:.0f} shows what it changes",
+        )
 
 
 def _normal(load: Array) -> Iterator[Doubt]:

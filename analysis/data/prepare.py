@@ -2,17 +2,20 @@
 
 Smooth with a centred moving average, keep every fifth sample, keep the window of
 velocities; in this order. Sticking, backward motion and fast peaks are left out.
+Widths count samples at 500 Hz and follow the rate: 11 samples are 22 ms.
 """
 
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from acquisition import SettingsError
+from acquisition import RATE_HZ, SettingsError
+from analysis.data.lag import ForceLag, force_lag
 from analysis.data.series import Array, Indices, TractionSeries
 
 MINIMUM_KEPT = 250  # kept samples that make a trial count
 MINIMUM_TRAVEL_SHARE = 0.9  # of the container
+_LITTLE = 1e-3
 _LONGEST_GAP = 3  # missing samples that a difference may span
 
 
@@ -21,8 +24,8 @@ class PrepareOptions:
     """How a trial is smoothed, thinned and windowed.
 
     Attributes:
-        smoothing: width of the moving average [samples], odd.
-        downsample: one sample of this many is kept.
+        smoothing: width of the moving average [samples at 500 Hz], odd.
+        downsample: one sample of this many is kept [samples at 500 Hz].
         slowest: lower edge of the window [m/s], included.
         fastest: upper edge of the window [m/s], included.
         container_travel: length of the container [m]; None = unknown, then travel
@@ -55,6 +58,19 @@ class PrepareOptions:
                 "starts at standstill.",
                 hint="Give 0 < slowest < fastest, e.g. 0.005 and 0.2.",
             )
+
+    def widths(self, series: TractionSeries) -> tuple[int, int]:
+        """Return (samples that are averaged, one of how many is kept) of a trial.
+
+        Both are times: at another rate than 500 Hz they are other numbers of samples.
+        Rows that were prepared before are taken as they are.
+        """
+        if series.is_prepared:
+            return 1, 1
+        scale = series.rate / RATE_HZ
+        # Half a sample counts down: a rate is known to a few digits only.
+        half = round((self.smoothing * scale - 1.0) / 2.0 - _LITTLE)
+        return 2 * max(half, 0) + 1, max(round(self.downsample * scale), 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +130,12 @@ class PreparedTrial:
         is_countable: enough kept samples and, where the container is known, travel.
         dropped_rows: rows that were not finite in the record.
         repeated_rows: rows of the record that were there twice.
+        lag: how much later than the motion the forces are; None where the trial does
+            not show it.
+        is_load_driven: the motion explains F_n as it should explain F_t, and not F_t.
+        stamped_lag: the same by the record's time stamps [s].
+        widths: samples that were averaged, and one of how many was kept.
+        is_prepared: the record's rows had been prepared before.
     """
 
     terrain: str
@@ -128,6 +150,11 @@ class PreparedTrial:
     is_countable: bool
     dropped_rows: int
     repeated_rows: int
+    lag: ForceLag | None
+    is_load_driven: bool
+    stamped_lag: float
+    widths: tuple[int, int]
+    is_prepared: bool
 
     @property
     def kept(self) -> int:
@@ -177,8 +204,11 @@ def foot_velocity(t: Array, position: Array) -> Array:
 
 def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
     """Return the kept samples of a trial: smoothed, thinned, inside the window."""
-    smooth = _smooth(series, options.smoothing)
-    thinned = np.arange(0, smooth.t.size, options.downsample)
+    widths = options.widths(series)
+    smooth = _smooth(series, widths[0])
+    lag = None if series.is_prepared else force_lag(series.t, series.v_t, series.F_t)
+    load_lag = force_lag(series.t, series.v_t, series.F_n) if lag is None else None
+    thinned = np.arange(0, smooth.t.size, widths[1])
     v = smooth.v_t[thinned]
     is_kept = (v >= options.slowest) & (v <= options.fastest)
     indices = thinned[is_kept]
@@ -196,6 +226,11 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
         is_countable=_is_countable(indices.size, travel, options.container_travel),
         dropped_rows=series.dropped_rows,
         repeated_rows=series.repeated_rows,
+        lag=lag,
+        is_load_driven=load_lag is not None and not series.is_prepared,
+        stamped_lag=series.stamped_lag,
+        widths=widths,
+        is_prepared=series.is_prepared,
     )
 
 

@@ -1,6 +1,6 @@
 """The record of one trial as the analysis takes it: velocity and forces over time."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ class TractionSeries:
         F_t: traction force [N], > 0 in slip.
         stones: size of the stones as recorded or given: "small", "big" or "none";
             empty where it is not known.
+        stamped_lag: how much older than the velocity the forces are by their own time
+            stamps [s]; 0 where they have none.
+        is_prepared: the rows are samples kept by an earlier preparation: smoothed,
+            thinned and windowed.
         dropped_rows: number of rows that were not finite.
         repeated_rows: number of rows that were there twice.
 
@@ -47,6 +51,8 @@ class TractionSeries:
     F_n: Array
     F_t: Array
     stones: str = ""
+    stamped_lag: float = 0.0
+    is_prepared: bool = False
     dropped_rows: int = field(init=False)
     repeated_rows: int = field(init=False)
 
@@ -79,6 +85,19 @@ class TractionSeries:
     def rate(self) -> float:
         """Sampling rate [Hz], from the median step of time."""
         return float(1.0 / np.median(np.diff(self.t)))
+
+    def with_forces_from(self, lag: float) -> "TractionSeries":
+        """Return the trial with the forces of `lag` [s] later at every time.
+
+        Rows whose forces are not recorded are left out.
+
+        Raises:
+            SettingsError: fewer than three rows are left.
+        """
+        at = self.t + lag
+        inside = (at >= self.t[0]) & (at <= self.t[-1])
+        F_n, F_t = (np.interp(at, self.t, F)[inside] for F in (self.F_n, self.F_t))
+        return replace(self, t=self.t[inside], v_t=self.v_t[inside], F_n=F_n, F_t=F_t)
 
 
 def _check_name(terrain: str, name: str) -> None:

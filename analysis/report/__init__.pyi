@@ -1,12 +1,19 @@
 from .page import ReportContext, write_report
 from .page_model import ReportTable
-from .what_if import StudyVariant, parse_choice, plain_choice, side_by_side
+from .what_if import (
+    StudyVariant,
+    parse_choice,
+    parse_window,
+    plain_choice,
+    side_by_side,
+)
 
 __all__ = [
     "ReportContext",
     "ReportTable",
     "StudyVariant",
     "parse_choice",
+    "parse_window",
     "plain_choice",
     "side_by_side",
     "write_report",

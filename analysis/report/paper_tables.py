@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from acquisition import RATE_HZ
 from analysis.figures import ReportSection
 from analysis.report.page_model import ReportTable
 from analysis.study import (
@@ -150,8 +151,7 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         for name, (low, high) in fit.bounds.items()
     )
     rows = [
-        ["smoothing", f"centred moving average of {prepare.smoothing} samples"],
-        ["downsampling", f"one sample in {prepare.downsample}, after smoothing"],
+        *_widths(study),
         ["window", f"{prepare.slowest:g} ≤ v_t ≤ {prepare.fastest:g} m/s"],
         ["folds", "one whole trial left out at a time"],
         ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
@@ -169,13 +169,32 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         ["across terrains", "the model of fold k tested on trial k, wrapping round"],
         ["recorded rate", _rates(study)],
     ]
-    note = (
-        "The tables come from elsewhere: smoothing and downsampling count samples as "
-        "they are, whatever their rate."
-        if is_foreign
-        else ""
-    )
+    note = "The tables come from elsewhere." if is_foreign else ""
     return ReportTable("Choices", ("what", "how"), rows, note)
+
+
+def _widths(study: Study) -> list[list[str]]:
+    """Return how samples were smoothed and thinned, in time and in samples."""
+    prepare = study.options.prepare
+    trials = [trial for result in study.terrains.values() for trial in result.trials]
+    used = sorted({trial.widths for trial in trials if not trial.is_prepared})
+    averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
+    thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
+    prepared = sum(trial.is_prepared for trial in trials)
+    rest = f"; {prepared} trials were prepared before" if prepared else ""
+    span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
+    return [
+        [
+            "smoothing",
+            f"centred moving average over {span:g} ms: {averaged or 'no'} samples"
+            + rest,
+        ],
+        [
+            "downsampling",
+            f"a sample every {step:g} ms, after smoothing: one in {thinned or '1'}"
+            + rest,
+        ],
+    ]
 
 
 def _summary_row(result: TerrainResult) -> list[str]:

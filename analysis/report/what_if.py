@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from acquisition import SettingsError
-from analysis.data import Frame
+from analysis.data import Frame, PrepareOptions, RecordedTrial, TractionSeries
 from analysis.figures import ReportSection
 from analysis.report.further_tables import paired_cell
 from analysis.report.page_model import ReportTable
@@ -28,10 +28,12 @@ from analysis.tustin import TustinForm
 VALUES = {
     "smoothing": "an odd number of samples, e.g. smoothing=15",
     "window": "slowest:fastest in m/s, e.g. window=0.01:0.2",
+    "lag": "-50 to 50 ms that the force is late, e.g. lag=20",
     "frame": "sole or terrain",
     "kernel": "as_printed (eq. 5 without 1 +) or default",
     "static_friction": "proportional (F_s = f_s F_n) or constant",
 }
+_LATEST_MS = 50.0
 _WIDEST = 501  # samples of smoothing: a second
 _MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
@@ -45,19 +47,38 @@ class StudyVariant:
         value: how, as given.
         models: names of the models that it touches.
         frame: the frame that forces are projected on.
+        lag: how late the forces are taken to be [s].
         change: from the options of the study to those of the repeated one.
     """
 
     key: str
     value: str
     models: tuple[str, ...]
-    frame: Frame
-    change: Callable[[StudyOptions], StudyOptions]
+    change: Callable[[StudyOptions], StudyOptions] = lambda options: options
+    frame: Frame = "terrain"
+    lag: float = 0.0
 
     @property
     def text(self) -> str:
         """The choice as it was given."""
         return f"{self.key}={self.value}"
+
+    def series(self, trial: RecordedTrial | TractionSeries) -> TractionSeries:
+        """Return a trial under the choice.
+
+        Raises:
+            SettingsError: the choice needs a recording, and the trial is a table.
+        """
+        if isinstance(trial, RecordedTrial):
+            series = trial.series(self.frame)
+        elif self.frame == "terrain":
+            series = trial
+        else:
+            raise SettingsError(
+                f"--what-if {self.text}: tables have no frame to be changed.",
+                hint="It is a choice of recorded trials: traction report.",
+            )
+        return series.with_forces_from(self.lag) if self.lag else series
 
     def options(self, before: StudyOptions) -> StudyOptions:
         """Return the options of the repeated study, only of the models it touches."""
@@ -113,8 +134,9 @@ def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTab
         note="The study as it is, then repeated under the choice, with the same points "
         "and the same trials left out. Means over trials; difference ± its standard "
         "error over the trials that both have, below zero is better under the choice; "
-        "p by all patterns of signs. Choices that change which samples are kept are "
-        "tested on other samples.",
+        "p by all patterns of signs. Smoothing and window change what models are "
+        "fitted to; they are tested on the samples of the study as it is. Frame and "
+        "lag change the data themselves, and with them what is tested.",
         section=ReportSection.CHANGED,
     )
 
@@ -174,42 +196,53 @@ def _smoothing(value: str) -> StudyVariant:
     width = int(value)
     if not 1 <= width <= _WIDEST:
         raise ValueError(value)
-    return _of_samples(
-        "smoothing", value, lambda o: replace(o.prepare, smoothing=width)
-    )
+    return _of_samples("smoothing", value, lambda p: replace(p, smoothing=width))
 
 
 def _window(value: str) -> StudyVariant:
+    slowest, fastest = parse_window(value)
+    return _of_samples(
+        "window", value, lambda p: replace(p, slowest=slowest, fastest=fastest)
+    )
+
+
+def parse_window(value: str) -> tuple[float, float]:
+    """Return the edges of `slowest:fastest` [m/s].
+
+    Raises:
+        ValueError: there are not two finite numbers.
+    """
     slowest, fastest = (float(part) for part in value.split(":"))
     if not (math.isfinite(slowest) and math.isfinite(fastest)):
         raise ValueError(value)
-    return _of_samples(
-        "window",
-        value,
-        lambda o: replace(o.prepare, slowest=slowest, fastest=fastest),
-    )
+    return slowest, fastest
 
 
 def _of_samples(
-    key: str, value: str, prepare: Callable[[StudyOptions], Any]
+    key: str, value: str, prepare: Callable[[PrepareOptions], PrepareOptions]
 ) -> StudyVariant:
-    prepare(StudyOptions())  # refused here, not in the middle of a study
-    return StudyVariant(
-        key,
-        value,
-        tuple(FITTERS),
-        "terrain",
-        lambda options: replace(options, prepare=prepare(options)),
-    )
+    """Return a choice of training samples; the tested ones stay those of the study."""
+    prepare(PrepareOptions())  # refused here, not in the middle of a study
+
+    def change(options: StudyOptions) -> StudyOptions:
+        target = options.target or options.prepare
+        return replace(options, prepare=prepare(options.prepare), target=target)
+
+    return StudyVariant(key, value, tuple(FITTERS), change)
+
+
+def _lag(value: str) -> StudyVariant:
+    late_ms = float(value)
+    if not abs(late_ms) <= _LATEST_MS:
+        raise ValueError(value)
+    return StudyVariant("lag", value, tuple(FITTERS), lag=late_ms * 1e-3)
 
 
 def _frame(value: str) -> StudyVariant:
     frames: Mapping[str, Frame] = {"sole": "sole", "terrain": "terrain"}
     if value not in frames:
         raise ValueError(value)
-    return StudyVariant(
-        "frame", value, tuple(FITTERS), frames[value], lambda options: options
-    )
+    return StudyVariant("frame", value, tuple(FITTERS), frame=frames[value])
 
 
 def _kernel(value: str) -> StudyVariant:
@@ -218,7 +251,6 @@ def _kernel(value: str) -> StudyVariant:
         "kernel",
         value,
         (GP_NN, GP_NN_TUSTIN),
-        "terrain",
         lambda o: replace(o, fit=replace(o.fit, is_nn_as_printed=printed)),
     )
 
@@ -233,7 +265,6 @@ def _static_friction(value: str) -> StudyVariant:
         "static_friction",
         value,
         (TUSTIN, GP_SE_TUSTIN, GP_NN_TUSTIN),
-        "terrain",
         lambda o: replace(o, fit=replace(o.fit, form=form)),
     )
 
@@ -247,6 +278,7 @@ def _one_of(value: str, yes: str, no: str) -> bool:
 _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
     "smoothing": _smoothing,
     "window": _window,
+    "lag": _lag,
     "frame": _frame,
     "kernel": _kernel,
     "static_friction": _static_friction,

@@ -19,14 +19,8 @@ from .models import (
 )
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
-from .study import (
-    LIFTED_WARNING,
-    Study,
-    StudyOptions,
-    TerrainResult,
-    mean_of,
-    run_study,
-)
+from .study import LIFTED_WARNING, Study, StudyOptions, run_study
+from .terrain_fit import TerrainResult, mean_of
 
 __all__ = [
     "FITTERS",

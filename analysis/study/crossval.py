@@ -80,11 +80,24 @@ class FoldResult:
 
 
 def plan_folds(
-    trials: Prepared, options: FitOptions
+    trials: Prepared, options: FitOptions, targets: Prepared | None = None
 ) -> tuple[list[FoldTask], list[str]]:
-    """Return the folds of a study and notes on what cannot be folded."""
+    """Return the folds of a study and notes on what cannot be folded.
+
+    Args:
+        trials: what models are fitted to.
+        options: how to fit.
+        targets: the same trials as models are tested on them; None = as fitted to.
+    """
+    targets = trials if targets is None else targets
     usable = {
-        terrain: [k for k, trial in enumerate(prepared) if trial.kept]
+        terrain: [
+            k
+            for k, (trial, target) in enumerate(
+                zip(prepared, targets[terrain], strict=True)
+            )
+            if trial.kept and target.kept
+        ]
         for terrain, prepared in trials.items()
     }
     notes = _notes_on_gaps(trials, usable)
@@ -96,7 +109,9 @@ def plan_folds(
                 "needs two, so no model was fitted."
             )
             continue
-        tasks += [_task(trials, usable, (terrain, fold), options) for fold in folds]
+        tasks += [
+            _task((trials, targets), usable, (terrain, fold), options) for fold in folds
+        ]
     return tasks, notes
 
 
@@ -165,20 +180,20 @@ def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[st
 
 
 def _task(
-    trials: Prepared,
+    trials: tuple[Prepared, Prepared],
     usable: Mapping[str, list[int]],
     place: tuple[str, int],
     options: FitOptions,
 ) -> FoldTask:
     terrain, fold = place
-    own = trials[terrain]
+    own, targets = trials[0][terrain], trials[1]
     others = {
         other: tuple(
-            SampleTable.of([trials[other][j]])
+            SampleTable.of([targets[other][j]])
             for k, j in pair_trials(usable[terrain], usable[other])
             if k == fold
         )
-        for other in trials
+        for other in targets
         if other != terrain
     }
     return FoldTask(
@@ -186,7 +201,7 @@ def _task(
         fold=fold,
         training=SampleTable.of([own[k] for k in usable[terrain] if k != fold]),
         lengths=tuple(own[k].kept for k in usable[terrain] if k != fold),
-        own=SampleTable.of([own[fold]]),
+        own=SampleTable.of([targets[terrain][fold]]),
         others=others,
         options=options,
     )

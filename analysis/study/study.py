@@ -1,6 +1,6 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,19 +11,17 @@ from analysis.data import (
     PreparedTrial,
     PrepareOptions,
     SampleTable,
-    Slip,
     TractionSeries,
     doubts_of,
     find_slips,
-    kind_title,
     prepare_trial,
     summed_up,
     terrain_kind,
 )
-from analysis.study.crossval import FoldResult, ModelFold, plan_folds, run_fold
+from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.models import FitOptions
-from analysis.study.terrain_fit import PooledTustinFit, TerrainTask, fit_terrain
+from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
 
 LIFTED_WARNING = 0.03  # share of kept samples with F_n <= 0 that points to a bad tare
 
@@ -34,6 +32,9 @@ class StudyOptions:
 
     Attributes:
         prepare: smoothing, thinning and window.
+        target: the same of the samples that models are tested on; None = those of
+            `prepare`. A study repeated under another smoothing is so held against the
+            same numbers.
         fit: bounds, number of points and seed.
         n_jobs: worker processes; None = one per core. Does not change the results.
         scheduler: address of a Dask scheduler to work for; None = this machine. Does
@@ -41,79 +42,10 @@ class StudyOptions:
     """
 
     prepare: PrepareOptions = field(default_factory=PrepareOptions)
+    target: PrepareOptions | None = None
     fit: FitOptions = field(default_factory=FitOptions)
     n_jobs: int | None = None
     scheduler: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class TerrainResult:
-    """One terrain of a study.
-
-    Attributes:
-        terrain: its name.
-        kind: "small", "big", "flat", or its own name where that is not known.
-        trials: its prepared trials.
-        slips: the slips of every trial.
-        folds: its folds; a trial without kept samples has none.
-        whole: the Tustin fit of all its trials, with intervals.
-    """
-
-    terrain: str
-    kind: str
-    trials: tuple[PreparedTrial, ...]
-    slips: tuple[tuple[Slip, ...], ...]
-    folds: tuple[FoldResult, ...]
-    whole: PooledTustinFit
-
-    @property
-    def title(self) -> str:
-        """Its name and its kind in words, e.g. "S0: small stones"."""
-        if self.kind == self.terrain:
-            return self.terrain
-        return f"{self.terrain}: {kind_title(self.kind)}"
-
-    def per_trial(
-        self, model: str, measure: Callable[[ModelFold], float]
-    ) -> list[float | None]:
-        """Return a measure of a model's fold for every trial, None where missing."""
-        values: list[float | None] = [None] * len(self.trials)
-        for fold in self.folds:
-            if model in fold.models:
-                values[fold.fold] = measure(fold.models[model])
-        return values
-
-    def scores(self, model: str, key: str) -> list[float | None]:
-        """Return the measure `key` of a model on every trial, None where missing."""
-        return self.per_trial(model, lambda fold: getattr(fold.score, key))
-
-    def maes(self, model: str) -> list[float | None]:
-        """Return the mean absolute error [N] on every trial, left out in turn."""
-        return self.scores(model, "mae")
-
-    def mae(self, model: str) -> float | None:
-        """Return the mean over folds of the mean absolute error [N]."""
-        return mean_of(self.maes(model))
-
-    @property
-    def constant_mae(self) -> float | None:
-        """Error [N] of always predicting the training rows' median F_t."""
-        return mean_of([fold.constant_mae for fold in self.folds])
-
-    @property
-    def kept(self) -> int:
-        """Number of kept samples of all trials."""
-        return sum(trial.kept for trial in self.trials)
-
-    @property
-    def lifted_share(self) -> float:
-        """Share of the kept samples with F_n <= 0: the foot off the ground."""
-        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
-        return lifted / self.kept if self.kept else 0.0
-
-    def models(self, name: str) -> list[ModelFold]:
-        """Return the folds of the model `name`."""
-        return [fold.models[name] for fold in self.folds if name in fold.models]
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,11 +106,9 @@ def run_study(
     """
     if not any(trials.values()):
         raise SettingsError("There is no trial to analyse.", hint="Record some first.")
-    prepared = {
-        terrain: tuple(prepare_trial(series, options.prepare) for series in recorded)
-        for terrain, recorded in trials.items()
-    }
-    tasks, notes = plan_folds(prepared, options.fit)
+    prepared = _prepared(trials, options.prepare)
+    targets = _prepared(trials, options.target) if options.target else prepared
+    tasks, notes = plan_folds(prepared, options.fit, targets)
     workers, whole_tasks = (
         Workers(options.n_jobs, options.scheduler),
         _wholes(prepared, options),
@@ -204,6 +134,15 @@ def run_study(
     return Study(simulated, options, results, tuple(notes), warnings)
 
 
+def _prepared(
+    trials: Mapping[str, Sequence[TractionSeries]], options: PrepareOptions
+) -> dict[str, tuple[PreparedTrial, ...]]:
+    return {
+        terrain: tuple(prepare_trial(series, options) for series in recorded)
+        for terrain, recorded in trials.items()
+    }
+
+
 def _in_turn(
     progress: Progress | None, first: int, second: int
 ) -> tuple[Progress | None, Progress | None]:
@@ -226,12 +165,6 @@ def _wholes(
         )
         for terrain, trials in prepared.items()
     ]
-
-
-def mean_of(values: Sequence[float | None]) -> float | None:
-    """Return the mean of the values that exist, None if none does."""
-    present = [value for value in values if value is not None]
-    return float(np.mean(present)) if present else None
 
 
 def _cross_mae(result: TerrainResult, model: str, tested: str) -> float | None:

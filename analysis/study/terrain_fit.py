@@ -1,13 +1,14 @@
-"""The Tustin fit of all trials of a terrain, and how far to believe it."""
+"""One terrain of a study: its folds, and the Tustin fit of all its trials."""
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from acquisition import TractionError
-from analysis.data import SampleTable
+from analysis.data import PreparedTrial, SampleTable, Slip, kind_title
+from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
 from analysis.tustin import Interval, TustinFit, bootstrap_tustin, fit_tustin
 
@@ -45,6 +46,76 @@ class PooledTustinFit:
     intervals: Mapping[str, Interval]
 
 
+@dataclass(frozen=True, slots=True)
+class TerrainResult:
+    """One terrain of a study.
+
+    Attributes:
+        terrain: its name.
+        kind: "small", "big", "flat", or its own name where that is not known.
+        trials: its prepared trials.
+        slips: the slips of every trial.
+        folds: its folds; a trial without kept samples has none.
+        whole: the Tustin fit of all its trials, with intervals.
+    """
+
+    terrain: str
+    kind: str
+    trials: tuple[PreparedTrial, ...]
+    slips: tuple[tuple[Slip, ...], ...]
+    folds: tuple[FoldResult, ...]
+    whole: PooledTustinFit
+
+    @property
+    def title(self) -> str:
+        """Its name and its kind in words, e.g. "S0: small stones"."""
+        if self.kind == self.terrain:
+            return self.terrain
+        return f"{self.terrain}: {kind_title(self.kind)}"
+
+    def per_trial(
+        self, model: str, measure: Callable[[ModelFold], float]
+    ) -> list[float | None]:
+        """Return a measure of a model's fold for every trial, None where missing."""
+        values: list[float | None] = [None] * len(self.trials)
+        for fold in self.folds:
+            if model in fold.models:
+                values[fold.fold] = measure(fold.models[model])
+        return values
+
+    def scores(self, model: str, key: str) -> list[float | None]:
+        """Return the measure `key` of a model on every trial, None where missing."""
+        return self.per_trial(model, lambda fold: getattr(fold.score, key))
+
+    def maes(self, model: str) -> list[float | None]:
+        """Return the mean absolute error [N] on every trial, left out in turn."""
+        return self.scores(model, "mae")
+
+    def mae(self, model: str) -> float | None:
+        """Return the mean over folds of the mean absolute error [N]."""
+        return mean_of(self.maes(model))
+
+    @property
+    def constant_mae(self) -> float | None:
+        """Error [N] of always predicting the training rows' median F_t."""
+        return mean_of([fold.constant_mae for fold in self.folds])
+
+    @property
+    def kept(self) -> int:
+        """Number of kept samples of all trials."""
+        return sum(trial.kept for trial in self.trials)
+
+    @property
+    def lifted_share(self) -> float:
+        """Share of the kept samples with F_n <= 0: the foot off the ground."""
+        lifted = sum(int(np.count_nonzero(trial.F_n <= 0)) for trial in self.trials)
+        return lifted / self.kept if self.kept else 0.0
+
+    def models(self, name: str) -> list[ModelFold]:
+        """Return the folds of the model `name`."""
+        return [fold.models[name] for fold in self.folds if name in fold.models]
+
+
 def fit_terrain(task: TerrainTask) -> PooledTustinFit:
     """Return the fit of all trials of a terrain; a pure function of the task."""
     options = task.options
@@ -60,3 +131,9 @@ def fit_terrain(task: TerrainTask) -> PooledTustinFit:
     rng = np.random.default_rng(key)
     intervals = bootstrap_tustin(columns, fit, rng, options.bounds, options.draws)
     return PooledTustinFit(task.terrain, fit, intervals)
+
+
+def mean_of(values: Sequence[float | None]) -> float | None:
+    """Return the mean of the values that exist, None if none does."""
+    present = [value for value in values if value is not None]
+    return float(np.mean(present)) if present else None

@@ -6,9 +6,11 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_seed
+from experiments.arguments import add_analysis, add_seed
 
 if TYPE_CHECKING:
+    from analysis.data import TractionSeries
+    from analysis.report import StudyVariant
     from analysis.study import Study
 
 EXAMPLES = """\
@@ -30,6 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--unit", metavar="v_t=mm/s,..", help="units where a header gives none"
     )
+    parser.add_argument(
+        "--rate",
+        type=_rate,
+        metavar="HZ",
+        help="rows of a CSV per second, where it has no time",
+    )
     parser.add_argument("--terrain", metavar="NAME", help="terrain of the CSV files")
     parser.add_argument(
         "--stones",
@@ -37,48 +45,77 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="stones of a terrain: small, big or none for a plate",
     )
     add_seed(parser)
+    add_analysis(parser)
+
+
+def _rate(text: str) -> float:
+    """Return rows per second.
+
+    Raises:
+        ArgumentTypeError: it is no number of 1 to 100000.
+    """
+    try:
+        rate = float(text)
+    except ValueError:
+        rate = 0.0
+    if not 1.0 <= rate <= 100_000.0:
+        raise argparse.ArgumentTypeError(f"{text!r} - expected a rate in Hz, e.g. 500")
+    return rate
 
 
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition import SystemClock
-    from analysis.data import (
-        PrepareOptions,
-        load_tables,
-        parse_columns,
-        parse_stones,
-        parse_units,
-    )
-    from analysis.report import ReportContext, write_report
+    from analysis.data import load_tables, parse_columns, parse_stones, parse_units
+    from analysis.report import ReportContext, plain_choice, side_by_side, write_report
     from analysis.study import FitOptions, StudyOptions, run_study
     from experiments.operator import Console
-    from experiments.report import REPORTED, fitting
+    from experiments.report import REPORTED, analysis_choices, fitting
     from experiments.session import iso_utc
 
     console = Console(color=not args.no_color)
+    choices = analysis_choices(args)
     columns = parse_columns(args.columns) if args.columns else None
     stones = parse_stones(args.stones) if args.stones else None
     units = parse_units(args.unit) if args.unit else None
-    trials = load_tables(args.files, columns, args.terrain, stones, units)
+    trials = load_tables(args.files, columns, args.terrain, stones, units, args.rate)
+    varied = [_under(choice, trials) for choice in choices.variants]
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
-    fit = FitOptions(seed=args.seed, models=REPORTED)
-    options = StudyOptions(prepare=PrepareOptions(), fit=fit)
+    fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=REPORTED)
+    options = StudyOptions(prepare=choices.prepare, fit=fit)
     with fitting(console) as progress:
         study = run_study(trials, options, simulated=False, progress=progress)
     _require_samples(study)
+    others: list[tuple[StudyVariant, Study]] = []
+    for choice, series in zip(choices.variants, varied, strict=True):
+        console.say(f"What if {choice.text}: fitting ...")
+        with fitting(console) as progress:
+            other = run_study(series, choice.options(options), False, progress)
+        others.append((choice, other))
     context = ReportContext(
         title="Traction of foreign tables",
         subtitle=f"{count} trials from {len(args.files)} files",
         is_simulated=False,
         is_foreign=True,
         generated_utc=iso_utc(SystemClock().utc_ns()),
+        tables=[side_by_side(choice, study, other) for choice, other in others],
+        further_numbers={
+            "what_if": [plain_choice(c, study, other) for c, other in others]
+        },
     )
     page = write_report(study, args.out, context)
     for warning in study.warnings:
         console.say(f"▲ {warning}")
     console.say(str(page))
     return 0
+
+
+def _under(
+    choice: StudyVariant, trials: dict[str, list[TractionSeries]]
+) -> dict[str, list[TractionSeries]]:
+    """Return tables under a choice."""
+    return {name: [choice.series(t) for t in group] for name, group in trials.items()}
 
 
 def _require_samples(study: Study) -> None:

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from experiments.arguments import add_allow_missing, add_seed
+from experiments.arguments import add_allow_missing, add_analysis, add_seed
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -21,32 +21,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
     )
-    parser.add_argument(
-        "--what-if",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="repeat the study under another choice and show both: smoothing=N, "
-        "window=LOW:HIGH, frame=sole, kernel=as_printed, "
-        "static_friction=proportional; more than once for several",
-    )
     add_allow_missing(parser)
     add_seed(parser)
+    add_analysis(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
-    from analysis.report import parse_choice
     from experiments.operator import Console
     from experiments.report import (
         ReportRequest,
+        analysis_choices,
         choose_sessions,
         report_sessions,
         tell_missing,
     )
     from experiments.settings import load_settings
 
-    choices = [parse_choice(text) for text in args.what_if]
+    choices = analysis_choices(args)
     console = Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)

@@ -1,3 +1,4 @@
+from .choices import AnalysisChoices, analysis_choices
 from .export import export_sessions
 from .playback import play
 from .progress import fitting
@@ -13,7 +14,9 @@ from .truth_errors import compare_with_truth
 
 __all__ = [
     "REPORTED",
+    "AnalysisChoices",
     "ReportRequest",
+    "analysis_choices",
     "choose_sessions",
     "compare_with_truth",
     "export_sessions",

@@ -136,6 +136,7 @@ SAMPLES = (
     ("v_t", "m/s", "slip velocity, smoothed"),
     ("F_n", "N", "normal force, smoothed"),
     ("F_t", "N", "traction force, smoothed"),
+    ("kept_row", "1", "row of the trial's table, from 0"),
 )
 
 
@@ -187,7 +188,10 @@ def samples_table(trial: RecordedTrial) -> str:
     """Return the kept samples of a trial as CSV, units in the header."""
     options = PrepareOptions(container_travel=trial.frame.travel)
     kept = prepare_trial(trial.series(), options)
-    columns = (kept.smooth.t[kept.indices], kept.v_t, kept.F_n, kept.F_t)
+    columns = (
+        *(kept.smooth.t[kept.indices], kept.v_t, kept.F_n, kept.F_t),
+        kept.indices.astype(float),
+    )
     headers = [f"{name} [{unit}]" for name, unit, _ in SAMPLES]
     return _table(headers, np.column_stack(columns))
 

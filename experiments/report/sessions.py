@@ -1,12 +1,11 @@
 """From sessions to a report: the trials, their study and the page."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock, TrialFileError
 from analysis.data import (
-    PrepareOptions,
     RecordedTrial,
     doubts_of_record,
     load_trial,
@@ -33,6 +32,7 @@ from analysis.study import (
 from analysis.terrains import database_of, identify_study
 from experiments.messages import CATALOGUE
 from experiments.operator import WARNING, Console
+from experiments.report.choices import AnalysisChoices
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables
 from experiments.report.truth_errors import truth_tables
@@ -58,14 +58,14 @@ class ReportRequest:
         terrains: names in the matrix's order.
         seed: seed of the points of the Gaussian processes.
         scheduler: address of a Dask scheduler to fit on; None for this machine.
-        choices: what the study is repeated under.
+        choices: of the analysis.
         missing: kept trials that are missing or changed, in words.
     """
 
     terrains: Sequence[str]
     seed: int
     scheduler: str | None = None
-    choices: Sequence[StudyVariant] = ()
+    choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     missing: Sequence[str] = ()
 
     def sorted(self, names: Iterable[str]) -> list[str]:
@@ -189,7 +189,7 @@ def study_sessions(
     is_simulated = sessions[0].is_simulated
     travel = min(t.frame.travel for group in trials.values() for t in group)
     options = StudyOptions(
-        prepare=PrepareOptions(container_travel=travel),
+        prepare=replace(order.choices.prepare, container_travel=travel),
         fit=fit,
         scheduler=order.scheduler,
     )
@@ -207,7 +207,7 @@ def repeated(
     """Return the study once more under a choice."""
     console.say(f"What if {choice.text}: fitting ...")
     series = {
-        name: [t.series(choice.frame) for t in group]
+        name: [choice.series(t) for t in group]
         for name, group in analysed.trials.items()
     }
     options = choice.options(analysed.study.options)
@@ -261,10 +261,11 @@ def report_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    fit = FitOptions(seed=order.seed, models=REPORTED)
+    bounds = order.choices.bounds
+    fit = FitOptions(bounds=bounds, seed=order.seed, models=REPORTED)
     analysed = study_sessions(sessions, data, order, console, fit)
     study, trials = analysed.study, analysed.trials
-    others = [(c, repeated(analysed, c, data, console)) for c in order.choices]
+    others = [(c, repeated(analysed, c, data, console)) for c in order.choices.variants]
     count = sum(len(group) for group in trials.values())
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(

@@ -12,6 +12,7 @@ from analysis.data import (
     JOINT7_WARNING,
     MINIMUM_KEPT,
     Doubt,
+    ForceLag,
     PrepareOptions,
     coverage,
     doubts_of,
@@ -45,6 +46,7 @@ class Review:
         ratio: slope of F_t over F_n of the kept samples; NaN without load.
         counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
         doubts: why velocity and forces cannot be right; empty if they can.
+        lag: how late the forces are; None where the trial does not show it.
     """
 
     worst_gap: float
@@ -58,6 +60,7 @@ class Review:
     ratio: float
     counts: NDArray[np.int64]
     doubts: tuple[Doubt, ...] = ()
+    lag: ForceLag | None = None
 
     @property
     def known_ratio(self) -> float | None:
@@ -78,7 +81,8 @@ class Review:
         return [
             (
                 timing,
-                f"timing worst gap {self.worst_gap * 1e3:.1f} ms, missed {self.missed}",
+                f"timing worst gap {self.worst_gap * 1e3:.1f} ms, missed {self.missed}"
+                f"{self._lag_words()}",
             ),
             (sensor, self._sensor_words()),
             (joint7, f"joint 7 moved {self.joint7 * 1e3:.0f} mrad"),
@@ -90,6 +94,12 @@ class Review:
             (fit, words),
             *((BAD, doubt.text) for doubt in self.doubts),
         ]
+
+    def _lag_words(self) -> str:
+        if self.lag is None:
+            return ""
+        late = self.lag.seconds * 1e3
+        return f", force {abs(late):.1f} ms {'late' if late >= 0 else 'early'}"
 
     def _sensor_words(self) -> str:
         if self.saturated:
@@ -138,4 +148,5 @@ def review_trial(path: Path) -> Review:
         ratio=quick_ratio(prepared),
         counts=covered.counts,
         doubts=(*doubts_of(prepared), *doubts_of_record(trial)),
+        lag=prepared.lag,
     )

@@ -11,6 +11,7 @@ from analysis.data.prepare import (
     moving_average,
     prepare_trial,
 )
+from analysis.data.series import TractionSeries
 
 
 @given(
@@ -126,3 +127,31 @@ def test_a_foot_that_never_moves_has_no_share_in_the_window():
     assert CoverageShares(0.0, 1.0, 0.0, 0.0).window_of_moving is None
     shares = CoverageShares(0.3, 0.4, 0.1, 0.2)
     assert shares.window_of_moving == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("rate", "widths"),
+    [
+        (500.0, (11, 5)),
+        (1000.0, (21, 10)),
+        (250.0, (5, 2)),
+        (100.0, (3, 1)),
+        (20.0, (1, 1)),
+    ],
+)
+def test_smoothing_and_thinning_are_times_and_follow_the_rate(rate, widths):
+    t = np.arange(0.0, 4.0, 1.0 / rate)
+    series = TractionSeries("S0", "T01", t, 0.1 + 0 * t, 5 + 0.01 * t, 4 + 0.01 * t)
+    assert PrepareOptions().widths(series) == widths
+    assert prepare_trial(series, PrepareOptions()).widths == widths
+
+
+def test_samples_that_were_prepared_are_not_prepared_again(make_series, moving):
+    once = prepare_trial(make_series(moving), PrepareOptions())
+    again = TractionSeries(
+        *("S0", "kept", once.smooth.t[once.indices], once.v_t, once.F_n, once.F_t),
+        is_prepared=True,
+    )
+    twice = prepare_trial(again, PrepareOptions())
+    np.testing.assert_array_equal(twice.v_t, once.v_t)
+    np.testing.assert_array_equal(twice.F_t, once.F_t)

@@ -240,3 +240,30 @@ def test_npz_with_a_wrong_byte_is_read_or_refused(tmp_path, place, value):
     except SettingsError:
         return
     assert all(series.t.size for found in trials.values() for series in found)
+
+
+def test_rows_without_a_time_are_spread_by_the_rate(tmp_path):
+    path = write(tmp_path, "v_t,F_n,F_t\n0.1,2,1\n0.2,2,1\n0.3,2,1\n")
+    series = load_tables([path], rate=200.0)["table"][0]
+    np.testing.assert_allclose(series.t, [0.0, 0.005, 0.010])
+    np.testing.assert_allclose(series.v_t, [0.1, 0.2, 0.3])
+
+
+def test_rows_without_a_time_and_a_rate_say_how_to_give_it(tmp_path):
+    path = write(tmp_path, "v_t,F_n,F_t\n0.1,2,1\n0.2,2,1\n0.3,2,1\n")
+    with pytest.raises(SettingsError) as refused:
+        load_tables([path])
+    assert "--rate" in refused.value.hint
+
+
+def test_a_rate_beside_a_time_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="a time of its own"):
+        load_tables([write(tmp_path, GOOD)], rate=200.0)
+
+
+def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
+    header, rest = GOOD.split("\n", 1)
+    rows = [f"{row},{k}" for k, row in enumerate(rest.strip().split("\n"))]
+    path = write(tmp_path, "\n".join([f"{header},kept_row [1]", *rows, ""]))
+    assert load_tables([path])["table"][0].is_prepared
+    assert not load_tables([write(tmp_path, GOOD)])["table"][0].is_prepared

@@ -8,6 +8,8 @@ from analysis.report.page import FIGURES
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
+pytestmark = pytest.mark.slow
+
 MARGIN = 0.02  # inches: half a line that lies on the edge
 
 

@@ -194,9 +194,11 @@ def test_a_model_that_helps_is_called_so(small_study):
     assert "of a constant's" in next(v for v in verdicts(small_study) if v[:2] == "TF")
 
 
-def test_foreign_tables_are_told_that_samples_are_counted_as_they_are(small_study):
-    assert "whatever their rate" in choices(small_study, is_foreign=True).note
-    assert choices(small_study, is_foreign=False).note == ""
+def test_choices_state_smoothing_in_time_and_in_samples(small_study):
+    rows = dict(choices(small_study, is_foreign=True).rows)
+    assert "22 ms" in rows["smoothing"]
+    assert "11 samples" in rows["smoothing"]
+    assert "10 ms" in rows["downsampling"]
 
 
 def test_a_folder_that_cannot_be_written_is_refused(small_study, tmp_path):

@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
+from analysis.data.prepare import prepare_trial
 from analysis.report.what_if import VALUES, parse_choice, plain_choice, side_by_side
+from analysis.study.crossval import plan_folds
 from analysis.study.models import GP_NN, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -24,6 +28,9 @@ from analysis.study.study import StudyOptions, run_study
         "frame=base",
         "kernel=cubic",
         "static_friction=none",
+        "lag=x",
+        "lag=nan",
+        "lag=51",
     ],
 )
 def test_choices_that_there_are_not_are_refused_with_a_list(text):
@@ -45,6 +52,53 @@ def test_choices_change_what_they_name_and_nothing_else():
     proportional = parse_choice("static_friction=proportional").options(before)
     assert proportional.fit.form.is_proportional
     assert parse_choice("frame=sole").frame == "sole"
+    assert parse_choice("lag=-12.5").lag == -0.0125
+
+
+@pytest.mark.parametrize("text", ["smoothing=41", "window=0.02:0.12"])
+def test_other_training_samples_are_tested_on_the_same_ones(make_series, moving, text):
+    trials = [make_series(moving, seed=k) for k in range(3)]
+    before = StudyOptions()
+    after = parse_choice(text).options(before)
+
+    def prepared(options):
+        return {"S0": [prepare_trial(series, options) for series in trials]}
+
+    plain, _ = plan_folds(prepared(before.prepare), before.fit)
+    varied, _ = plan_folds(
+        prepared(after.prepare), after.fit, prepared(after.target or after.prepare)
+    )
+    for one, other in zip(plain, varied, strict=True):
+        np.testing.assert_array_equal(one.own.F_t, other.own.F_t)
+        assert one.training.F_t.shape != other.training.F_t.shape or not np.allclose(
+            one.training.F_t, other.training.F_t
+        )
+
+
+def test_a_study_under_another_smoothing_is_held_against_the_same_samples(
+    make_series, moving
+):
+    trials = {"S0": [make_series(moving, seed=k) for k in range(3)]}
+    fit = FitOptions(gp_points=40, models=(TUSTIN,), draws=0)
+    options = StudyOptions(fit=fit, n_jobs=1)
+    smooth = parse_choice("smoothing=101").options(options)
+    same = run_study(trials, smooth, simulated=True).terrains["S0"].mae(TUSTIN)
+    own = replace(smooth, target=None)
+    easier = run_study(trials, own, simulated=True).terrains["S0"].mae(TUSTIN)
+    # a target that is smoothed as much is easier: its noise is gone
+    assert same > 1.02 * easier
+
+
+def test_tables_have_no_frame_to_be_changed(make_series, moving):
+    with pytest.raises(SettingsError, match="no frame"):
+        parse_choice("frame=sole").series(make_series(moving))
+
+
+def test_a_lag_moves_the_forces_only(make_series, moving):
+    series = make_series(moving)
+    later = parse_choice("lag=20").series(series)
+    np.testing.assert_array_equal(later.v_t, series.v_t[: later.v_t.size])
+    np.testing.assert_allclose(later.F_t, series.F_t[10 : 10 + later.F_t.size])
 
 
 def test_only_models_that_a_choice_touches_are_fitted_again():

@@ -10,6 +10,8 @@ from experiments.operator.prompts import Prompt
 from experiments.run.stop import StopFlag
 from tests.experiments.program import journal, run_watched, sidecar
 
+pytestmark = pytest.mark.slow
+
 
 def short_trial(asked):
     """End a recording at once and keep it; None leaves it to AutoOperator."""

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from analysis.data.lag import ForceLag
 from experiments.operator.console import GOOD, WARNING
 from experiments.trial.quality import review_trial
 
@@ -109,3 +112,14 @@ def test_the_quick_fit_is_held_against_the_trials_before(first_trial, off, mark)
     found, text = review.lines([middle - 0.1, middle, middle + 0.1])[4]
     assert found == mark
     assert text.endswith(f"(3 before: {middle:.2f} ± 0.10)")
+
+
+def test_a_force_that_comes_late_is_shown_with_its_offset(first_trial):
+    review = replace(review_trial(first_trial), lag=ForceLag(0.0213, 0.8))
+    assert "force 21.3 ms late" in review.lines()[0][1]
+    early = replace(review, lag=ForceLag(-0.004, 0.8))
+    assert "4.0 ms early" in early.lines()[0][1]
+
+
+def test_a_plate_does_not_show_when_the_force_came(first_trial):
+    assert "force" not in review_trial(first_trial).lines()[0][1]

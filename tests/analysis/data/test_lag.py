@@ -1,0 +1,142 @@
+"""Forces that come late: the offset is found, stated and taken back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.data.lag import force_lag
+from analysis.data.plausibility import doubts_of
+from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.series import TractionSeries
+
+MASS, DAMPING = 4.0, 90.0  # kg, N s/m: of an arm and the hand that holds it
+
+
+def jamming(late=0.0, rate=500.0, seconds=8.0, seed=0):
+    """Return a trial whose force moves a mass with a damper, and comes `late` [s]."""
+    from scipy.signal import butter, lfilter, sosfilt
+
+    rng = np.random.default_rng(seed)
+    fine = 10
+    dt = 1.0 / (rate * fine)
+    n = int(seconds * rate * fine)
+    band = butter(2, (4.0, 60.0), "band", fs=1.0 / dt, output="sos")
+    force = np.asarray(sosfilt(band, rng.normal(size=n)))
+    force *= 2.0 / force.std()
+    decay = np.exp(-DAMPING / MASS * dt)
+    swing = lfilter([(1.0 - decay) / DAMPING], [1.0, -decay], -force)
+    t = np.arange(n) * dt
+    F_t = 5.0 + np.interp(t - late, t, force)
+    keep = slice(n // 10, None, fine)
+    v_t = 0.08 + np.asarray(swing)[keep] + rng.normal(scale=1e-4, size=n)[keep]
+    F_n = np.full(v_t.size, 6.0) + rng.normal(scale=0.3, size=v_t.size)
+    return TractionSeries("S0", "T01", t[keep] - t[keep][0], v_t, F_n, F_t[keep])
+
+
+def lag_of(series):
+    return force_lag(series.t, series.v_t, series.F_t)
+
+
+@pytest.mark.parametrize("late_ms", [-20.0, -3.0, 0.0, 1.3, 5.0, 20.0, 40.0])
+def test_an_offset_is_found_to_half_a_millisecond(late_ms):
+    lag = lag_of(jamming(late_ms * 1e-3))
+    assert lag is not None
+    assert lag.seconds * 1e3 == pytest.approx(late_ms, abs=0.5)
+    assert lag.explained > 0.8
+
+
+@pytest.mark.parametrize("rate", [250.0, 1000.0])
+def test_an_offset_is_found_at_other_rates(rate):
+    lag = lag_of(jamming(0.008, rate=rate))
+    assert lag is not None
+    assert lag.seconds == pytest.approx(0.008, abs=1e-3)
+
+
+@pytest.mark.parametrize("terrain", ["S0", "B10"])
+def test_trials_of_another_program_come_within_three_milliseconds(
+    slice_trials, terrain
+):
+    known = [lag for s in slice_trials.get(terrain, []) if (lag := lag_of(s))]
+    assert all(abs(lag.seconds) < 3e-3 for lag in known)
+
+
+def test_a_smooth_slip_says_nothing(slice_trials):
+    assert [lag_of(series) for series in slice_trials["TF"]] == [None] * len(
+        slice_trials["TF"]
+    )
+
+
+def test_a_force_that_has_nothing_to_do_with_the_motion_says_nothing():
+    series = jamming()
+    assert force_lag(series.t, series.v_t, jamming(seed=9).F_t) is None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda s: replace(s, v_t=np.zeros_like(s.v_t)),
+        lambda s: replace(s, v_t=s.v_t * 1e200, F_t=s.F_t * 1e200),
+        lambda s: replace(s, F_t=np.full_like(s.F_t, 3.0)),
+        lambda s: replace(s, t=s.t * 1e6),
+        lambda s: replace(s, t=s.t * 1e-9),
+    ],
+)
+def test_absurd_trials_say_nothing(change):
+    assert lag_of(change(jamming())) is None
+
+
+def test_a_trial_of_a_few_rows_says_nothing():
+    series = jamming(seconds=0.3)
+    assert lag_of(series) is None
+
+
+def named(series):
+    return {d.name: d for d in doubts_of(prepare_trial(series, PrepareOptions()))}
+
+
+def test_a_late_force_is_doubted_with_its_offset():
+    doubt = named(jamming(0.020))["lag"]
+    assert "20 ms late" in doubt.seen
+    assert "--what-if lag=20" in doubt.remedy
+
+
+def test_an_early_force_is_doubted_too():
+    assert "early" in named(jamming(-0.015))["lag"].seen
+
+
+def test_a_force_as_old_as_its_time_stamps_say_is_not_doubted():
+    assert "lag" not in named(replace(jamming(0.006), stamped_lag=0.006))
+    assert "lag" in named(replace(jamming(0.0), stamped_lag=0.006))
+
+
+def test_three_milliseconds_are_no_reason_for_doubt():
+    assert "lag" not in named(jamming(0.002))
+
+
+def test_a_load_that_moves_the_foot_is_a_swapped_column():
+    series = jamming()
+    swapped = replace(series, F_n=series.F_t, F_t=series.F_n)
+    assert "swapped" in named(swapped)
+    assert "swapped" not in named(series)
+
+
+def test_forces_taken_later_undo_the_offset():
+    lag = lag_of(jamming(0.020).with_forces_from(0.020))
+    assert lag is not None
+    assert abs(lag.seconds) < 0.5e-3
+
+
+def test_forces_taken_later_keep_velocity_and_its_time():
+    series = jamming()
+    later = series.with_forces_from(0.1)
+    count = later.t.size
+    np.testing.assert_array_equal(later.v_t, series.v_t[:count])
+    assert series.t[-1] - later.t[-1] == pytest.approx(0.1, abs=1e-9)
+    np.testing.assert_allclose(later.F_t, series.F_t[50 : 50 + count])
+
+
+def test_forces_beyond_the_trial_are_refused():
+    with pytest.raises(SettingsError):
+        jamming(seconds=1.0).with_forces_from(60.0)
