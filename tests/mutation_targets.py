@@ -17,7 +17,10 @@ _SALVAGED = (
 )
 
 TESTS = {
-    f"{_LOOP}/guard.py": (f"{_LOOP_TESTS}/test_guard.py",),
+    f"{_LOOP}/guard.py": (
+        f"{_LOOP_TESTS}/test_guard.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
     f"{_LOOP}/cycle.py": (
         f"{_LOOP_TESTS}/test_cycle.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
@@ -190,6 +193,20 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "if (clock.now_ns() - start_ns) * 1e-09 > PATIENCE: -> "
         "if (clock.now_ns() - start_ns) * 1e-09 >= PATIENCE:",
     ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "elif t < ramp: -> elif t <= ramp:",
+    ): _AT_REST,
+    (
+        "wam/calibration/free_space.py",
+        "reach, width = (constants.d[2], abs(constants.a[2])) -> "
+        "reach, width = (constants.d[2], abs(constants.a[3]))",
+    ): "the elbow's axis is as far off the upper arm as off the forearm",
+    (
+        "wam/calibration/poses.py",
+        "down = [-model.plate_pose(q)[1][2] for q in reachable] -> "
+        "down = [+model.plate_pose(q)[1][2] for q in reachable]",
+    ): "up tells as much as down",
     (
         f"{_LOOP}/contact.py",
         "if max((dist(point.sole, seen.sole) for point in points)) >= STANDING: -> "

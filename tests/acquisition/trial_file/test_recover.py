@@ -409,3 +409,23 @@ def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
     found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
     assert found == []
     assert "ends in a record" in salvage.reason
+
+
+@pytest.mark.parametrize(
+    ("index", "is_sound"),
+    [
+        (struct.pack("<HI", 1, 0), True),  # of a channel without a message
+        (struct.pack("<HI", 1, 16) + bytes(16), True),
+        (struct.pack("<HI", 1, 8) + bytes(8), False),
+        (struct.pack("<HI", 1, 16) + bytes(8), False),
+        (b"\x01\x00", False),
+    ],
+)
+def test_an_index_of_messages_is_whole_or_ends_what_is_salvaged(
+    tmp_path, index, is_sound
+):
+    before = channel_record(1, 0) + message_record(1)
+    data = MAGIC_BYTES + before + record(MESSAGE_INDEX, index) + message_record(1)
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert len(list(salvage)) == (3 if is_sound else 2)
+    assert ("broken record, kind 7" in salvage.reason) is not is_sound

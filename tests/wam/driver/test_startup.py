@@ -177,3 +177,16 @@ def test_a_puck_without_its_constants_is_refused(name, value):
     rig.network.set_property(6, name, value)
     with pytest.raises(DeviceFaultError, match=f"Puck 6 .*{name} {value}"):
         start(rig)
+
+
+@pytest.mark.parametrize("mode", [SafetyMode.IDLE, SafetyMode.ACTIVE])
+def test_motors_are_let_go_unless_the_arm_is_active(mode):
+    # As long a heartbeat that start-up is no silence of the host.
+    rig = Rig(NetworkOptions(heartbeat_ns=10_000 * MS), HOME_COUNTS)
+    if mode is SafetyMode.ACTIVE:
+        rig.network.pendant("activate")
+    rig.sent.clear()
+    info = start(rig)
+    assert info.safety_mode is mode
+    told = [d for _, i, d in rig.sent if i == 0x404 and len(d) == 6 and d[0] == 0x88]
+    assert told == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])
