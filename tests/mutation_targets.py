@@ -208,6 +208,22 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "down = [+model.plate_pose(q)[1][2] for q in reachable]",
     ): "up tells as much as down",
     (
+        "wam/calibration/poses.py",
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "q + side) for side in sides))] -> "
+        "reachable = [q for q in drawn[heights >= space.floor] if all((space.holds("
+        "q + side) for side in sides))]",
+    ): _AT_REST,
+    (
+        "experiments/session/reducer.py",
+        "return value if type(value) is int and value > 0 else 0 -> "
+        "return value if type(value) is int and value >= 0 else 0",
+    ): "0 is 0 either way",
+    (
+        f"{_LOOP}/contact.py",
+        "if growth > limits.contact_growth: -> if growth >= limits.contact_growth:",
+    ): _AT_REST,
+    (
         f"{_LOOP}/contact.py",
         "if max((dist(point.sole, seen.sole) for point in points)) >= STANDING: -> "
         "if max((dist(point.sole, seen.sole) for point in points)) > STANDING:",

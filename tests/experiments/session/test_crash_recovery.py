@@ -3,11 +3,12 @@
 import json
 import os
 from contextlib import contextmanager
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import pytest
 
+from acquisition.errors import SessionError
 from acquisition.trial_file.recover import ROOM
 from acquisition.trial_file.verify import verify_file
 from experiments.session import crash_recovery
@@ -16,6 +17,7 @@ from experiments.session.data_files import read_json, sha256_of, write_json
 from experiments.session.journal import Journal, open_journal
 from experiments.session.states import Event, SessionPhase
 from experiments.session.store import create_session
+from fakes.clock import SteppedClock
 from tests.acquisition.trials import make_cycles, write_trial
 
 STEPS = ("hardlink_to", "unlink", "replace")
@@ -286,3 +288,21 @@ def test_a_damaged_sidecar_does_not_move_the_recording_of_another_attempt(tmp_pa
     recover_session(open_journal(folder, Now()))
     assert (folder.trials / "T01.mcap").read_text() == "1.2"
     assert not (folder.rejected / "T01a.mcap").exists()
+
+
+def test_a_recorder_that_never_ends_is_waited_for_twenty_seconds(crashed, monkeypatch):
+    clock = SteppedClock()
+    began_ns, asked_ns = clock.now_ns(), []
+
+    def is_claimed(_):
+        asked_ns.append(clock.now_ns() - began_ns)
+        return True
+
+    monkeypatch.setattr(crash_recovery, "SystemClock", lambda: clock)
+    monkeypatch.setattr(crash_recovery, "is_claimed", is_claimed)
+    before = crashed.folder.events()
+    with pytest.raises(SessionError, match="still ends a trial file"):
+        recover_session(crashed)
+    assert asked_ns[-1] == 20_000_000_000
+    assert {b - a for a, b in pairwise(asked_ns)} == {20_000_000}
+    assert crashed.folder.events() == before

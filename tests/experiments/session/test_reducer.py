@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -301,3 +302,11 @@ def test_a_verdict_that_is_neither_keep_nor_reject_is_refused(verdict):
     changed = {"event": "verdict-changed", **fields, "verdict": verdict}
     assert refusal(replay(events), changed) == "a verdict is keep or reject"
     assert refusal(replay(events), {**changed, "verdict": "reject"}) == ""
+
+
+def test_a_drift_is_told_to_a_millinewton():
+    state = replace(
+        replay([]), tares=2, first_bias=(0.0,) * 6, last_bias=(0.12345,) * 6
+    )
+    assert state.drift == (0.123, 0.123, 0.123)
+    assert replace(state, tares=1).drift == ()

@@ -1,4 +1,5 @@
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -229,3 +230,17 @@ def test_a_way_is_no_lower_than_the_floor_or_its_ends(
 ):
     monkeypatch.setattr(free_space, "lowest", lambda *_: np.array(heights))
     assert is_clear(model, np.zeros(7), np.ones(7), 0.33) is is_free
+
+
+def test_a_pose_is_chosen_only_if_it_is_free_on_both_sides_of_it(model):
+    class Asked(FreeSpace):
+        asked: ClassVar[set] = set()
+
+        def holds(self, q):
+            self.asked.add(tuple(np.round(q, 6)))
+            return super().holds(q)
+
+    for pose in choose_poses(model, 4, Asked(FLOOR)):
+        for side in (-OFFSET, 0.0, OFFSET):
+            assert tuple(np.round(pose + side, 6)) in Asked.asked
+            assert lowest(model, (pose + side)[None])[0] > FLOOR
