@@ -39,6 +39,7 @@ from .settings import (
     Vector3,
     Whole,
     parse_toml,
+    read_text,
 )
 from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSource
 from .temporary_folders import remove_abandoned, temporary_folder
@@ -85,6 +86,7 @@ __all__ = [
     "control_loop",
     "ipc",
     "parse_toml",
+    "read_text",
     "recording",
     "remove_abandoned",
     "temporary_folder",

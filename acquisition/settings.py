@@ -1,7 +1,10 @@
 """What settings and calibrations in TOML are made of, and how they are parsed."""
 
+import io
 import re
+import stat
 import tomllib
+from pathlib import Path
 from typing import Annotated, Any, cast
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -22,6 +25,28 @@ _DEEPEST = 20  # tables in tables; a settings file has four
 _PARTS = re.compile(r"[,=\n]")
 _DOTTED = re.compile(r"""\.\s*[\w"'-]""")
 _LARGEST_WHOLE = 2**63 - 1  # of TOML
+_LARGEST = 1_000_000  # bytes; what a person writes has a few thousand
+
+
+def read_text(path: Path) -> str:
+    """Return the UTF-8 text of a small file that a person or a calibration wrote.
+
+    Pipes and devices are not opened: they would be read for ever.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is no file, larger than 1 MB, or no text.
+    """
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise ValueError("it is no file")
+    with path.open("rb") as file:
+        data = file.read(_LARGEST + 1)
+    if len(data) > _LARGEST:
+        raise ValueError(f"it is larger than {_LARGEST // 1_000_000} MB")
+    try:
+        return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
+    except UnicodeDecodeError as error:
+        raise ValueError("it is no text") from error
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -47,7 +72,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         level = [inner for value in level for inner in _inner(value)]
         if any(type(v) is int and abs(v) > _LARGEST_WHOLE for v in level):
             raise ValueError(f"it {_TOO_LARGE}")
-    if level:
+    if any(isinstance(value, dict | list) for value in level):
         raise ValueError("it nests too deeply")
     return table
 

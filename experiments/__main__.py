@@ -2,9 +2,11 @@
 """The command line: parse, run one command, turn errors into messages and codes."""
 
 import argparse
+import errno
 import importlib
 import sys
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from acquisition import TractionError
 from experiments.arguments import add_global_options
@@ -30,6 +32,15 @@ COMMANDS = {
     "report": "fit and compare models of recorded sessions, write the report",
     "identify": "which terrain is this? probabilities over time",
     "fit": "the same for tables that Traction did not record",
+}
+_OF_THE_DISK = {
+    errno.EIO,
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EROFS,
+    errno.ESTALE,
+    errno.EMFILE,
+    errno.ENFILE,
 }
 EXIT_CODES = """\
 exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
@@ -89,9 +100,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _tell("nothing-lost", {})
     except BrokenPipeError:
         return 0
-    except Exception:
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno in _OF_THE_DISK:
+            return _report_disk(error)
         return _report_bug()
     return int(code)
+
+
+def _report_disk(error: OSError) -> int:
+    """Say that a disk refused what no command had expected it to."""
+    from acquisition import TrialFileError
+
+    refusal = TrialFileError(
+        Path(str(error.filename or "a file")),
+        f"cannot be used ({error.strerror})",
+        hint="Is the disk full or broken? Nothing that was kept is lost.",
+    )
+    print(refusal, file=sys.stderr)  # noqa: T201
+    return refusal.exit_code
 
 
 def _report_bug() -> int:

@@ -12,6 +12,7 @@ import os
 import stat
 from collections.abc import Generator, Mapping
 from contextlib import contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from acquisition.errors import TrialFileError
@@ -92,15 +93,27 @@ def claimed_folder(path: Path) -> Generator[None]:
 
 
 def is_claimed(path: Path) -> bool:
-    """Return whether a process writes a trial file in `path` now."""
+    """Return whether a process writes a trial file in `path` now.
+
+    Raises:
+        TrialFileError: the folder cannot be opened: nothing is known then.
+    """
     try:
         with open_folder(path) as folder:
-            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
+            return not _is_free(folder)
+    except OSError as error:
+        check_absent(path, error)
         return False
-    return False
+
+
+def _is_free(folder: int) -> bool:
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks
+        return True
+    return True
 
 
 def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
@@ -146,6 +159,22 @@ def check_absent(path: Path, error: OSError) -> None:
     if error.errno not in _ABSENT:
         reason = f"cannot be read ({error.strerror})"
         raise TrialFileError(path, reason, hint="Nothing was changed.") from error
+
+
+def list_folder(folder: Path, pattern: str = "*") -> list[Path]:
+    """Return what lies in `folder` under names that match `pattern`, sorted.
+
+    A folder that is missing holds nothing; one that cannot be listed is no empty one.
+
+    Raises:
+        TrialFileError: it cannot be listed.
+    """
+    try:
+        paths = list(folder.iterdir())
+    except OSError as error:
+        check_absent(folder, error)
+        return []
+    return sorted(path for path in paths if fnmatchcase(path.name, pattern))
 
 
 def check_folders(session: Path) -> None:

@@ -1,11 +1,12 @@
 """What a calibration's moves keep clear of, and poses that a person has chosen."""
 
-import tomllib
 from pathlib import Path
+from typing import cast
 
 import numpy as np
+from pydantic import ValidationError
 
-from acquisition import SettingsError
+from acquisition import Near, SettingsError, SettingsSection, parse_toml, read_text
 from experiments.rig import build_tool, terrain_frame
 from experiments.settings import Settings, TerrainRow
 from ft_sensor import TerrainFrame
@@ -22,7 +23,6 @@ from wam.model import (
 ABOVE = 0.10  # m that sole, plate and elbow stay above the highest container
 RIM = 0.03  # of a container above its plane [m]
 _BESIDE, _BEYOND = 0.25, 0.10  # half a container's width, and past a trial's ends [m]
-_JOINTS = 7
 
 
 def container_box(frame: TerrainFrame) -> ObstacleBox:
@@ -43,24 +43,52 @@ def free_space(settings: Settings, row: TerrainRow) -> FreeSpace:
     return FreeSpace(floor, ArmClearance(load_constants(), tool, (box,)))
 
 
-def read_poses(path: Path, settings: Settings, row: TerrainRow) -> list[Array]:
+class PoseFile(SettingsSection):
+    """Joint positions [rad] that a person has chosen, joints 1 to 7 in each row."""
+
+    poses: tuple[tuple[Near, Near, Near, Near, Near, Near, Near], ...]
+
+
+def read_poses(
+    path: Path, settings: Settings, row: TerrainRow, counts: range
+) -> list[Array]:
     """Return the poses [rad], shape (7,) each, of a file that a person wrote.
 
     It is TOML: `poses = [[0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0], ...]`, joints 1 to 7.
+    `counts`: how many there may be; none where a calibration takes no poses.
 
     Raises:
-        SettingsError: no such file, no poses, or one that is not safe.
+        SettingsError: no such file, no poses, as many as are not taken, or one that is
+            not safe.
     """
-    try:
-        content = tomllib.loads(path.read_text())
-        poses = np.array(content["poses"], dtype=np.float64)
-    except (OSError, UnicodeError, ValueError, TypeError, KeyError) as error:
-        raise _unread(path, str(error) or "no poses") from error
-    if poses.ndim != 2 or poses.shape[1] != _JOINTS or not np.isfinite(poses).all():
-        raise _unread(path, f"expected rows of {_JOINTS} numbers")
+    poses = [np.array(pose) for pose in _parse(path, counts).poses]
     model = ArmModel(load_constants(), build_tool(settings.rig, row.foot))
-    check_poses(model, list(poses), free_space(settings, row))
-    return list(poses)
+    check_poses(model, poses, free_space(settings, row))
+    return poses
+
+
+def _parse(path: Path, counts: range) -> PoseFile:
+    """Read the file; of a list that is too long no member is looked at."""
+    try:
+        table = parse_toml(read_text(path))
+    except (OSError, ValueError) as error:
+        raise _unread(path, getattr(error, "strerror", None) or str(error)) from error
+    listed = table.get("poses")
+    if not isinstance(listed, list):
+        raise _unread(path, "no list of that name")
+    count = len(cast("list[object]", listed))
+    if count not in counts:
+        wanted = f"{counts[0]}..{counts[-1]}" if counts else "none"
+        raise SettingsError(
+            f"{path}: {count} poses - expected {wanted}.",
+            hint="A terrain is touched by hand, without poses. Nothing was started.",
+        )
+    try:
+        return PoseFile.model_validate(table)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise _unread(path, f"{place}: {first['msg']}") from error
 
 
 def _unread(path: Path, why: str) -> SettingsError:

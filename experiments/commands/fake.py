@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from experiments.operator import Console
     from experiments.settings import Settings
-    from experiments.tools import Press, Pressable, TimedPress
+    from experiments.tools import Press, Pressable
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
@@ -60,10 +60,10 @@ def run(args: argparse.Namespace) -> int:
     from experiments.rig import build_server, open_bus_log
     from experiments.run import StopFlag, handle_signals
     from experiments.settings import load_settings
-    from experiments.tools import PRESSES, Lines, Pendant
+    from experiments.tools import PRESSES, Lines, Pendant, read_script
 
     bus = _split(args.can) if args.can else None
-    script = _read_script(args.script)
+    script = None if args.script is None else read_script(args.script)
     settings = load_settings(args.config)
     console = Console(color=not args.no_color)
     clock, stop = SystemClock(), StopFlag()
@@ -134,20 +134,6 @@ def _split(text: str) -> tuple[str, str]:
             hint="Nothing was started.",
         )
     return interface, channel
-
-
-def _read_script(path: Path | None) -> tuple[TimedPress, ...] | None:
-    from acquisition import SettingsError
-    from experiments.tools import parse_script
-
-    if path is None:
-        return None
-    try:
-        return parse_script(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise SettingsError(
-            f"--script {path} cannot be read: {error}.", hint="Nothing was started."
-        ) from error
 
 
 def _stdin() -> int | None:

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from acquisition import SettingsError
+from acquisition import SettingsError, read_text
 from experiments.messages import CATALOGUE
 from experiments.operator.keys import REJECT_REASONS, Operand, script_keys
 from experiments.operator.prompts import (
@@ -16,7 +16,6 @@ from experiments.operator.prompts import (
 from experiments.operator.terminal import TerminalInput
 
 _WORDS = script_keys(Prompt.READY) | script_keys(Prompt.REVIEW)
-_LARGEST = 1_000_000  # bytes; a script has a few hundred
 
 
 def choose_operator(script: str | None, *, is_fake: bool) -> OperatorInput:
@@ -79,12 +78,11 @@ class ScriptedOperator:
 
 def _read(path: Path) -> str:
     try:
-        if path.stat().st_size > _LARGEST:
-            raise ValueError("it is too large")
-        return path.read_text()
+        return read_text(path)
     except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
         raise SettingsError(
-            f"The operator script {path} cannot be read.",
+            f"The operator script {path} cannot be read ({reason}).",
             hint="Name a text file or auto. Nothing was started.",
         ) from error
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import cast
 
+from acquisition.trial_file import list_folder
 from analysis.data import RecordedTrial
 from analysis.figures import ReportSection
 from analysis.report import ReportTable
@@ -40,7 +41,7 @@ def _session_table(sessions: Sequence[SessionFolder]) -> ReportTable:
             s.terrain,
             s.path.name[:10],
             "SIMULATED" if s.is_simulated else "LIVE",
-            str(len(list(s.trials.glob("T??.mcap")))),
+            str(len(list_folder(s.trials, "T??.mcap"))),
             str(len(s.rejected_sidecars())),
         )
         for s in sessions
@@ -138,7 +139,7 @@ def _few(values: set[str]) -> str:
 def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
     rows: list[tuple[str, str, str]] = []
     for session in sessions:
-        for path in sorted(session.trials.glob("T*.json")):
+        for path in list_folder(session.trials, "T*.json"):
             sidecar = read_json(path)
             name = f"{session.path.name}/trials/{path.stem}.mcap"
             digest, size = (str(sidecar.get(key, "?")) for key in ("sha256", "size"))

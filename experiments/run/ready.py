@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from acquisition import MOTOR_FRESH_SHIFT, SafetyMode, SessionError
 from acquisition.control_loop import ArmState
+from acquisition.trial_file import list_folder
 from experiments.messages import preflight_error, pucks_have
 from experiments.operator import (
     NOTE_KEYS,
@@ -188,7 +189,7 @@ def _view_last(context: RunContext, name: TrialName) -> None:
     """Say the newest review again, or that of the last kept trial on the disk."""
     del name
     if not context.page:
-        kept = sorted(context.metadata.folder.trials.glob("T??.mcap"))
+        kept = list_folder(context.metadata.folder.trials, "T??.mcap")
         if not kept:
             context.say("There is no trial to look at yet.")
             return

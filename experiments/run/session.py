@@ -5,6 +5,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from acquisition import TractionError
 from experiments.arguments import data_option
 from experiments.fault_injection import HostFaults, plan_faults
 from experiments.operator import Console, OperatorInput, keyboard
@@ -215,5 +216,9 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     request.console.say(f"It writes {journal.folder.path / 'report' / 'index.html'}")
     is_simulated = journal.folder.is_simulated
     matrix = request.settings.matrix
-    for step in next_steps(request.data, matrix, is_simulated=is_simulated):
+    try:
+        steps = next_steps(request.data, matrix, is_simulated=is_simulated)
+    except TractionError as error:  # of another session; this one is complete
+        steps = [f"▲ What comes next is not known: {error.message}"]
+    for step in steps:
         request.console.say(step)

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock
-from acquisition.trial_file import is_there
+from acquisition.trial_file import is_there, list_folder
 from experiments.operator import WARNING
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import sha256_of
@@ -143,7 +143,8 @@ def trial_path(folder: SessionFolder, trial: str) -> Path:
     if attempt:
         path = folder.rejected / f"{name.rejected}.mcap"
     if not is_there(path):
-        files = [*folder.trials.glob("T*.mcap"), *folder.rejected.glob("T*.mcap")]
+        files = list_folder(folder.trials, "T*.mcap")
+        files += list_folder(folder.rejected, "T*.mcap")
         known = sorted(p.stem for p in files if "." not in p.stem)
         raise SessionError(
             f"There is no {trial} in {folder.id}.",

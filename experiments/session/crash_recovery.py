@@ -8,6 +8,7 @@ from acquisition.trial_file import (
     VerifiedFile,
     is_claimed,
     is_there,
+    list_folder,
     recover_file,
     recovered_path,
     verify_file,
@@ -117,11 +118,11 @@ def _truth(partial: Path) -> Path:
 def _sweep(folder: SessionFolder) -> None:
     """Take away what a kill in the middle of a replacement has left."""
     for place in (folder.path, folder.trials, folder.rejected):
-        for path in place.glob("*.*.tmp"):
+        for path in list_folder(place, "*.*.tmp"):
             if path.with_suffix("").suffix in REPLACED:
                 remove_file(path)
         remove_abandoned(ROOM, place)
-    for path in folder.trials.glob("*.mcap.partial"):
+    for path in list_folder(folder.trials, "*.mcap.partial"):
         finished = path.with_suffix("")
         for other in (path, recovered_path(path)):
             if is_there(other) and is_there(finished) and finished.samefile(other):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import SessionError, TrialFileError
-from acquisition.trial_file import is_there
+from acquisition.trial_file import is_there, list_folder
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.store import JOURNAL_FILE, SessionFolder, list_sessions
@@ -81,7 +81,7 @@ def _compare(
         except TrialFileError as error:
             faults.append((_below(folder, error), error.reason))
     judged = {d.name for d in map(decision_of, events) if d is not None}
-    for path in sorted(folder.trials.glob("T??.json")):
+    for path in list_folder(folder.trials, "T??.json"):
         fields = read_json(path)
         stem, attempt = path.stem, fields.get("attempt")
         is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
@@ -193,7 +193,7 @@ def board_notes(
     notes: list[str] = []
     known = list_sessions(data)
     named = {session.path for session in known}
-    for path in sorted(sessions.iterdir()):
+    for path in list_folder(sessions):
         if path not in named and (path / JOURNAL_FILE).is_file():
             notes.append(
                 f"{path} has a journal, but not the name of a session: it is not "

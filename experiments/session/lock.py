@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock
-from acquisition.trial_file import check_folders, is_there, open_data
+from acquisition.trial_file import check_absent, check_folders, open_data
 from experiments.messages import CATALOGUE
 from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
@@ -58,11 +58,17 @@ def session_lock(folder: SessionFolder) -> Generator[None]:
 
 
 def owner_of(folder: SessionFolder) -> LockOwner | None:
-    """Return the living process that has the session open, None for none."""
+    """Return the living process that has the session open, None for none.
+
+    Raises:
+        TrialFileError: the lock lies elsewhere, or cannot be opened now.
+    """
     path = folder.path / LOCK_FILE
-    if not is_there(path):
+    try:
+        descriptor = open_data(path)
+    except OSError as error:
+        check_absent(path, error)
         return None
-    descriptor = open_data(path)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -15,6 +15,7 @@ from acquisition.trial_file import (
     check_absent,
     check_folders,
     is_there,
+    list_folder,
     make_directories,
     open_data,
     read_data,
@@ -125,13 +126,9 @@ class SessionFolder:
             digest: what computes the checksum of a file; None = `sha256_of`.
         """
         digest = digest or sha256_of
-        recorded = {
-            (event.get("trial"), event.get("attempt")): event["sha256"]
-            for event in self.events()
-            if isinstance(event.get("sha256"), str) and _is_pair(event)
-        }
+        recorded = self.recorded_sums()
         kept: list[Path] = []
-        for sidecar in sorted(self.trials.glob("T*.json")):
+        for sidecar in list_folder(self.trials, "T*.json"):
             if not _TRIAL_FILE.match(sidecar.name):
                 continue
             fields = read_json(sidecar)
@@ -145,9 +142,17 @@ class SessionFolder:
                 kept.append(path)
         return kept
 
+    def recorded_sums(self) -> dict[tuple[int, int], str]:
+        """Return the SHA-256 in the journal of every (trial, attempt) that has one."""
+        return {
+            (event["trial"], event["attempt"]): event["sha256"]
+            for event in self.events()
+            if isinstance(event.get("sha256"), str) and _is_pair(event)
+        }
+
     def rejected_sidecars(self) -> list[dict[str, Any]]:
         """Return the sidecars of rejected and interrupted trials."""
-        return [read_json(path) for path in sorted(self.rejected.glob("T*.json"))]
+        return [read_json(path) for path in list_folder(self.rejected, "T*.json")]
 
 
 def _is_pair(event: Mapping[str, object]) -> bool:
@@ -155,11 +160,13 @@ def _is_pair(event: Mapping[str, object]) -> bool:
 
 
 def list_sessions(data: Path) -> list[SessionFolder]:
-    """Return all sessions below `data`, oldest number first."""
-    folder = data / "sessions"
-    if not folder.is_dir():
-        return []
-    matches = [_session_at(path) for path in folder.iterdir() if path.is_dir()]
+    """Return all sessions below `data`, oldest number first.
+
+    Raises:
+        TrialFileError: the folder cannot be listed.
+    """
+    paths = list_folder(data / "sessions")
+    matches = [_session_at(path) for path in paths if path.is_dir()]
     return sorted((s for s in matches if s), key=lambda s: (int(s.id[1:]), s.path.name))
 
 

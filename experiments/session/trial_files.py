@@ -7,7 +7,13 @@ from typing import Any, cast
 
 from acquisition import TrialFileError
 from acquisition.trial_file import is_there
-from experiments.session.data_files import move_file, read_json, remove_file, write_json
+from experiments.session.data_files import (
+    move_file,
+    read_json,
+    remove_file,
+    sha256_of,
+    write_json,
+)
 from experiments.session.reducer import KEEP, REJECT
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
@@ -112,7 +118,7 @@ def move_trial_files(folder: SessionFolder, decision: Verdict) -> None:
     at_rejected = folder.rejected / f"{name.rejected}.json"
     source, target = (at_rejected, at_trials) if is_kept else (at_trials, at_rejected)
     sidecar = find_sidecar(folder, name)
-    holds_source = is_kept or _is_of(at_trials, name)
+    holds_source = is_kept or _holds(folder, name)
     if holds_source:
         for suffix in _SUFFIXES:
             path = source.with_suffix(suffix)
@@ -174,6 +180,20 @@ def _list(fields: _Facts, key: str) -> list[object]:
 
 def _is_of(sidecar: Path, name: TrialName) -> bool:
     return read_json(sidecar).get("attempt") == name.attempt
+
+
+def _holds(folder: SessionFolder, name: TrialName) -> bool:
+    """Return whether the recording of that number in trials/ is of this attempt.
+
+    A sidecar that is damaged or missing cannot tell: the checksum in the journal does.
+    """
+    recording = folder.trials / f"{name.kept}.mcap"
+    sidecar = recording.with_suffix(".json")
+    if "attempt" in read_json(sidecar):
+        return _is_of(sidecar, name)
+    wanted = folder.recorded_sums().get((name.number, name.attempt))
+    is_known = wanted is not None and is_there(recording)
+    return is_known and sha256_of(recording) == wanted
 
 
 def _with_verdict(sidecar: _Facts, decision: Verdict) -> dict[str, object]:

@@ -1,6 +1,5 @@
 """The settings with the calibrations that they name: sensor, feet, containers."""
 
-import stat
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -9,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 from pydantic import ValidationError
 
-from acquisition import SettingsError
+from acquisition import SettingsError, read_text
 from experiments.settings.load import Settings
 from experiments.settings.matrix import TerrainRow
 from experiments.settings.rig import RigSettings
@@ -20,7 +19,6 @@ from ft_sensor.calibration import (
     terrain_metadata,
 )
 
-_LARGEST = 1_000_000  # bytes; a calibration has a few thousand
 NOTHING = "Nothing was started."
 
 
@@ -36,12 +34,9 @@ def read_calibration(path: Path, what: str, instead: str) -> str:
         SettingsError: it cannot be read.
     """
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST:
-            raise ValueError("it is too large, or no file")
-        return path.read_text(encoding="utf-8")
+        return read_text(path)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is no calibration"
+        reason = getattr(error, "strerror", None) or error
         raise SettingsError(
             f"The {what} calibration {path} cannot be read ({reason}).",
             hint=f"Make it with: traction calibrate {what}. Or {instead}. {NOTHING}",

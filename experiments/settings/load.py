@@ -9,13 +9,12 @@ from typing import Any, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from acquisition import SettingsError, parse_toml
+from acquisition import SettingsError, parse_toml, read_text
 from experiments.settings.matrix import MatrixSettings, TerrainRow
 from experiments.settings.rig import RigSettings
 from experiments.settings.sensor import build_device
 
 _M = TypeVar("_M", bound=BaseModel)
-_LARGEST = 1_000_000  # bytes; a matrix has a few thousand
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,13 +117,9 @@ def load_settings(config: Path | None) -> Settings:
 
 def _read(path: Path) -> str:
     try:
-        # A pipe or a device would be read for ever.
-        is_plain = path.is_file() or path.is_dir() or not path.exists()
-        if not is_plain or path.stat().st_size > _LARGEST:
-            raise ValueError
-        return path.read_text()
+        return read_text(path)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "it is no text"
+        reason = getattr(error, "strerror", None) or error
         raise SettingsError(
             f"{path} cannot be read ({reason}).",
             hint="Name a rig.toml with --config. Nothing was started.",

@@ -1,6 +1,6 @@
 from .acceptance import AcceptancePlan, analyse, as_plain, record_study
 from .bench import BenchReport, run_bench
-from .pendant import PRESSES, Lines, Pendant, Press, Pressable, TimedPress, parse_script
+from .pendant import PRESSES, Lines, Pendant, Press, Pressable, TimedPress, read_script
 
 __all__ = [
     "PRESSES",
@@ -13,7 +13,7 @@ __all__ = [
     "TimedPress",
     "analyse",
     "as_plain",
-    "parse_script",
+    "read_script",
     "record_study",
     "run_bench",
 ]

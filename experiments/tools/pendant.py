@@ -7,9 +7,10 @@ import os
 import select
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, Protocol
 
-from acquisition import NS_PER_S, SettingsError
+from acquisition import NS_PER_S, SettingsError, read_text
 
 Press = Literal["activate", "idle", "estop", "quit"]
 PendantButton = Literal["activate", "idle", "estop"]
@@ -38,6 +39,22 @@ def parse_press(text: str) -> Press | None:
     """Return the button that a line names, None if it names none."""
     word = text.strip().lower()
     return word if word in PRESSES else None
+
+
+def read_script(path: Path) -> tuple[TimedPress, ...]:
+    """Return the presses of the script at `path`.
+
+    Raises:
+        SettingsError: it cannot be read, or as `parse_script`.
+    """
+    try:
+        text = read_text(path)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise SettingsError(
+            f"--script {path} cannot be read: {reason}.", hint="Nothing was started."
+        ) from error
+    return parse_script(text)
 
 
 def parse_script(text: str) -> tuple[TimedPress, ...]:

@@ -18,6 +18,7 @@ from acquisition.trial_file import (
     TrialHeader,
     TrialWriter,
     VerifiedFile,
+    list_folder,
 )
 from analysis.data import CoverageGrid, suggest
 from experiments import provenance
@@ -255,7 +256,7 @@ class TrialArchive:
         return suggest(CoverageGrid(counts))
 
     def _kept_sidecars(self) -> list[dict[str, Any]]:
-        paths = sorted(self.metadata.folder.trials.glob("T*.json"))
+        paths = list_folder(self.metadata.folder.trials, "T*.json")
         sidecars = [read_json(path) for path in paths]
         return [sidecar for sidecar in sidecars if sidecar.get("verdict") == KEEP]
 

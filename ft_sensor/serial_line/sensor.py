@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import Protocol
 
 from acquisition import NS_PER_S, Clock, TractionError, WrenchSample
-from ft_sensor.reading import Reading, StreamTiming, Wrench
+from ft_sensor.reading import Reading, StreamTiming, Wrench, is_measurable
 from ft_sensor.serial_line.framing import FrameScanner, ScanCounters
 from ft_sensor.serial_line.link import PortSettings, SerialLink
 from ft_sensor.serial_line.startup import SerialDialog
@@ -122,6 +122,9 @@ class SerialSensor:
         scanned = self._scanner.counters
         before = scanned.discarded
         readings = self._scanner.feed(data)
+        for reading in readings:
+            if not is_measurable(reading.wrench, self.device.ranges):
+                reading.is_trusted = False  # whatever its checksum says
         if readings:
             self._reads += 1
             self._bursts += len(readings) > self._most_at_once

@@ -13,6 +13,7 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
+from experiments.calibrating.surroundings import read_poses
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import open_journal
@@ -21,6 +22,7 @@ from experiments.session.matrix_board import count_board
 from experiments.session.store import list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.load import load_settings
+from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
@@ -115,6 +117,19 @@ def _script(data: bytes, folder: Path) -> None:
     ScriptedOperator(path)
 
 
+def _poses(data: bytes, folder: Path) -> None:
+    path = folder / "poses.toml"
+    path.write_bytes(data)
+    settings = load_settings(None)
+    read_poses(path, settings, settings.matrix.terrains[0], range(3, 61))
+
+
+def _presses(data: bytes, folder: Path) -> None:
+    path = folder / "presses.txt"
+    path.write_bytes(data)
+    read_script(path)
+
+
 def _bus_log(data: bytes, _: Path) -> None:
     reader = BusReader()
     for frame in parse_log(data.decode(errors="replace").splitlines()):
@@ -186,6 +201,8 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "table": _table("trial.csv"),
     "npz": _table("trials.npz"),
     "script": _script,
+    "poses": _poses,
+    "presses": _presses,
     "bus-log": _bus_log,
     "frames": _frames,
     "sensor": _sensor,

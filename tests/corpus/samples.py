@@ -39,6 +39,14 @@ _JOURNAL = (
 )
 _SIDECAR = {"trial": "T01", "attempt": 1, "sha256": "", "verdict": "keep"}
 _SCRIPT = b"keep\nredo 2  # again\nremark wet\nquit\n"
+_POSES = b"""\
+poses = [
+  [0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0],
+  [0.0, -0.6, 0.3, 1.9, 0.2, -0.4, 0.0],
+  [0.0, -0.2, 0.0, 1.7, 0.0, 0.0, 0.0],
+]
+"""
+_PRESSES = b"0 activate\n2.5 idle  # a pause\nactivate\n30 quit\n"
 _LOG = b"""\
 (1800000000.000100) can0 404#16
 (1800000000.000400) can0 463#00C000
@@ -141,6 +149,8 @@ def samples() -> dict[str, bytes]:
         "used-mcap": session_file("trials/T01.mcap"),
         "npz": _npz(),
         "script": _SCRIPT,
+        "poses": _POSES,
+        "presses": _PRESSES,
         "bus-log": _LOG,
         "frames": _frames(),
         "sensor": _stream(),

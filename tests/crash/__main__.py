@@ -1,10 +1,13 @@
-"""Break disks: `python -m tests.crash power-cuts|io-errors [COUNT] [SEED]`."""
+"""Break disks: `python -m tests.crash power-cuts|io-errors|KIND [COUNT] [SEED]`.
+
+A kind of broken disk is one of `io_errors.KINDS`, such as broken-read.
+"""
 
 import sys
 import tempfile
 from pathlib import Path
 
-from tests.crash.io_errors import fail
+from tests.crash.io_errors import KINDS, fail
 from tests.crash.power_cuts import record_session, survive
 
 
@@ -12,8 +15,9 @@ def main(what: str, count: int, seed: int) -> int:
     """Return how many things went wrong."""
     with tempfile.TemporaryDirectory(prefix="crash-") as place:
         folder = Path(place)
-        if what == "io-errors":
-            wrong = fail(folder, count, seed)
+        if what != "power-cuts":
+            kinds = KINDS if what == "io-errors" else (what,)
+            wrong = fail(folder, count, seed, kinds)
         else:
             wrong = survive(record_session(folder), folder, count, seed)
         for text in wrong:

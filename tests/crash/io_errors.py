@@ -2,6 +2,7 @@
 
 import errno
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,14 @@ from tests.crash.syscalls import recorded
 from tests.experiments.program import Done, run_short, traction, write_config
 from tests.experiments.run.test_resume import short
 
-KINDS = ("full", "full-for-a-while", "broken", "broken-sync", "no-descriptors")
+KINDS = (
+    "full",
+    "full-for-a-while",
+    "broken",
+    "broken-sync",
+    "broken-read",
+    "no-descriptors",
+)
 ENDED = {0, 2, 4, 5, 6}
 AUTO = ("--operator-script", "auto")
 BYTES = 400_000  # that a session writes about
@@ -43,7 +51,8 @@ class FailingDisk:
         wanted = {
             "broken": {"write", "fsync", "replace", "create"},
             "broken-sync": {"fsync"},
-            "no-descriptors": {"open", "create"},
+            "broken-read": {"read", "list"},
+            "no-descriptors": {"open", "create", "list"},
         }[self.kind]
         if name in wanted:
             self.left -= 1
@@ -68,15 +77,15 @@ class FailingDisk:
         raise OSError(number, errno.errorcode[number])
 
 
-def random_disk(rng: np.random.Generator) -> FailingDisk:
+def random_disk(rng: np.random.Generator, kinds: Sequence[str]) -> FailingDisk:
     """Return a disk that fails somewhere in a session."""
-    kind = KINDS[rng.integers(len(KINDS))]
+    kind = kinds[rng.integers(len(kinds))]
     lasts = int(rng.integers(1, 6)) if kind != "full" else 1 << 30
     left = rng.integers(BYTES) if kind.startswith("full") else rng.integers(CALLS)
     return FailingDisk(kind, int(left), lasts)
 
 
-def fail(folder: Path, runs: int, seed: int) -> list[str]:
+def fail(folder: Path, runs: int, seed: int, kinds: Sequence[str] = KINDS) -> list[str]:
     """Run sessions on failing disks; return what went wrong.
 
     A session has two trials; a kept one is repeated and a verdict changed then. The
@@ -86,14 +95,14 @@ def fail(folder: Path, runs: int, seed: int) -> list[str]:
     rng = np.random.default_rng(seed)
     wrong = []
     for number in range(runs):
-        disk = random_disk(rng)
+        disk = random_disk(rng, kinds)
         root = folder / f"disk{number}"
         root.mkdir()
         with recorded(root, disk) as recording:
             done = use(config, root / "data")
         operations = recording.operations
         found = [f"ended with {d.code}: {d.err}" for d in done if d.code not in ENDED]
-        if disk.failed and not any(d.err for d in done):
+        if disk.failed and not any(d.err or "▲" in d.out for d in done):
             found.append("nothing was said")
         found += problems(root, acknowledged(operations), recordings(operations))
         wrong += [f"{number} {disk}: {text}" for text in found]

@@ -161,6 +161,11 @@ class Recording:
         inside = place == self.root or self.root in place.parents
         return place.relative_to(self.root) if inside else None
 
+    def is_inside(self, file: object) -> bool:
+        """Return whether a path or a descriptor is one below the root."""
+        place = Path(f"/proc/self/fd/{file}").readlink() if type(file) is int else file
+        return self.below(place) is not None
+
     def opened(self, path: Path, descriptor: int, flags: int, *, was_there: bool):
         """Note a file that was opened, and that it is new or was emptied."""
         if not flags & _WRITING:
@@ -237,6 +242,24 @@ class _RecordedFile(io.FileIO):
         super().close()
 
 
+class _LimitedFile(io.FileIO):
+    """A file whose reading may fail."""
+
+    limit: Limit
+
+    def readinto(self, buffer, /) -> int | None:
+        self.limit("read", 0)
+        return super().readinto(buffer)
+
+    def read(self, size=-1, /) -> bytes | None:
+        self.limit("read", 0)
+        return super().read(size)
+
+    def readall(self) -> bytes:
+        self.limit("read", 0)
+        return super().readall()
+
+
 _FLAGS = {"r": os.O_RDONLY, "w": os.O_WRONLY | os.O_CREAT | os.O_TRUNC}
 _FLAGS |= {"x": os.O_WRONLY | os.O_CREAT | os.O_EXCL}
 _FLAGS |= {"a": os.O_WRONLY | os.O_CREAT | os.O_APPEND}
@@ -250,11 +273,25 @@ def _flags(mode: str) -> int:
 def _recorded_open(recording: Recording):
     """Return what stands in for `io.open` and `os.fdopen`."""
     kind = type("_File", (_RecordedFile,), {"recording": recording})
+    read_only = type("_Read", (_LimitedFile,), {"limit": staticmethod(recording.limit)})
+
+    def reading(file, mode, buffering, encoding, *rest, **named):
+        raw = read_only(file, "r")
+        if buffering == 0:
+            return raw
+        binary = io.BufferedReader(raw)
+        if "b" in mode:
+            return binary
+        return io.TextIOWrapper(binary, encoding or "utf-8", *rest, **named)
 
     def opened(file, mode="r", buffering=-1, encoding=None, *rest, **named):
         flags = _flags(mode)
         is_descriptor = isinstance(file, int)
         inside = is_descriptor or recording.below(file) is not None
+        if not flags & _WRITING and recording.is_inside(file):
+            if not is_descriptor:
+                recording.limit("open", 0)
+            return reading(file, mode, buffering, encoding, *rest, **named)
         if not inside or not flags & _WRITING:
             return _REAL_OPEN(file, mode, buffering, encoding, *rest, **named)
         descriptor = file if is_descriptor else os.open(file, flags, 0o666)
@@ -360,6 +397,23 @@ def _recorded_calls(recording: Recording):
     }
 
 
+def _reading_calls(recording: Recording):
+    """Return what stands in for the calls of `os` that read, by their names."""
+
+    def on_read(name, what):
+        real = getattr(os, name)
+
+        def called(place=".", *arguments):
+            if recording.is_inside(place):
+                recording.limit(what, 0)
+            return real(place, *arguments)
+
+        return called
+
+    calls = {"read": "read", "pread": "read", "listdir": "list", "scandir": "list"}
+    return {name: on_read(name, what) for name, what in calls.items()}
+
+
 _CALLS = [
     "open",
     "link",
@@ -387,7 +441,8 @@ def recorded(root: Path, limit: Limit = without_limit) -> Generator[Recording]:
     """
     recording = Recording(root, limit)
     with pytest.MonkeyPatch.context() as patch:
-        for name, call in _recorded_calls(recording).items():
+        calls = _recorded_calls(recording) | _reading_calls(recording)
+        for name, call in calls.items():
             patch.setattr(os, name, call)
         patch.setattr(io, "open", _recorded_open(recording))
         yield recording

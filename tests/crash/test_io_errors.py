@@ -12,6 +12,11 @@ def test_no_failing_disk_loses_a_kept_trial(tmp_path):
     assert fail(tmp_path, 15, 1) == []
 
 
+@pytest.mark.timeout(240)
+def test_no_disk_that_cannot_be_read_loses_a_kept_trial(tmp_path):
+    assert fail(tmp_path, 10, 4, ("broken-read",)) == []
+
+
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_five_hundred_failing_disks_lose_no_kept_trial(tmp_path):

@@ -1,3 +1,5 @@
+import errno
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -129,3 +131,15 @@ def test_status_counts_kept_trials_of_simulations_apart(recorded, config):
     lines = [line.split() for line in done.out.splitlines() if line.startswith("TF")]
     assert [line[1:3] for line in lines] == [["live", "0/10"], ["simulated", "2/10"]]
     assert lines[1][-1] == "S001"
+
+
+@pytest.mark.parametrize(("number", "code"), [(errno.EIO, 6), (errno.EBADF, 1)])
+def test_a_disk_that_refuses_anything_is_no_bug(monkeypatch, number, code):
+    def refuse(_):
+        raise OSError(number, os.strerror(number), "/data/sessions")
+
+    monkeypatch.setattr("experiments.commands.status.run", refuse)
+    done = traction("status")
+    assert done.code == code
+    assert os.strerror(number) in done.err
+    assert ("/data/sessions: cannot be used" in done.err) is (code == 6)

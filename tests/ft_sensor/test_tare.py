@@ -71,7 +71,7 @@ def test_one_second_is_enough():
     assert measure(samples(noise(800))).samples == 800
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 780])
+@pytest.mark.parametrize("count", [0, 1, 2, 780, 799])
 def test_less_than_a_second_is_refused(count):
     with pytest.raises(TareError, match="too few"):
         measure(samples(noise(count)))
@@ -106,3 +106,34 @@ def test_a_flagged_sample_is_refused(flag):
 def test_a_non_finite_sample_is_refused():
     with pytest.raises(TareError, match="non-finite"):
         measure(samples([*noise(1599), float("nan")]))
+
+
+def test_two_samples_a_second_apart_are_too_few_in_each_window():
+    far = [replace(sample, t_ns=k * 10**9) for k, sample in enumerate(samples([4, 4]))]
+    with pytest.raises(TareError, match="Only 0"):
+        measure(far)
+
+
+def test_a_refused_tare_is_a_failed_preflight():
+    assert TareError("x", hint="").exit_code == 3
+
+
+@pytest.mark.parametrize(("rate", "is_enough"), [(250, True), (245, False)])
+def test_half_of_the_promised_samples_are_enough(rate, is_enough):
+    slow = [
+        replace(sample, t_ns=round(k * 1e9 / rate))
+        for k, sample in enumerate(samples(noise(2 * rate)))
+    ]
+    if is_enough:
+        assert measure(slow).samples == 2 * rate
+        return
+    with pytest.raises(TareError, match="Only"):
+        measure(slow)
+
+
+def test_the_spread_is_that_of_the_force_and_not_of_the_moment():
+    turned = [
+        replace(sample, wrench=(*sample.wrench[:3], float(k // 400), 0.0, 0.0))
+        for k, sample in enumerate(samples([4.0] * 1600))
+    ]
+    assert measure(turned).spread == 0.0

@@ -5,7 +5,12 @@ import pytest
 
 from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.cycle import Cycle, CycleOutputs
-from acquisition.control_loop.faults import CircuitCauses, ReplySilence
+from acquisition.control_loop.faults import (
+    CircuitCauses,
+    Fault,
+    ReplySilence,
+    verdict_for,
+)
 from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState
@@ -718,3 +723,75 @@ def test_an_unknown_arm_is_asked_for_no_position_until_torques_are_wanted(bench)
     bench.enter(ArmState.HOLD)
     assert bench.arm.asked_ns > asked_ns
     assert bench.state is ArmState.HOLD
+
+
+def test_nothing_is_known_before_the_first_cycle(bench):
+    assert bench.cycle.replies_ns == 0
+    status = bench.cycle.status
+    assert (status.state, status.safety) == (ArmState.IDLE, SafetyMode.UNKNOWN)
+    assert (status.verdict, status.ft_age_ns) == (None, 0)
+
+
+def test_the_wait_for_the_first_force_begins_with_the_first_cycle(bench):
+    bench.cycle.is_recording = True
+    bench.cycle.request(ArmState.FLOAT)
+    bench.run(force=None)
+    assert (bench.cycle.status.ft_age_ns, bench.reason) == (0, "")
+    bench.run(2, force=None)
+    assert bench.cycle.status.ft_age_ns == 2 * PERIOD_NS
+
+
+class Loaded(Observer):
+    """Shows the whole wrench that it is given, and takes the tare."""
+
+    def set_bias(self, bias):
+        self.bias = bias
+
+    def observe(self, reading, wrench, sample):
+        if wrench is not None:
+            sample.wrench[:] = wrench.wrench
+        return super().observe(reading, wrench, sample)
+
+
+@pytest.mark.parametrize("is_tared", [True, False])
+def test_a_load_is_judged_once_it_is_known(bench, is_tared):
+    bench.observer = Loaded()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    if is_tared:
+        bench.cycle.set_bias((0.0,) * 6)
+        assert bench.observer.bias == (0.0,) * 6
+    bench.run(10, force=200.0)
+    assert bench.reason == ("contact-force" if is_tared else "")
+
+
+def test_a_load_is_not_judged_from_a_force_that_is_not_fresh(bench):
+    bench.observer = Loaded()
+    bench.cycle = bench.make()
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.set_bias((0.0,) * 6)
+    bench.run(2, force=200.0)
+    bench.run(10, force=None)
+    assert bench.reason == ""
+
+
+def test_of_two_equal_verdicts_the_guards_own_is_told(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.cycle.is_recording = True
+    bench.law.offset = 0.06
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.run()
+    assert (bench.state, bench.reason) == (ArmState.HOLD, "joint7-slip")
+
+
+def test_a_fault_of_the_same_severity_does_not_replace_the_first(bench):
+    bench.enter(ArmState.FLOAT)
+    bench.arm.qd = np.full(7, 1.6)
+    bench.run()
+    bench.arm.qd = np.zeros(7)
+    bench.observer.speed = 2.0
+    bench.run(3)
+    assert bench.reason == "overspeed"
+    bench.enter(ArmState.HOLD)
+    bench.run(2)
+    assert bench.reason == "foot-speed"  # it was there all the time

@@ -1,11 +1,16 @@
+import json
+
 import pytest
 
 from acquisition.control_loop.faults import (
     FAULTS,
     OK,
     Action,
+    CircuitCauses,
     Fault,
     GuardVerdict,
+    JointExcess,
+    ReplySilence,
     from_plain,
     to_plain,
     verdict_for,
@@ -63,6 +68,19 @@ def test_no_fault_has_no_reason_and_ends_no_session():
 
 def test_a_verdict_without_a_fault_survives_the_way_through_json():
     assert from_plain(to_plain(OK)) == OK
+
+
+@pytest.mark.parametrize(
+    "verdict",
+    [
+        verdict_for(Fault.E_STOP, CircuitCauses(("torque", "voltage"))),
+        verdict_for(Fault.JOINT_LIMIT, JointExcess(3, 2.9, 2.8)),
+        verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x41), is_lasting=True),
+    ],
+    ids=lambda verdict: verdict.reason,
+)
+def test_a_verdict_survives_the_way_through_json_with_its_numbers(verdict):
+    assert from_plain(json.loads(json.dumps(to_plain(verdict)))) == verdict
 
 
 def test_a_name_that_is_no_fault_is_refused():

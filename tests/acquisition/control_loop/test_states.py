@@ -64,3 +64,15 @@ def test_every_state_but_unknown_can_be_requested():
 
 def test_every_action_of_the_guard_is_an_event():
     assert set(VERDICTS) == set(Action) - {Action.NONE}
+
+
+def test_states_keep_the_numbers_that_processes_exchange():
+    numbers = {state.name: state.value for state in ArmState}
+    assert numbers == {
+        "IDLE": 0,
+        "FLOAT": 1,
+        "HOLD": 2,
+        "DAMP": 3,
+        "UNKNOWN": 4,
+        "GUIDE": 5,
+    }

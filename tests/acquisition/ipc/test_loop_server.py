@@ -178,3 +178,19 @@ def test_what_the_devices_say_is_published_once_a_second(loop):
     assert loop.shared.health.version == version
     loop.run(0.02)
     assert loop.shared.health.version != version
+
+
+def test_the_bell_rings_first_when_a_minute_has_passed(loop):
+    loop.run(0.1)
+    loop.run(60.0, beating=())
+    before = loop.rung
+    loop.run(1.0, beating=())
+    assert (before, loop.rung) == (0, 1)
+
+
+def test_what_the_devices_say_is_published_as_a_trial_begins(loop):
+    loop.run(0.1)
+    version = loop.shared.health.version
+    loop.console.post(CommandKind.WATCH_TRIAL, 1)
+    loop.run(0.002)
+    assert loop.shared.health.version != version

@@ -18,6 +18,7 @@ from acquisition.trial_file.recover import recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import TRUTH_TOPICS, TrialWriter
+from tests.acquisition.forged import chunk_content, with_chunk
 from tests.acquisition.ros import messages_of
 from tests.acquisition.trials import (
     ATTACHMENTS,
@@ -338,3 +339,93 @@ def test_the_length_of_a_recording_is_read_from_its_chunks(left):
     half = recorded_seconds(left[: chunks(left)[3].start + 3])
     assert half == pytest.approx(151 * 0.002)
     assert recorded_seconds(b"") == 0.0
+
+
+# --- records that refer to nothing ----------------------------------------------------
+
+
+def record(opcode, body):
+    return struct.pack("<BQ", opcode, len(body)) + body
+
+
+def channel_record(number, schema):
+    """Return a channel of a schema that may not be there."""
+    fields = struct.pack("<HH", number, schema)
+    return record(4, fields + struct.pack("<I", 2) + b"/x" + bytes(8))
+
+
+def message_record(channel):
+    return record(5, struct.pack("<HIQQ", channel, 0, 0, 0) + b"content")
+
+
+MAGIC_BYTES = b"\x89MCAP0\r\n"
+
+
+@pytest.mark.parametrize(
+    ("records", "reason"),
+    [
+        (channel_record(7, 9), "a channel without a schema"),
+        (message_record(7), "messages without a channel"),
+    ],
+)
+def test_a_record_that_refers_to_nothing_ends_what_is_salvaged(
+    tmp_path, records, reason
+):
+    sound = channel_record(1, 0) + message_record(1)
+    data = MAGIC_BYTES + sound + records + message_record(1)
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert len(list(salvage)) == 2
+    assert reason in salvage.reason
+    assert salvage.kept_bytes == len(MAGIC_BYTES + sound)
+
+
+def test_nothing_of_a_chunk_is_given_that_breaks_in_its_middle(tmp_path):
+    content = chunk_content(compression="") + message_record(99)
+    data = with_chunk(content, len(content), compression="")
+    found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
+    assert "messages without a channel" in salvage.reason
+    assert found == []
+    whole = content[: -len(message_record(99))]
+    data = with_chunk(whole, len(whole), compression="")
+    assert len(salvaged_messages(data, tmp_path / "T01.mcap")[0]) == 1
+
+
+def test_what_begins_otherwise_is_no_mcap_file(tmp_path):
+    data = b"x" * len(MAGIC_BYTES) + channel_record(1, 0) + message_record(1)
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert list(salvage) == []
+    assert "no MCAP file" in salvage.reason
+    assert salvage.kept_bytes == 0
+
+
+def test_a_file_that_is_whole_lost_no_second(put, sealed):
+    recovery = recover_file(put(sealed, "T09.mcap"))
+    assert (recovery.seconds_dropped, recovery.bytes_dropped) == (0.0, 0)
+
+
+def test_a_chunk_that_ends_in_a_record_is_not_sound(tmp_path):
+    content = chunk_content(compression="") + b"\x05\x10"
+    data = with_chunk(content, len(content), compression="")
+    found, salvage = salvaged_messages(data, tmp_path / "T01.mcap")
+    assert found == []
+    assert "ends in a record" in salvage.reason
+
+
+@pytest.mark.parametrize(
+    ("index", "is_sound"),
+    [
+        (struct.pack("<HI", 1, 0), True),  # of a channel without a message
+        (struct.pack("<HI", 1, 16) + bytes(16), True),
+        (struct.pack("<HI", 1, 8) + bytes(8), False),
+        (struct.pack("<HI", 1, 16) + bytes(8), False),
+        (b"\x01\x00", False),
+    ],
+)
+def test_an_index_of_messages_is_whole_or_ends_what_is_salvaged(
+    tmp_path, index, is_sound
+):
+    before = channel_record(1, 0) + message_record(1)
+    data = MAGIC_BYTES + before + record(MESSAGE_INDEX, index) + message_record(1)
+    salvage = SoundRecords(data, tmp_path / "T01.mcap")
+    assert len(list(salvage)) == (3 if is_sound else 2)
+    assert ("broken record, kind 7" in salvage.reason) is not is_sound

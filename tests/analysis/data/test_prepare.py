@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import (
+    CoverageShares,
     PrepareOptions,
     foot_velocity,
     moving_average,
@@ -120,6 +121,12 @@ def test_kept_samples_agree_with_an_independent_analysis(slice_trials, key, kept
     (series,) = [s for s in slice_trials[key[:2]] if s.name.endswith(key)]
     # one sample on the edge of the window may fall either way
     assert abs(prepare_trial(series, PrepareOptions()).kept - kept) <= 1
+
+
+def test_a_foot_that_never_moves_has_no_share_in_the_window():
+    assert CoverageShares(0.0, 1.0, 0.0, 0.0).window_of_moving is None
+    shares = CoverageShares(0.3, 0.4, 0.1, 0.2)
+    assert shares.window_of_moving == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

@@ -100,3 +100,14 @@ def test_an_arm_zeroed_elsewhere_is_refused_before_anything_is_recorded(
     assert done.code == 3
     assert done.err.startswith(f"Joint {joint} is ")
     assert "traction zero" in done.err
+
+
+@pytest.mark.parametrize(("more", "is_refused"), [(0.0, False), (1e-6, True)])
+def test_an_error_is_refused_from_the_limit_on(more, is_refused):
+    error = np.zeros(7)
+    error[4] = -HOME_LIMIT - more
+    if not is_refused:
+        check_zero(error)
+        return
+    with pytest.raises(PreflightError, match="Joint 5"):
+        check_zero(error)

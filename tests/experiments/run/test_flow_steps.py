@@ -1,14 +1,17 @@
 """The steps of the flow that ask the operator: ready, note, verdict, estimates."""
 
 import time
+from types import SimpleNamespace
 
 import pytest
 
 from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
-from experiments.operator.keys import REJECT_REASONS
+from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, screen_keys
+from experiments.operator.prompts import Prompt
+from experiments.run import ready
 from experiments.run.console_loop import TICK
-from experiments.run.ready import take_note, wait_ready
+from experiments.run.ready import ready_view, take_note, wait_ready
 from experiments.run.runner import ask_verdict
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session.sidecar import TrialOutcome
@@ -160,3 +163,73 @@ def test_the_heartbeat_goes_on_while_a_slow_disk_takes_the_journal(tmp_path):
     context.append(Event.PAUSED)
     assert client.advanced >= 3 * TICK
     assert names(context)[-1] == Event.PAUSED
+
+
+def test_the_keys_of_a_note_and_what_was_noted_are_said(tmp_path, capsys):
+    context = make_context(tmp_path, Keys(lines=["wet"]))
+    take_note(context, FIRST, is_on_trial=False)
+    out = capsys.readouterr().out
+    assert NOTE_KEYS in out
+    assert f"Noted on {context.metadata.folder.id}: wet" in out
+
+
+def test_a_note_between_two_trials_holds_the_arm_meanwhile(tmp_path):
+    context = make_context(tmp_path, Keys("n", " ", lines=["wet"]))
+    wait_ready(context, FIRST)
+    assert context.loop_client.requested == [ArmState.HOLD, ArmState.FLOAT]
+    assert Event.NOTED in names(context)
+
+
+def test_the_last_kept_trial_is_viewed_before_there_is_a_new_one(
+    tmp_path, capsys, monkeypatch
+):
+    context = make_context(tmp_path, Keys("v", " "))
+    for name in ("T01", "T02", "T03"):
+        (context.metadata.folder.trials / f"{name}.mcap").touch()
+    lines = SimpleNamespace(lines=lambda: [("✓", "sound")])
+    reviewed_paths = []
+    monkeypatch.setattr(
+        ready, "review_trial", lambda path: reviewed_paths.append(path.stem) or lines
+    )
+    wait_ready(context, FIRST)
+    assert reviewed_paths == ["T03"]
+    assert "T03, recorded before:" in capsys.readouterr().out
+
+
+def test_the_newest_page_is_viewed_again(tmp_path, capsys):
+    context = make_context(tmp_path, Keys("v", " "))
+    context.say_page(["T01 was fine"])
+    wait_ready(context, FIRST)
+    assert capsys.readouterr().out.count("T01 was fine") == 2
+
+
+def test_a_live_screen_stays_and_is_gone_with_the_trial(tmp_path, monkeypatch):
+    context = make_context(tmp_path, Keys("", " "))
+    panels, ends = [], []
+    monkeypatch.setattr(context.console, "is_live", True)
+    monkeypatch.setattr(context.console, "panel", panels.append)
+    monkeypatch.setattr(context.console, "end_panel", lambda: ends.append(len(panels)))
+    monkeypatch.setattr(context.console, "say", panels.append)
+    wait_ready(context, FIRST)
+    assert panels
+    assert screen_keys(Prompt.READY) in panels[0]
+    assert ends == [0, len(panels)]
+
+
+def test_without_a_terminal_the_screen_is_printed_line_by_line(tmp_path, capsys):
+    context = make_context(tmp_path, Keys(" "))
+    wait_ready(context, FIRST)
+    out = capsys.readouterr().out
+    assert screen_keys(Prompt.READY) in out
+    assert f"of {ready_view(context).wanted}" in out
+
+
+def test_a_note_is_seen_while_it_is_typed(tmp_path, monkeypatch):
+    context = make_context(tmp_path, Keys(lines=[None, "wet"]))
+    context.operator.draft = "we"
+    panels = []
+    monkeypatch.setattr(context.console, "is_live", True)
+    monkeypatch.setattr(context.console, "panel", panels.append)
+    take_note(context, FIRST, is_on_trial=False)
+    assert panels[0][0].startswith("Note: we")
+    assert NOTE_KEYS in panels[0]

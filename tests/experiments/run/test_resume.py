@@ -189,3 +189,22 @@ def test_a_redo_under_other_conditions_is_refused_with_the_differences(
     assert "▲ terrain.travel was 0.07, is 0.08" in done.out
     assert done.err.startswith("2 conditions are not as in S001: rig.feet.tread.mass")
     assert digests(only_session(data)) == digests(recorded.folder)
+
+
+@pytest.mark.slow
+def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
+    tmp_path, recorded
+):
+    data = tmp_path / "data"
+    shutil.copytree(recorded.data, data)
+    folder = only_session(data)
+    before = digests(folder)
+    (folder / "trials" / "T01.json").chmod(0o644)
+    (folder / "trials" / "T01.json").write_text("{")
+    redo = ("redo", "S001", "T01", "--reason", "bed was wet", *AUTO, "--data", data)
+    assert traction(*redo).code == 6
+    done = traction(*redo, "--allow-missing")
+    assert done.code == 0, done.err
+    old = folder / "rejected" / "T01a.mcap"
+    assert digest(old) == before["T01.mcap"] != digests(folder)["T01.mcap"]
+    assert kept_and_sound(folder) == ["T01", "T02"]

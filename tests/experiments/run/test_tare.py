@@ -1,10 +1,32 @@
+"""The tare between two trials, and what it may not hide."""
+
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from experiments.run.tare import known_bias, residual_force
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import WrenchSample
+from acquisition.errors import PreflightError
+from acquisition.ipc.layout import WRENCH_DTYPE, pack_wrench
+from acquisition.ipc.rings import Ring
+from acquisition.sample import Sample
+from experiments.fault_injection.plan import FaultTrigger
+from experiments.operator.prompts import Prompt
+from experiments.run.stop import StopRequestedError
+from experiments.run.tare import (
+    known_bias,
+    residual_force,
+    take_end_tare,
+    take_tare,
+)
+from experiments.session.states import Event
+from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import Payload
+from tests.experiments.run.bench import Keys, StubClient, make_context
 
 BIAS = np.array([0.5, -1.0, 2.0, 0.01, 0.02, 0.03])
 
@@ -44,3 +66,254 @@ def test_a_wrong_mass_of_the_foot_shows_as_its_weight():
     wrong = believed.tared(reading, np.eye(3))
     assert residual_force(right, BIAS) == pytest.approx(0.0, abs=1e-12)
     assert residual_force(wrong, BIAS) == pytest.approx(0.05 * 9.81, rel=1e-3)
+
+
+class LiftedFoot(StubClient):
+    """A loop whose foot hangs still in the air, with a sensor that streams.
+
+    Attributes:
+        height: of the foot above the plane, by the seconds since the start [m].
+        speed: of the foot, linear and angular [m/s, rad/s].
+        force: along x, by the seconds since the start [N].
+        is_valid: the sensor vouches for its numbers.
+    """
+
+    def __init__(self, clock):
+        super().__init__(clock)
+        self.height = self.force = lambda seconds: 0.1
+        self.speed = (0.0,) * 6
+        self.is_valid = True
+        self.bias = None
+        self.ring = Ring(
+            memoryview(bytearray(Ring.size_of(WRENCH_DTYPE, 4096))), WRENCH_DTYPE, 4096
+        )
+        self.on_advance.append(self._stream)
+
+    def _stream(self):
+        now = self.clock.now_ns()
+        for t_ns in range(now - 20_000_000, now, 2_000_000):
+            wrench = (self.force(self.advanced), 0.0, 0.0, 0.0, 0.0, 0.0)
+            sample = WrenchSample(t_ns, 0, wrench, 0, self.is_valid, 0)
+            self.ring.write(pack_wrench(sample))
+
+    def latest(self):
+        sample = Sample()
+        sample.foot_position[2] = self.height(self.advanced)
+        sample.foot_velocity[:] = self.speed
+        return sample.data
+
+    def wrenches(self):
+        return self.ring.reader()
+
+    def set_bias(self, bias):
+        self.bias = bias
+
+
+def lifted(tmp_path, *keys, mass=0.0, residual=0.5, calibrations=None):
+    """Return a context whose foot of `mass` [kg] is lifted, and is known to weigh 0."""
+    context = make_context(tmp_path, Keys(*keys))
+    rig = context.rig
+    rig.backend.loop_client = LiftedFoot(rig.clock)
+    rig.frame = SimpleNamespace(height=lambda position: position[2])
+    rig.model = SimpleNamespace(sole_pose=lambda q: (np.zeros(3), np.eye(3)))
+    rig.payload, rig.is_simulated = payload(mass), True
+    rig.row = SimpleNamespace(name="TF", foot="tread", reset=())
+    rig.settings = SimpleNamespace(
+        calibrations=calibrations or {},
+        rig=SimpleNamespace(limits=SimpleNamespace(tare_spread=0.5, residual=residual)),
+    )
+    return context
+
+
+def events(context, event):
+    return [e for e in context.metadata.folder.events() if e["event"] == event]
+
+
+def test_a_tare_gives_the_bias_to_the_loop_and_the_rig_and_the_journal(tmp_path):
+    context = lifted(tmp_path)
+    take_tare(context, TrialName(2, 1))
+    right = pytest.approx([0.1, 0, 0, 0, 0, 0])
+    assert context.loop_client.bias == right
+    assert context.rig.tared.bias == right
+    (event,) = events(context, Event.TARED)
+    assert (event["bias"], event["spread"]) == (right, 0.0)
+    assert event["trial_number"] == 2
+
+
+def test_the_foot_is_guided_until_it_is_still_and_then_held(tmp_path):
+    context = lifted(tmp_path)
+    take_tare(context, TrialName(1, 1))
+    assert context.loop_client.requested == [ArmState.GUIDE, ArmState.HOLD]
+    assert context.loop_client.advanced == pytest.approx(0.3 + 1.02, abs=0.03)
+
+
+def test_the_operator_is_asked_to_lift_all_the_time(tmp_path):
+    context = lifted(tmp_path)
+    take_tare(context, TrialName(3, 2))
+    asked = {(s.prompt, s.trial, s.attempt) for s in context.operator.states}
+    assert asked == {(Prompt.LIFT, 3, 2)}
+
+
+@pytest.mark.parametrize(
+    ("height", "waits"), [(0.031, False), (0.03, True), (0.029, True)]
+)
+def test_a_foot_counts_as_lifted_three_centimetres_above_the_plane(
+    tmp_path, height, waits
+):
+    context = lifted(tmp_path)
+    context.loop_client.height = lambda s: 0.1 if s > 1.0 else height
+    take_tare(context, TrialName(1, 1))
+    assert (context.loop_client.advanced > 2.0) is waits
+
+
+@pytest.mark.parametrize(
+    ("speed", "is_still"),
+    [
+        ((0.009, 0, 0, 0, 0, 0), True),
+        ((-0.009, 0, 0, 0, 0, 0), True),
+        ((0, 0.011, 0, 0, 0, 0), False),
+        ((0, 0, -0.011, 0, 0, 0), False),
+        ((0, 0, 0, 1.0, 0, 0), True),
+    ],
+)
+def test_a_foot_is_still_below_a_centimetre_a_second(tmp_path, speed, is_still):
+    keys = [""] * 100 + ["q"]
+    context = lifted(tmp_path, *keys)
+    context.loop_client.speed = speed
+    if is_still:
+        take_tare(context, TrialName(1, 1))
+        return
+    with pytest.raises(StopRequestedError):
+        take_tare(context, TrialName(1, 1))
+    assert context.loop_client.requested == [ArmState.GUIDE]
+
+
+def test_a_foot_that_touches_in_between_has_to_be_still_again(tmp_path):
+    context = lifted(tmp_path)
+    context.loop_client.height = lambda s: 0.0 if 0.19 < s < 0.21 else 0.1
+    take_tare(context, TrialName(1, 1))
+    assert context.loop_client.advanced == pytest.approx(0.2 + 0.3 + 1.02, abs=0.03)
+
+
+def test_a_force_that_varies_is_tared_again_by_itself(tmp_path, capsys):
+    context = lifted(tmp_path)
+    context.loop_client.force = lambda s: 3.0 if 0.8 < s < 1.2 else 0.1
+    take_tare(context, TrialName(1, 1))
+    assert len(events(context, Event.TARED)) == 1
+    assert context.loop_client.bias[0] == pytest.approx(0.1)
+    assert "limit 0.5" in capsys.readouterr().err
+
+
+def test_the_fifth_refused_tare_ends_the_session(tmp_path, capsys):
+    context = lifted(tmp_path)
+    context.loop_client.force = lambda s: 3.0 * (s % 0.5)
+    with pytest.raises(PreflightError, match="Force varied"):
+        take_tare(context, TrialName(1, 1))
+    assert context.loop_client.requested.count(ArmState.GUIDE) == 5
+    assert capsys.readouterr().err.count("Force varied") == 4
+    assert events(context, Event.TARED) == []
+
+
+def test_flagged_samples_make_a_poor_tare_and_not_a_moved_foot(tmp_path):
+    context = lifted(tmp_path)
+    context.loop_client.is_valid = False
+    with pytest.raises(PreflightError, match="flagged"):
+        take_tare(context, TrialName(1, 1))
+
+
+@pytest.mark.parametrize(("limit", "is_taken"), [(0.48, False), (0.50, True)])
+def test_a_tare_that_hides_a_force_of_the_foot_is_refused(tmp_path, limit, is_taken):
+    """50 g too much in the settings are 0.49 N at the sensor."""
+    context = lifted(tmp_path, mass=0.05, residual=limit)
+    context.loop_client.force = lambda s: 0.0
+    if is_taken:
+        take_tare(context, TrialName(1, 1))
+        return
+    with pytest.raises(PreflightError, match="residual"):
+        take_tare(context, TrialName(1, 1))
+    assert context.loop_client.bias is None
+
+
+def test_the_residual_is_measured_against_the_calibration_of_this_foot(tmp_path):
+    context = lifted(tmp_path, residual=0.1, calibrations=calibration("tread"))
+    context.loop_client.force = lambda s: float(BIAS[0])
+    with pytest.raises(PreflightError):  # y and z are not those of the calibration
+        take_tare(context, TrialName(1, 1))
+
+
+def test_faults_are_rehearsed_at_every_moment_of_a_tare(tmp_path):
+    context = lifted(tmp_path)
+    due = []
+    context.console_loop.faults = SimpleNamespace(
+        inject_due=lambda *given: due.append(given)
+    )
+    take_tare(context, TrialName(4, 1))
+    assert {(moment, number) for moment, number, _ in due} == {(FaultTrigger.TARE, 4)}
+    assert [seconds for *_, seconds in due[1:]] == pytest.approx(
+        [tick * 0.02 for tick in range(51)]
+    )
+
+
+def test_the_last_tare_is_written_like_the_others(tmp_path, capsys):
+    context = lifted(tmp_path)
+    take_end_tare(context)
+    (event,) = events(context, Event.TARED)
+    assert event["trial_number"] == 0
+    assert "No tare at the end" not in capsys.readouterr().out
+
+
+def test_the_last_tare_may_be_left_out(tmp_path, capsys):
+    context = lifted(tmp_path, "q")
+    take_end_tare(context)
+    assert "No tare at the end: left out" in capsys.readouterr().out
+
+
+def test_a_fault_in_the_last_tare_costs_the_bracket_only(tmp_path, capsys):
+    context = lifted(tmp_path)
+    context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
+    take_end_tare(context)
+    assert "No tare at the end: Stop pressed" in capsys.readouterr().out
+
+
+def test_a_last_tare_that_is_refused_costs_the_bracket_only(tmp_path, capsys):
+    context = lifted(tmp_path)
+    context.loop_client.is_valid = False
+    take_end_tare(context)
+    assert "flagged" in capsys.readouterr().out
+
+
+def test_other_texts_of_the_settings_are_no_calibration():
+    text = calibration("tread")["calibration:ft_sensor.toml"]
+    assert known_bias({"rig": text}, "tread", is_simulated=False) is None
+    container = {"calibration:terrain.toml": "name = 1"}
+    assert known_bias(container, "tread", is_simulated=False) is None
+
+
+def test_the_first_fault_of_a_tare_is_due_at_its_beginning(tmp_path):
+    context = lifted(tmp_path)
+    due = []
+    context.console_loop.faults = SimpleNamespace(
+        inject_due=lambda *given: due.append(given)
+    )
+    take_tare(context, TrialName(4, 1))
+    assert due[0] == (FaultTrigger.TARE, 4, 0.0)
+
+
+def test_the_journal_has_the_bias_to_a_tenth_of_a_millinewton(tmp_path):
+    context = lifted(tmp_path)
+    context.loop_client.force = lambda s: 0.1 + 1.23456e-4 + 0.1 * (s > 0.8)
+    take_tare(context, TrialName(1, 1))
+    (event,) = events(context, Event.TARED)
+    assert event["bias"][0] == round(context.loop_client.bias[0], 4)
+    assert event["bias"][0] != round(event["bias"][0], 3)
+    assert event["spread"] == pytest.approx(0.1, abs=0.02)
+    assert event["spread"] == round(event["spread"], 3)
+
+
+def test_a_real_sensor_of_unknown_bias_is_tared_without_a_residual(tmp_path, capsys):
+    context = lifted(tmp_path, residual=0.1)
+    context.rig.is_simulated = False
+    context.loop_client.force = lambda s: 3.0
+    take_tare(context, TrialName(1, 1))
+    assert context.loop_client.bias[0] == pytest.approx(3.0)
+    assert "Lift the foot" in capsys.readouterr().out

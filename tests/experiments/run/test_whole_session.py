@@ -5,6 +5,7 @@ import os
 
 import pytest
 
+from acquisition.errors import TrialFileError
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.session.reducer import replay
 from tests.experiments.program import (
@@ -12,6 +13,7 @@ from tests.experiments.program import (
     journal,
     kept_and_sound,
     only_session,
+    run_short,
     sidecar,
     traction,
 )
@@ -135,3 +137,16 @@ def check_files(folder, names, killed_in):
     assert (folder / "faults" / "T01a.flight.mcap").exists()
     (note,) = sidecar(folder / "trials" / f"{killed}.mcap")["notes"]
     assert note["text"] == "stone in the tread"
+
+
+def test_a_broken_neighbour_does_not_cost_a_complete_session_its_exit_code(
+    tmp_path, config, monkeypatch
+):
+    def refuse(*_, **__):
+        raise TrialFileError(tmp_path / "S007", "cannot be read (EIO)")
+
+    monkeypatch.setattr("experiments.run.session.next_steps", refuse)
+    done = run_short(config, tmp_path)
+    assert (done.code, done.err) == (0, "")
+    assert "What comes next is not known" in done.out
+    assert "cannot be read (EIO)" in done.out

@@ -209,7 +209,7 @@ def test_a_table_holds_every_cycle_with_units(exported, recorded, first_trial):
 
 def test_the_kept_samples_are_those_inside_the_window(exported, recorded):
     header, rows = table(exported / recorded.folder.name / "T01.kept.csv")
-    assert header == ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]"]
+    assert header == ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]", "kept_row [1]"]
     v_t = rows[:, 1]
     assert 0.005 <= v_t.min() <= v_t.max() <= 0.2
 

@@ -3,17 +3,21 @@
 import json
 import os
 from contextlib import contextmanager
-from itertools import takewhile
+from itertools import pairwise, takewhile
 from pathlib import Path
 
 import pytest
 
+from acquisition.errors import SessionError
+from acquisition.trial_file.recover import ROOM
 from acquisition.trial_file.verify import verify_file
+from experiments.session import crash_recovery
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import read_json, sha256_of, write_json
 from experiments.session.journal import Journal, open_journal
 from experiments.session.states import Event, SessionPhase
 from experiments.session.store import create_session
+from fakes.clock import SteppedClock
 from tests.acquisition.trials import make_cycles, write_trial
 
 STEPS = ("hardlink_to", "unlink", "replace")
@@ -235,3 +239,70 @@ def test_a_torn_line_is_ended_before_the_next_one(crashed):
     assert torn == '{"event": "trial-rec'
     assert json.loads(last)["text"] == "after the kill"
     assert open_journal(crashed.folder, Now()).state == book.state
+
+
+def test_a_recorder_that_still_writes_is_waited_for(crashed, monkeypatch):
+    looks = [True, True, False]
+    monkeypatch.setattr(crash_recovery, "is_claimed", lambda _: looks.pop(0))
+    recover_session(crashed)
+    assert looks == []
+    assert crashed.state.running is None
+
+
+def test_what_a_killed_process_left_in_a_session_is_swept(crashed):
+    folder = crashed.folder
+    gone = 2**22 + 1  # no process has this number
+    left = folder.trials / f"{ROOM}-{gone}-abcdefgh"
+    left.mkdir()
+    (left / "half.json").write_text("{")
+    (folder.trials / "T09.json.tmp").write_text("{")
+    (folder.trials / "notes.odt.tmp").write_text("a person's")
+    recover_session(crashed)
+    assert not left.exists()
+    assert [p.name for p in folder.trials.iterdir()] == ["notes.odt.tmp"]
+
+
+@pytest.mark.parametrize("damaged", [b"{", b"", b"[]", None])
+def test_a_recording_whose_sidecar_is_damaged_is_put_aside_all_the_same(
+    tmp_path, damaged
+):
+    book = make_session(tmp_path)
+    folder = book.folder
+    sidecar = folder.trials / "T02.json"
+    sidecar.unlink() if damaged is None else sidecar.write_bytes(damaged)
+    book.append(Event.REDO, trial=2, reason="wet")
+    book.append(Event.ACTIVATED)
+    book.append(Event.SET_ASIDE, trial=2, attempt=1, reason="redone", who="mk")
+    assert contents(folder)["2.1"] == "rejected/T02a.mcap"
+    assert contents(folder)["truth 2.1"] == "rejected/T02a.truth.mcap"
+    assert read_json(folder.rejected / "T02a.json")["reason"] == "redone"
+    assert not sidecar.exists()
+
+
+def test_a_damaged_sidecar_does_not_move_the_recording_of_another_attempt(tmp_path):
+    """T01b was kept and its sidecar is damaged: T01a was rejected before."""
+    book = make_session(tmp_path)
+    folder = book.folder
+    (folder.trials / "T01.json").write_bytes(b"{")
+    (folder.rejected / "T01a.mcap").unlink()
+    recover_session(open_journal(folder, Now()))
+    assert (folder.trials / "T01.mcap").read_text() == "1.2"
+    assert not (folder.rejected / "T01a.mcap").exists()
+
+
+def test_a_recorder_that_never_ends_is_waited_for_twenty_seconds(crashed, monkeypatch):
+    clock = SteppedClock()
+    began_ns, asked_ns = clock.now_ns(), []
+
+    def is_claimed(_):
+        asked_ns.append(clock.now_ns() - began_ns)
+        return True
+
+    monkeypatch.setattr(crash_recovery, "SystemClock", lambda: clock)
+    monkeypatch.setattr(crash_recovery, "is_claimed", is_claimed)
+    before = crashed.folder.events()
+    with pytest.raises(SessionError, match="still ends a trial file"):
+        recover_session(crashed)
+    assert asked_ns[-1] == 20_000_000_000
+    assert {b - a for a, b in pairwise(asked_ns)} == {20_000_000}
+    assert crashed.folder.events() == before

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 
 import pytest
@@ -268,3 +269,44 @@ def test_every_opening_has_a_bracket_of_its_own():
 def test_a_damaged_tare_changes_nothing(bias):
     sound = [*BEGIN, tared(0.1, 0.2, 0.3)]
     assert replay([*sound, {"event": "tared", "bias": bias}]) == replay(sound)
+
+
+def test_a_session_without_events_wants_and_has_nothing():
+    state = replay([])
+    assert (state.wanted, state.rejected, state.openings, state.tares) == (0, 0, 0, 0)
+    assert (state.kept, state.running, state.redoing, state.ended) == (
+        (),
+        None,
+        None,
+        "",
+    )
+
+
+@pytest.mark.parametrize("value", [0, -1, 2.5, True, "3", None])
+def test_a_number_of_trials_that_is_none_counts_as_zero(value):
+    started = {"event": "session-started", "terrain": "TF", "trials": value}
+    assert replay([started]).wanted == 0
+
+
+@pytest.mark.parametrize("verdict", ["", "maybe", None, 1])
+def test_a_verdict_that_is_neither_keep_nor_reject_is_refused(verdict):
+    fields = {"trial": 1, "attempt": 1}
+    events = [
+        {"event": "session-started", "terrain": "TF", "trials": 1},
+        {"event": "activated"},
+        {"event": "trial-started", **fields},
+        {"event": "trial-recorded", **fields},
+        {"event": "trial-kept", **fields},
+        {"event": "session-ended", "reason": "complete"},
+    ]
+    changed = {"event": "verdict-changed", **fields, "verdict": verdict}
+    assert refusal(replay(events), changed) == "a verdict is keep or reject"
+    assert refusal(replay(events), {**changed, "verdict": "reject"}) == ""
+
+
+def test_a_drift_is_told_to_a_millinewton():
+    state = replace(
+        replay([]), tares=2, first_bias=(0.0,) * 6, last_bias=(0.12345,) * 6
+    )
+    assert state.drift == (0.123, 0.123, 0.123)
+    assert replace(state, tares=1).drift == ()

@@ -5,7 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import SettingsError
-from experiments.tools.pendant import Lines, Pendant, TimedPress, parse_script
+from experiments.tools.pendant import (
+    Lines,
+    Pendant,
+    TimedPress,
+    parse_script,
+    read_script,
+)
 
 S = 1_000_000_000
 
@@ -103,3 +109,19 @@ def test_the_end_of_stdin_quits_unless_there_is_a_script(pipe, script, pressed):
     descriptor, writer = pipe
     writer.close()
     assert Pendant(script, Lines(descriptor), 0).due(0) == pressed
+
+
+@pytest.mark.parametrize(
+    ("content", "why"), [(b"\xff\xfe", "no text"), (b"#" * 1_000_001, "1 MB")]
+)
+def test_a_script_that_is_no_small_text_is_refused(tmp_path, content, why):
+    path = tmp_path / "presses.txt"
+    path.write_bytes(content)
+    with pytest.raises(SettingsError, match=why):
+        read_script(path)
+
+
+def test_a_script_is_read_from_its_file(tmp_path):
+    path = tmp_path / "presses.txt"
+    path.write_text("1 activate\n")
+    assert read_script(path) == (TimedPress(1_000_000_000, "activate"),)

@@ -260,3 +260,38 @@ def test_sensor_frames_of_another_length_are_refused(decode, length):
 def test_the_seven_motors_report_under_their_own_identifiers():
     found = [frames.position_reply_id(node) for node in frames.MOTOR_NODES]
     assert found == [0x423, 0x443, 0x463, 0x483, 0x4A3, 0x4C3, 0x4E3]
+
+
+def test_groups_have_the_numbers_of_the_wire():
+    assert {group.name: int(group) for group in Group} == {
+        "BUS": 0,
+        "LOWER_TORQUE": 1,
+        "WRIST_TORQUE": 2,
+        "POSITION": 3,
+        "ARM": 4,
+        "HAND": 5,
+        "PROPERTY": 6,
+        "JOINT_ENCODER": 7,
+        "FORCE": 10,
+        "TORQUE": 11,
+        "ACCELERATION": 12,
+    }
+
+
+@pytest.mark.parametrize("number", [-1, 128])
+def test_a_property_has_a_number_of_seven_bits(number):
+    assert frames.encode_get(127) == b"\x7f"
+    with pytest.raises(ValueError, match="0 to 127"):
+        frames.encode_get(number)
+
+
+@pytest.mark.parametrize("can_id", [0, 0x7FF])
+def test_identifiers_have_eleven_bits(can_id):
+    address = frames.split_id(can_id)
+    assert (
+        frames.compose_id(address.sender, address.to, is_group=address.is_group)
+        == can_id
+    )
+    for beyond in (-1, 0x800):
+        with pytest.raises(ValueError, match="11-bit"):
+            frames.split_id(beyond)

@@ -1,10 +1,20 @@
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from wam.calibration.free_space import OFFSET, UPRIGHT, FreeSpace, is_clear, lowest
+from wam.calibration import free_space
+from wam.calibration.free_space import (
+    OFFSET,
+    UPRIGHT,
+    FreeSpace,
+    check_poses,
+    elbow_of,
+    is_clear,
+    lowest,
+)
 from wam.calibration.poses import (
     APPROACH_SPEED,
     MARGIN,
@@ -135,3 +145,102 @@ def test_a_container_that_is_too_high_is_refused(model):
 def test_an_arm_that_cannot_rise_is_refused(model, poses):
     with pytest.raises(SettingsError, match="cannot rise"):
         plan_halts(model, np.array(TWISTED), poses, SPACE)
+
+
+def test_the_elbow_is_where_the_upper_arm_ends(model):
+    """On the sphere of the upper arm, lower by the offset of the elbow's axis."""
+    constants = model.constants
+    q = np.zeros((2, 7))
+    q[:, 0], q[:, 1] = (0.7, -1.1), (0.4, 1.2)
+    found = elbow_of(constants, q)
+    for row, (q1, q2) in zip(found, q[:, :2], strict=True):
+        out = 0.55 * np.sin(q2)
+        expected = [out * np.cos(q1), out * np.sin(q1), 0.55 * np.cos(q2) - 0.045]
+        assert row == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("joint", range(7))
+@pytest.mark.parametrize("side", ["lower", "upper"])
+def test_a_pose_beyond_a_stop_is_refused_with_its_joint(model, joint, side):
+    constants = model.constants
+    stops = constants.q_lower if side == "lower" else constants.q_upper
+    inward = 1.0 if side == "lower" else -1.0
+    low = FreeSpace(-5.0)
+    pose = np.array(UPRIGHT)
+    pose[joint] = stops[joint] + inward * (OFFSET + 1e-6)
+    check_poses(model, [pose], low)
+    pose[joint] = stops[joint] + inward * (OFFSET - 1e-6)
+    with pytest.raises(SettingsError, match=f"Pose 2 .* joint {joint + 1} is beyond"):
+        check_poses(model, [np.array(UPRIGHT), pose], low)
+
+
+def test_the_upright_pose_has_elbow_and_foot_high():
+    assert UPRIGHT == (0.0, -0.4, 0.0, 1.8, 0.0, -0.4, 0.0)
+
+
+def test_no_pose_is_further_from_upright_than_it_may_be(poses):
+    most = np.array([0.0, 1.2, 1.1, 1.3, 1.3, 1.0, 1.0])
+    assert (np.abs(np.array(poses) - UPRIGHT) <= most + 1e-12).all()
+    assert (np.ptp(np.array(poses)[:, 1:], axis=0) > 0.5 * most[1:]).all()
+
+
+def test_a_pose_that_cannot_be_reached_from_the_one_before_is_reached_by_upright(model):
+    """The way from one side to the other dips; by the upright pose it does not."""
+    low, other = (np.array(UPRIGHT) + d for d in ([0] * 7, [0] * 7))
+    low[[1, 3]] += (0.9, 0.9)
+    other[[1, 3]] += (-0.9, 0.4)
+
+    class Space(FreeSpace):
+        def is_clear(self, model, start, goal):
+            return bool((start == UPRIGHT).all() or (goal == UPRIGHT).all())
+
+    halts = plan_halts(
+        model, np.array(UPRIGHT), [low, other], Space(-5.0), is_two_sided=False
+    )
+    places = ["upright" if (halt.q == UPRIGHT).all() else halt.pose for halt in halts]
+    assert places == ["upright", 0, "upright", 1, "upright", "upright"]
+
+
+def test_a_leg_is_as_fast_as_the_sole_may_be(model):
+    """A swing of joint 1 alone: the sole goes on a circle of known radius."""
+    q = np.array([0.0, 1.0, 0.0, 0.3, 0.0, 0.0, 0.0])
+    x, y, _ = model.sole_pose(q)[0]
+    goal = q.copy()
+    goal[0] += 1.0
+    assert leg_speed(model, q, goal) == pytest.approx(
+        POINT_SPEED / np.hypot(x, y), rel=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("heights", "is_free"),
+    [
+        ([0.5, 0.5, 0.5, 0.5], True),
+        ([0.5, 0.2, 0.5, 0.5], False),
+        ([0.5, 0.5, 0.2, 0.5], False),
+        ([0.2, 0.25, 0.5, 0.5], True),
+        ([0.5, 0.5, 0.25, 0.2], True),
+        ([0.5, 0.331, 0.329, 0.5], True),
+        ([0.5, 0.327, 0.5, 0.5], False),
+        ([0.2, 0.197, 0.5, 0.5], False),
+    ],
+)
+def test_a_way_is_no_lower_than_the_floor_or_its_ends(
+    model, monkeypatch, heights, is_free
+):
+    monkeypatch.setattr(free_space, "lowest", lambda *_: np.array(heights))
+    assert is_clear(model, np.zeros(7), np.ones(7), 0.33) is is_free
+
+
+def test_a_pose_is_chosen_only_if_it_is_free_on_both_sides_of_it(model):
+    class Asked(FreeSpace):
+        asked: ClassVar[set] = set()
+
+        def holds(self, q):
+            self.asked.add(tuple(np.round(q, 6)))
+            return super().holds(q)
+
+    for pose in choose_poses(model, 4, Asked(FLOOR)):
+        for side in (-OFFSET, 0.0, OFFSET):
+            assert tuple(np.round(pose + side, 6)) in Asked.asked
+            assert lowest(model, (pose + side)[None])[0] > FLOOR

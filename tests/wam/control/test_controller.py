@@ -237,3 +237,69 @@ def test_two_thousand_cycles_leave_nothing_behind_in_memory(foot_model):
         before = sys.getallocatedblocks()
         compute(2000)
         assert sys.getallocatedblocks() - before < 100  # less than one in 20 cycles
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
+    foot_model, way
+):
+    """Joints that carry weight and are braked with all there is, either way."""
+    law = with_walls(foot_model)
+    law.enter(ArmState.HOLD, reading(0.0))
+    tau, gravity = law.torque(reading(5.0, qd=np.full(7, -way * 100.0)))
+    assert abs(gravity[1]) > 5.0
+    assert tau[:6] == pytest.approx(np.full(6, way * 0.9 * 40.0))
+
+
+def test_an_arm_that_floated_is_held_where_it_is_then(law):
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.enter(ArmState.FLOAT, reading(1.0))
+    there = DOWN + np.array([0.1, -0.1, 0.1, 0.1, -0.1, 0.1, 0.0])
+    law.enter(ArmState.HOLD, reading(2.0, q=there))
+    tau, gravity = law.torque(reading(9.0, q=there))
+    assert tau[:6] == pytest.approx(gravity[:6], abs=1e-9)
+
+
+def test_a_move_later_than_the_start_of_the_clock_goes_on_the_same(law):
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(DOWN, 0.5, reading(3.0))
+    sagged = DOWN.copy()
+    sagged[1] += 0.001
+    before = law.torque(reading(4.0, q=sagged))[0]
+    law.move_to(DOWN + 0.01, 0.5, reading(4.0, q=sagged))
+    assert law.torque(reading(4.0, q=sagged))[0] == pytest.approx(before, abs=1e-9)
+
+
+def test_a_move_in_place_of_another_begins_on_its_way(law):
+    """Half-way of a long move another one begins: the goal of the PD does not jump."""
+    goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(goal, 0.5, reading(3.0))
+    q = DOWN + np.array([0, 0, 0, 0.2, 0, 0, 0])
+    half = reading(3.0 + 0.5 * 2.0 * np.sqrt(0.4 / 0.5), q=q)
+    at_rest = law.torque(half)[1]
+    law.move_to(DOWN, 0.5, half)
+    assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)
+    law.enter(ArmState.HOLD, half)
+    assert law.torque(half)[0][3] == pytest.approx(at_rest[3], abs=0.2)
+
+
+@pytest.mark.parametrize(("state", "offset"), [("HOLD", 0.065), ("FLOAT", 0.5)])
+def test_joint_7_stays_where_a_person_turns_it_in_hold_and_not_in_a_trial(
+    law, state, offset
+):
+    law.enter(ArmState[state], reading(0.0))
+    law.torque(reading(9.0, q=moved(0.5)))
+    assert law.joint7_offset(reading(9.0, q=moved(0.5))) == pytest.approx(offset)
+
+
+def test_a_hold_in_the_middle_of_a_move_begins_with_the_torque_of_the_move(law):
+    """The PD of the move pulls back by 1 mrad; its goal is far away."""
+    goal = DOWN + np.array([0, 0, 0, 0.4, 0, 0, 0])
+    law.enter(ArmState.HOLD, reading(3.0))
+    law.move_to(goal, 0.5, reading(3.0))
+    q = DOWN + np.array([0, 0, 0, 0.2 + 0.001, 0, 0, 0])
+    half = reading(3.0 + 0.5 * 2.0 * np.sqrt(0.4 / 0.5), q=q)
+    law.enter(ArmState.HOLD, half)
+    tau, gravity = law.torque(half)
+    assert tau[3] - gravity[3] == pytest.approx(-0.5, abs=0.05)  # 500 N m/rad

@@ -174,3 +174,37 @@ def test_the_lock_comes_to_rest_on_the_example_foot():
         trace.append(q)
     assert max(np.abs(trace)) < 0.02  # 0.2 N m at 20 N m/rad is 10 mrad
     assert max(np.abs(trace[-500:])) < 3 * count
+
+
+def test_a_reference_on_its_way_is_followed_only_where_the_torque_ends(lock):
+    lock.move(1.0, FULL)
+    lock.follow(0.41, FULL + S // 10)  # 30 mrad on, 20 behind: it does not stop
+    assert lock.reference(FULL + S) == pytest.approx(0.7, abs=1e-9)
+
+
+def test_a_released_lock_follows_nothing(lock):
+    lock.release(FULL)
+    lock.follow(2.0, FULL + S)
+    assert lock.reference(FULL + 2 * S) == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_reference_is_drawn_along_at_the_largest_torque(lock, side):
+    lock.follow(0.4 + side, FULL)
+    assert lock.torque(0.4 + side, 0.0, FULL) == pytest.approx(-side * 1.3)
+    reference = lock.reference(FULL + S)
+    assert reference == pytest.approx(0.4 + side * (1.0 - 1.3 / 20.0))
+
+
+def test_a_fresh_lock_has_its_reference_at_zero():
+    lock = JointLock()
+    assert lock.reference(0) == lock.reference(START) == 0.0
+    lock.engage(0.0, START)
+    assert lock.torque(0.01, 0.0, START) == 0.0
+
+
+def test_a_second_engage_moves_the_reference_nowhere(lock):
+    lock.engage(1.0, FULL)
+    for after in (1, 5):
+        assert lock.reference(FULL + after * S) == pytest.approx(0.4)
+    assert lock.torque(0.41, 0.0, FULL) == pytest.approx(-0.2, abs=1e-12)

@@ -54,8 +54,9 @@ def test_the_pd_part_is_clipped_joint_by_joint():
     error = np.full(7, 1.0)
     tau = joint_pd(np.full(7, 1e4), np.zeros(7), error, np.zeros(7))
     assert tau == pytest.approx(PD_TORQUE_LIMIT)
-    assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), error, error) == pytest.approx(
-        np.full(7, 5.0)
+    half = 0.5 * error
+    assert joint_pd(np.full(7, 2.0), np.full(7, 3.0), half, error) == pytest.approx(
+        np.full(7, 4.0)
     )
 
 
@@ -63,3 +64,32 @@ def test_nothing_that_is_in_the_way_is_pressed_harder_than_this():
     """N m beyond the weight: what a person who holds a joint has to bear."""
     held = joint_pd(np.full(7, 1e6), np.zeros(7), np.ones(7), np.zeros(7))
     assert held.tolist() == [25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0]
+
+
+@pytest.mark.parametrize("length", [0.1, 0.49, 0.51, 2.0])
+@given(share=st.floats(0.0, 1.0))
+def test_a_move_brakes_as_it_began(length, share):
+    """Half a radian is the shortest move that reaches the top speed."""
+    goal = np.array([length, 0, 0, 0, 0, 0, 0])
+    move = JointMove(np.zeros(7), goal)
+    t = share * move.duration
+    early, late = move.at(t), move.at(move.duration - t)
+    assert early[0] + late[0] == pytest.approx(goal, abs=1e-9)
+    assert early[1] == pytest.approx(late[1], abs=1e-9)
+
+
+@pytest.mark.parametrize(("length", "top"), [(0.1, 0.05**0.5), (0.5, 0.5), (2.0, 0.5)])
+def test_the_speed_half_way_is_all_that_the_length_allows(length, top):
+    goal = np.array([0, 0, -length, 0, 0, 0, 0])
+    move = JointMove(np.zeros(7), goal)
+    q, qd = move.at(0.5 * move.duration)
+    assert q[2] == pytest.approx(-0.5 * length)
+    assert qd[2] == pytest.approx(-top)
+
+
+def test_a_move_begins_with_its_acceleration():
+    move = JointMove(np.zeros(7), np.full(7, 2.0), speed=0.4, acceleration=0.8)
+    q, qd = move.at(0.25)
+    assert (q[0], qd[0]) == pytest.approx((0.5 * 0.8 * 0.25**2, 0.2))
+    assert move.at(0.5)[1][0] == pytest.approx(0.4)
+    assert move.at(-1.0)[0].tolist() == [0.0] * 7

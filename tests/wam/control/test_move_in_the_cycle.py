@@ -122,3 +122,16 @@ def test_a_move_may_end_at_a_stop_and_not_beyond(foot_model, stop):
     goal[3] *= 1.01
     with pytest.raises(ValueError, match="stops"):
         law.move_to(goal, 0.5, reading(0.0))
+
+
+def test_no_move_begins_while_a_verdict_stands(bench):
+    bench.cycle.report(verdict_for(Fault.CONSOLE_SILENT))
+    bench.run()
+    bench.cycle.move_to(GOAL, 0.4)
+    bench.run(2)
+    bench.enter(ArmState.HOLD)
+    bench.run(2)
+    assert bench.law.moves == []
+    bench.cycle.move_to(GOAL, 0.4)
+    bench.run()
+    assert len(bench.law.moves) == 1

@@ -164,3 +164,24 @@ def test_the_damper_of_a_wall_is_as_strong_as_it_was_chosen():
         q = np.array([-1.0 + DEPTH - depth, *np.zeros(6)])
         braked = pushed(walls, q, qd)[0] - pushed(walls, q)[0]
         assert braked == pytest.approx(-share * damping * speed)
+
+
+def test_beyond_the_stop_the_damper_grows_no_more():
+    damping, speed = 3.0, -0.4
+    walls = SoftWalls(Walls((-1.0,) * 7, (1.0,) * 7, (1e3,) * 7, (damping,) * 7))
+    pushed(walls, np.zeros(7))
+    q, qd = at(-1.0 - DEPTH / 2), at(speed)
+    assert pushed(walls, q, qd)[3] - pushed(walls, q)[3] == pytest.approx(
+        -damping * speed
+    )
+
+
+@pytest.mark.parametrize("joint", range(7))
+def test_no_wall_is_armed_at_first(joint):
+    assert not pushed(SoftWalls(WALLS), at(1.95, joint)).any()
+
+
+@pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
+def test_the_slightest_touch_of_a_wall_is_pushed_back(stop, sign):
+    inside = stop + sign * (DEPTH - 0.002)
+    assert pushed(armed(), at(inside))[3] == pytest.approx(sign * LIMIT / 0.2 * 0.002)

@@ -56,3 +56,9 @@ def test_small_errors_pass():
     assert (
         np.pi / 42 > 2 * HOME_LIMIT
     )  # half a turn of the motor with the highest ratio
+
+
+def test_an_error_of_just_the_limit_passes():
+    check_home(np.full(7, HOME_LIMIT))
+    with pytest.raises(PreflightError):
+        check_home(np.full(7, HOME_LIMIT + 1e-6))

@@ -105,3 +105,32 @@ def test_zero_is_marked_and_confirmed():
     assert not safety.is_zeroed()
     safety.mark_zeroed()
     assert safety.is_zeroed()
+
+
+class Answers:
+    """A module that answers everything with one number."""
+
+    def __init__(self, value):
+        self.value, self.wanted = value, []
+
+    def require(self, node, number, name):
+        return self.value
+
+    def set(self, node, number, value):
+        self.wanted.append((node, number, value))
+
+    def pause(self, duration_ns):
+        """Wait for nothing."""
+
+
+@pytest.mark.parametrize("value", [3, 5, -1])
+def test_a_mode_that_does_not_exist_is_an_error(value):
+    with pytest.raises(DeviceFaultError, match=f"mode {value}"):
+        SafetyModule(Answers(value), None, 200).mode()
+
+
+def test_a_module_that_does_not_take_the_zero_is_an_error():
+    answers = Answers(0)
+    with pytest.raises(DeviceFaultError, match="ZERO"):
+        SafetyModule(answers, None, 200).mark_zeroed()
+    assert [value for *_, value in answers.wanted] == [1]

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 
 from acquisition.devices import SafetyMode
-from acquisition.errors import PreflightError
+from acquisition.errors import DeviceFaultError, PreflightError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.frames import property_reply_id
@@ -132,3 +132,61 @@ def test_the_absolute_angle_outlives_the_zeroing():
     before = [p.mech for p in arm.start().pucks]
     arm.define_position(arm.transmission.joints([0.0] * 7))
     assert [p.mech for p in arm.start().pucks] == before == list(rig.motors.position)
+
+
+def test_a_node_that_is_no_motor_is_named():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.set_property(4, "ROLE", int(PuckRole.SAFETY))
+    with pytest.raises(PreflightError, match=r"Node 4 is not a motor puck"):
+        start(rig)
+
+
+SLEEP = bytes.fromhex("85 00 00 00 00 00")
+
+
+def test_a_puck_that_does_not_wake_is_named():
+    rig = Rig(counts=HOME_COUNTS)
+    rig.link.send(5, SLEEP)
+    rig.rest(600 * MS)
+    receive = rig.network.receive
+    rig.network.receive = lambda t, i, d: (
+        None if i == 5 and bytes(d[:1]) == b"\x85" else receive(t, i, d)
+    )
+    with pytest.raises(PreflightError, match="Puck 5 does not wake up"):
+        start(rig)
+
+
+def test_pucks_are_woken_one_after_the_other_and_left_alone_while_they_boot():
+    rig = Rig(counts=HOME_COUNTS)
+    for node in (2, 5):
+        rig.link.send(node, SLEEP)
+    rig.rest(600 * MS)
+    rig.sent.clear()
+    start(rig)
+    woken = [t for t, i, d in rig.sent if i in (2, 5) and len(d) == 6 and d[0] == 0x85]
+    assert len(woken) == 2
+    assert 10 * MS <= woken[1] - woken[0] < 15 * MS
+    after = min(t for t, *_ in rig.sent if t > woken[1])
+    assert after - woken[1] >= 1000 * MS
+
+
+@pytest.mark.parametrize("name", ["CTS", "IPNM"])
+@pytest.mark.parametrize("value", [0, -5])
+def test_a_puck_without_its_constants_is_refused(name, value):
+    rig = Rig(counts=HOME_COUNTS)
+    rig.network.set_property(6, name, value)
+    with pytest.raises(DeviceFaultError, match=f"Puck 6 .*{name} {value}"):
+        start(rig)
+
+
+@pytest.mark.parametrize("mode", [SafetyMode.IDLE, SafetyMode.ACTIVE])
+def test_motors_are_let_go_unless_the_arm_is_active(mode):
+    # As long a heartbeat that start-up is no silence of the host.
+    rig = Rig(NetworkOptions(heartbeat_ns=10_000 * MS), HOME_COUNTS)
+    if mode is SafetyMode.ACTIVE:
+        rig.network.pendant("activate")
+    rig.sent.clear()
+    info = start(rig)
+    assert info.safety_mode is mode
+    told = [d for _, i, d in rig.sent if i == 0x404 and len(d) == 6 and d[0] == 0x88]
+    assert told == ([] if mode is SafetyMode.ACTIVE else [b"\x88" + bytes(5)])

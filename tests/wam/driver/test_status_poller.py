@@ -11,6 +11,8 @@ from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_set
 from wam.driver.arm import WamArm
 from wam.driver.health import PuckHealth, complaints, health_metadata, temperature_range
+from wam.driver.settings import ArmSettings
+from wam.driver.status_poller import StatusPoller
 
 ZERO = np.zeros(7)
 CYCLE_NS = 2_000_000
@@ -238,3 +240,64 @@ def test_positions_are_whole_again_after_listening(bench):
         bench.arm.listen(bench.rig.clock.t_ns)
         bench.rig.rest(2_000_000)
     assert bench.arm.read(bench.rig.clock.t_ns).is_complete
+
+
+class Bus:
+    """A bus on which nothing answers; it keeps what was sent."""
+
+    def __init__(self):
+        self.mode_hints, self.sent = 0, []
+
+    def send(self, node, data):
+        self.sent.append((node, data))
+
+
+def poll(poller, cycles, **how):
+    for _ in range(cycles):
+        poller.begin_cycle(0)
+        poller.ask(**how)
+
+
+PERIOD = ArmSettings().safety_poll_cycles
+
+
+def test_the_mode_is_unknown_with_the_fifth_question_after_four_without_answer():
+    bus = Bus()
+    poller = StatusPoller(bus, ArmSettings())
+    poll(poller, 1)
+    poller.note_mode(SafetyMode.ACTIVE, 1)
+    poll(poller, 4 * PERIOD)
+    assert poller.mode is SafetyMode.ACTIVE
+    poll(poller, PERIOD)
+    assert poller.mode is SafetyMode.UNKNOWN
+
+
+def test_a_burst_of_urgent_questions_is_no_silence():
+    poller = StatusPoller(Bus(), ArmSettings())
+    poll(poller, 1)
+    poller.note_mode(SafetyMode.ACTIVE, 1)
+    poll(poller, PERIOD - 1, is_urgent=True)
+    assert poller.mode is SafetyMode.ACTIVE
+
+
+def test_a_second_question_in_a_cycle_waits_for_the_next():
+    bus = Bus()
+    poller = StatusPoller(bus, ArmSettings())
+    poller.begin_cycle(0)
+    poller.ask()
+    poller.ask(is_urgent=True)
+    assert len(bus.sent) == 1
+
+
+def test_the_first_cycle_asks_for_the_mode_and_the_others_are_spread():
+    bus = Bus()
+    poller = StatusPoller(bus, ArmSettings())
+    asked = []
+    for _ in range(PERIOD):
+        before = len(bus.sent)
+        poll(poller, 1)
+        asked.append(bus.sent[before:])
+    first = [cycle for cycle, questions in enumerate(asked) if questions]
+    settings = ArmSettings()
+    health = settings.health_poll_cycles // 3 - 1
+    assert first[:3] == sorted({0, PERIOD // 2 - 1, health})[:3]

@@ -151,3 +151,29 @@ def test_the_driver_has_the_matrix_of_the_arm_model():
 def test_constants_that_make_no_transmission_are_refused(j2mp, cts):
     with pytest.raises(SettingsError):
         Transmission(j2mp, cts, IPNM)
+
+
+@pytest.mark.parametrize("least", [1, 2])
+def test_the_least_constants_of_a_transmission_are_one(least):
+    wam = Transmission(J2MP, (least, *CTS[1:]), (least, *IPNM[1:]))
+    assert wam.exact_units(TAU)[0] == pytest.approx(-least * TAU[0] / 42.0)
+    with pytest.raises(SettingsError):
+        Transmission(J2MP, CTS, (0, *IPNM[1:]))
+
+
+def test_the_least_transmission_that_can_be_inverted_is_taken():
+    assert Transmission(np.eye(7), CTS, IPNM).joints([4096] + [0] * 6)[
+        0
+    ] == pytest.approx(2 * np.pi)
+    with pytest.raises(SettingsError, match="inverted"):
+        Transmission(0.99 * np.eye(7), CTS, IPNM)
+
+
+@pytest.mark.parametrize("motor", range(7))
+def test_every_motor_has_its_own_limit_of_torque(motor):
+    """Each motor's share of a torque that is far beyond all of them."""
+    wam = Transmission(np.eye(7), CTS, IPNM)
+    tau = np.zeros(7)
+    tau[motor] = 1e3
+    assert wam.command(tau, ZERO).units[motor] == LIMITS[motor]
+    assert wam.command(-tau, ZERO).units[motor] == -LIMITS[motor]

@@ -76,6 +76,7 @@ def test_a_way_through_an_obstacle_is_hit_though_both_ends_are_free(example_tool
     hit = clearance.first_hit(start, goal)
     assert hit is not None
     assert hit.second == "the post"
+    assert 0.0 < hit.distance < CLEARANCE_MARGIN
     assert clearance.first_hit(start, start) is None
 
 
@@ -113,3 +114,127 @@ def test_a_gap_is_told_in_words_and_millimetres(clearance):
     text = clearance.nearest(CONSTANTS.home).text()
     assert "mm from" in text
     assert "the wrist" in text
+
+
+def frames(q):
+    """Return (rotation, origin) of the frame of each joint, from the DH table."""
+    rotation, origin = np.eye(3), np.zeros(3)
+    result = [(rotation, origin)]
+    for joint, angle in enumerate(q):
+        c, s = np.cos(angle), np.sin(angle)
+        rotation = rotation @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        result.append((rotation, origin))
+        origin = origin + rotation @ [CONSTANTS.a[joint], 0.0, CONSTANTS.d[joint]]
+        c, s = np.cos(CONSTANTS.alpha[joint]), np.sin(CONSTANTS.alpha[joint])
+        rotation = rotation @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return result
+
+
+def enclosing(tool):
+    """Return (joint, radius, lowest, highest along its z, x, y) of every body [m]."""
+    x, y, z = tool.sole
+    return {
+        "the base": (0, 0.12, -0.346, -0.10, 0.0, 0.0),
+        "the shoulder": (1, 0.15, -0.15, 0.15, 0.0, 0.0),
+        "the upper arm": (3, 0.08, 0.08, 0.55, 0.0, 0.0),
+        "the elbow": (4, 0.09, -0.09, 0.09, 0.0, 0.0),
+        "the forearm": (5, 0.065, 0.0, 0.30, 0.0, 0.0),
+        "the wrist": (6, 0.065, -0.065, 0.065, 0.0, 0.0),
+        "the foot": (7, 0.045, 0.0, 0.0609 + z, x, y),
+    }
+
+
+def axis_points(body, frames):
+    """Return points on the axis of a capsule, close to each other, base frame."""
+    joint, radius, low, high, x, y = body
+    rotation, origin = frames[joint]
+    low, high = sorted((low + radius, high - radius))
+    along = np.linspace(low, high, 200)
+    flat = np.ones_like(along)
+    return origin + np.stack([x * flat, y * flat, along], axis=-1) @ rotation.T
+
+
+PAIRS = [
+    ("the elbow", "the base"),
+    ("the forearm", "the base"),
+    ("the wrist", "the base"),
+    ("the foot", "the base"),
+    ("the forearm", "the shoulder"),
+    ("the wrist", "the shoulder"),
+    ("the foot", "the shoulder"),
+    ("the wrist", "the upper arm"),
+    ("the foot", "the upper arm"),
+]
+ON_FLOOR = ("the upper arm", "the elbow", "the forearm", "the wrist", "the foot")
+
+
+def test_every_body_encloses_what_was_measured_of_the_arm(example_tool, clearance):
+    """Distances of all pairs against ones made here from the table of the joints."""
+    rng = np.random.default_rng(3)
+    bodies = enclosing(example_tool)
+    for q in rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper, (8, 7)):
+        at = frames(q)
+        points = {name: axis_points(body, at) for name, body in bodies.items()}
+        expected = [
+            np.linalg.norm(points[a][:, None] - points[b], axis=-1).min()
+            - bodies[a][1]
+            - bodies[b][1]
+            for a, b in PAIRS
+        ]
+        expected += [points[a][:, 2].min() - bodies[a][1] + 0.346 for a in ON_FLOOR]
+        found, wanted = clearance.distances(q), np.array(expected)
+        apart = wanted > 0.0
+        assert found[apart] == pytest.approx(wanted[apart], abs=5e-4)
+        assert (found[~apart] < 1e-3).all()
+
+
+def test_a_way_is_looked_at_from_end_to_end_in_equal_steps():
+    start, goal = UPRIGHT, UPRIGHT + np.array([0.05, -0.1, 0, 0, 0, 0, 0])
+    path = straight_way(start, goal)
+    assert path[0] == pytest.approx(start)
+    assert path[-1] == pytest.approx(goal)
+    assert np.diff(path, axis=0) == pytest.approx(
+        np.tile((goal - start) / (len(path) - 1), (len(path) - 1, 1))
+    )
+    assert len(path) in (6, 7)
+    assert len(straight_way(start, start)) == 2
+    assert len(straight_way(start, start + 0.999 * STEP)) == 2
+
+
+def test_the_margin_is_thirty_millimetres():
+    assert pytest.approx(0.03) == CLEARANCE_MARGIN
+
+
+class Staged(ArmClearance):
+    """Gaps that are given for each look at the way of joint 1 from 0 to 1 rad."""
+
+    def __init__(self, tool, gaps):
+        super().__init__(CONSTANTS, tool)
+        self.gaps = gaps
+
+    def distances(self, q):
+        count = len(straight_way(np.zeros(7), np.eye(7)[0]))
+        return np.array([self.gaps.get(round(q[0] * (count - 1)), 0.5)])
+
+
+LAST = len(straight_way(np.zeros(7), np.eye(7)[0])) - 1
+
+
+@pytest.mark.parametrize(
+    ("gaps", "is_hit"),
+    [
+        ({}, False),
+        ({1: 0.029}, True),
+        ({LAST - 1: 0.029}, True),
+        ({LAST // 2: 0.031}, False),
+        ({0: 0.01, 1: 0.0081}, False),
+        ({0: 0.01, 1: 0.0079}, True),
+        ({LAST: 0.01, LAST - 1: 0.0081}, False),
+        ({LAST: 0.01, 7: 0.0079}, True),
+    ],
+)
+def test_on_a_way_nothing_is_closer_than_the_margin_or_its_ends(
+    example_tool, gaps, is_hit
+):
+    hit = Staged(example_tool, gaps).first_hit(np.zeros(7), np.eye(7)[0])
+    assert (hit is not None) is is_hit

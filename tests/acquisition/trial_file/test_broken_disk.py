@@ -1,0 +1,57 @@
+"""What cannot be looked at now is not taken for what is not there."""
+
+import errno
+import fcntl
+import os
+from pathlib import Path
+
+import pytest
+
+from acquisition.errors import TrialFileError
+from acquisition.trial_file.data_files import is_claimed, list_folder
+
+
+def broken(number):
+    """Return a call that a broken disk refuses."""
+
+    def refuse(*_, **__):
+        raise OSError(number, os.strerror(number))
+
+    return refuse
+
+
+def test_a_folder_is_listed_in_order_by_a_pattern(tmp_path):
+    for name in ("T02.json", "T01.json", "T01.mcap", ".lock"):
+        (tmp_path / name).touch()
+    found = [path.name for path in list_folder(tmp_path, "T??.json")]
+    assert found == ["T01.json", "T02.json"]
+    assert len(list_folder(tmp_path)) == 4
+    assert list_folder(tmp_path)[0].parent == tmp_path
+
+
+@pytest.mark.parametrize("name", ["missing", "T01.mcap"])
+def test_a_folder_that_is_not_there_holds_nothing(tmp_path, name):
+    (tmp_path / "T01.mcap").touch()
+    assert list_folder(tmp_path / name) == []
+    assert list_folder(tmp_path / name / "below") == []
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EMFILE, errno.EACCES])
+def test_a_folder_that_cannot_be_listed_is_no_empty_one(tmp_path, monkeypatch, number):
+    monkeypatch.setattr(Path, "iterdir", broken(number))
+    with pytest.raises(TrialFileError, match=os.strerror(number)):
+        list_folder(tmp_path)
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.EMFILE])
+def test_whether_a_recorder_writes_is_not_guessed(tmp_path, monkeypatch, number):
+    assert not is_claimed(tmp_path)
+    assert not is_claimed(tmp_path / "missing")
+    monkeypatch.setattr(os, "open", broken(number))
+    with pytest.raises(TrialFileError, match=os.strerror(number)):
+        is_claimed(tmp_path)
+
+
+def test_a_file_system_without_locks_claims_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(fcntl, "flock", broken(errno.ENOLCK))
+    assert not is_claimed(tmp_path)

@@ -1,0 +1,76 @@
+"""Requests to stop, and the signals that make them."""
+
+import signal
+
+import pytest
+
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict
+from experiments.run.stop import URGENT_NS, ArmFaultError, StopFlag, handle_signals
+from fakes.clock import SteppedClock
+
+NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+def requested(*pauses_ns):
+    """Return a flag after one request and one more after each pause."""
+    clock = SteppedClock()
+    stop = StopFlag(clock)
+    stop.request()
+    for pause_ns in pauses_ns:
+        clock.sleep_until(clock.now_ns() + pause_ns)
+        stop.request()
+    return stop
+
+
+def test_urgent_means_within_three_seconds():
+    assert URGENT_NS == 3_000_000_000
+
+
+def test_the_first_request_is_not_urgent_whatever_the_time():
+    class Early:
+        def now_ns(self):
+            return 0
+
+    stop = StopFlag(Early())
+    stop.request()
+    assert (stop.count, stop.is_urgent) == (1, False)
+
+
+@pytest.mark.parametrize(("pause_ns", "is_urgent"), [(0, True), (1, False)])
+def test_two_requests_are_urgent_up_to_the_limit(pause_ns, is_urgent):
+    stop = requested(URGENT_NS + pause_ns)
+    assert (stop.count, stop.is_urgent) == (2, is_urgent)
+
+
+def test_the_time_counts_from_the_request_before():
+    assert requested(2 * URGENT_NS, URGENT_NS).is_urgent
+    assert not requested(2 * URGENT_NS, 2 * URGENT_NS).is_urgent
+
+
+def test_an_urgent_request_stays_urgent():
+    stop = requested(1, 2 * URGENT_NS)
+    assert (stop.count, stop.is_urgent) == (3, True)
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_a_signal_is_a_request_and_its_handler_is_given_back(number):
+    before = [signal.getsignal(each) for each in NUMBERS]
+    stop = StopFlag()
+    with handle_signals(stop):
+        signal.raise_signal(number)
+        assert (stop.count, stop.is_urgent) == (1, False)
+    assert [signal.getsignal(each) for each in NUMBERS] == before
+
+
+def test_signals_are_given_back_after_an_error():
+    before = [signal.getsignal(each) for each in NUMBERS]
+    with pytest.raises(ZeroDivisionError), handle_signals(StopFlag()):
+        raise ZeroDivisionError
+    assert [signal.getsignal(each) for each in NUMBERS] == before
+
+
+def test_a_fault_of_the_arm_has_the_verdict_and_its_reason():
+    verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
+    fault = ArmFaultError(verdict)
+    assert fault.verdict is verdict
+    assert str(fault) == verdict.reason

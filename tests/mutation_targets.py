@@ -1,0 +1,264 @@
+"""Modules whose errors are sown, each with the tests that have to notice."""
+
+_LOOP, _LOOP_TESTS = "acquisition/control_loop", "tests/acquisition/control_loop"
+_FILE, _FILE_TESTS = "acquisition/trial_file", "tests/acquisition/trial_file"
+_CONTROL, _CONTROL_TESTS = "wam/control", "tests/wam/control"
+_DRIVER, _DRIVER_TESTS = "wam/driver", "tests/wam/driver"
+_RUN, _RUN_TESTS = "experiments/run", "tests/experiments/run"
+_POSES = (
+    "tests/wam/calibration/test_gravity_poses.py",
+    "tests/experiments/calibrating/test_surroundings.py",
+)
+_SALVAGED = (
+    f"{_FILE_TESTS}/test_recover.py",
+    f"{_FILE_TESTS}/test_damaged_files.py",
+    f"{_FILE_TESTS}/test_hostile_files.py",
+    "tests/corpus/test_stated_limits.py",
+)
+
+TESTS = {
+    f"{_LOOP}/guard.py": (
+        f"{_LOOP_TESTS}/test_guard.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
+    f"{_LOOP}/cycle.py": (
+        f"{_LOOP_TESTS}/test_cycle.py",
+        f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
+    ),
+    f"{_LOOP}/states.py": (
+        f"{_LOOP_TESTS}/test_states.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
+    f"{_LOOP}/faults.py": (f"{_LOOP_TESTS}/test_faults.py",),
+    f"{_LOOP}/contact.py": (
+        f"{_LOOP_TESTS}/test_contact.py",
+        f"{_LOOP_TESTS}/test_cycle.py",
+    ),
+    f"{_LOOP}/limits.py": (
+        f"{_LOOP_TESTS}/test_torque_limiter.py",
+        f"{_LOOP_TESTS}/test_guard.py",
+    ),
+    "acquisition/ipc/loop_server.py": ("tests/acquisition/ipc/test_loop_server.py",),
+    f"{_FILE}/salvage.py": _SALVAGED,
+    f"{_FILE}/recover.py": _SALVAGED,
+    f"{_CONTROL}/controller.py": (
+        f"{_CONTROL_TESTS}/test_controller.py",
+        f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
+    ),
+    f"{_CONTROL}/position_control.py": (
+        f"{_CONTROL_TESTS}/test_position_hold.py",
+        f"{_CONTROL_TESTS}/test_joint_move.py",
+    ),
+    f"{_CONTROL}/joint_lock.py": (
+        f"{_CONTROL_TESTS}/test_joint_lock.py",
+        f"{_CONTROL_TESTS}/test_controller.py",
+    ),
+    f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
+    f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
+    f"{_DRIVER}/status_poller.py": (
+        f"{_DRIVER_TESTS}/test_status_poller.py",
+        f"{_DRIVER_TESTS}/test_arm.py",
+    ),
+    f"{_DRIVER}/joint_estimator.py": (
+        f"{_DRIVER_TESTS}/test_joint_estimator.py",
+        f"{_DRIVER_TESTS}/test_arm.py",
+        f"{_DRIVER_TESTS}/test_lost_replies.py",
+    ),
+    f"{_DRIVER}/startup.py": (
+        f"{_DRIVER_TESTS}/test_startup.py",
+        f"{_DRIVER_TESTS}/test_home_check.py",
+        "tests/experiments/preflight/test_zero_check.py",
+        f"{_DRIVER_TESTS}/test_generations.py",
+        f"{_DRIVER_TESTS}/test_safety_limits.py",
+    ),
+    f"{_DRIVER}/safety_module.py": (
+        f"{_DRIVER_TESTS}/test_safety_module.py",
+        f"{_DRIVER_TESTS}/test_safety_limits.py",
+        f"{_DRIVER_TESTS}/test_arm.py",
+    ),
+    "wam/model/clearance.py": ("tests/wam/model/test_clearance.py",),
+    "wam/calibration/free_space.py": _POSES,
+    "wam/calibration/poses.py": _POSES,
+    "wam/bus/frames.py": ("tests/wam/bus/test_frames.py",),
+    "ft_sensor/payload.py": (
+        "tests/ft_sensor/test_payload.py",
+        "tests/ft_sensor/test_observer.py",
+    ),
+    "ft_sensor/tare.py": ("tests/ft_sensor/test_tare.py",),
+    "experiments/session/reducer.py": ("tests/experiments/session/test_reducer.py",),
+    "experiments/session/crash_recovery.py": (
+        "tests/experiments/session/test_crash_recovery.py",
+    ),
+    f"{_RUN}/stop.py": (f"{_RUN_TESTS}/test_stop_flag.py",),
+    f"{_RUN}/ready.py": (
+        f"{_RUN_TESTS}/test_activation.py",
+        f"{_RUN_TESTS}/test_flow_steps.py",
+    ),
+    f"{_RUN}/tare.py": (f"{_RUN_TESTS}/test_tare.py",),
+    "analysis/data/prepare.py": ("tests/analysis/data/test_prepare.py",),
+}
+# What changes nothing that a test could see; the reason for each.
+_AT_REST = "at this very instant both ways give the same numbers"
+_BELOW = "nanoseconds, or a share of a millisecond, where milliseconds count"
+_TUNED = "a choice of many equally good ones: the poses it leads to are judged instead"
+EQUIVALENT: dict[tuple[str, str], str] = {
+    (
+        f"{_CONTROL}/position_control.py",
+        "if t <= 0.0: -> if t < 0.0:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "if length == 0.0 or t >= T: -> if length == 0.0 or t > T:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 1.0) -> "
+        "self._reach = TORQUE_LIMIT / np.maximum(self.stiffness, 2.0)",
+    ): "only the stiffness 0 of joint 7 is below either, and its limit is 0",
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "inward = 1.0 if depth > 0.0 else -1.0 -> "
+        "inward = 1.0 if depth >= 0.0 else -1.0",
+    ): "a joint without depth is in no wall",
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "if lower <= angle <= upper: -> if lower < angle <= upper:",
+    ): _AT_REST,
+    (
+        f"{_LOOP}/contact.py",
+        "return 0 < since_ns <= now_ns - LASTING_NS -> "
+        "return 1 < since_ns <= now_ns - LASTING_NS",
+    ): _BELOW,
+    (
+        f"{_LOOP}/contact.py",
+        "saturated_ms = (now_ns - saturated_ns) / NS_PER_MS "
+        "if saturated_ns else 0.0 -> "
+        "saturated_ms = (now_ns - saturated_ns) / NS_PER_MS "
+        "if saturated_ns else 1.0",
+    ): _BELOW,
+    (
+        f"{_FILE}/salvage.py",
+        "return 0.0 if first_ns is None else max(0, last_ns - first_ns) * 1e-09 -> "
+        "return 0.0 if first_ns is None else max(1, last_ns - first_ns) * 1e-09",
+    ): _BELOW,
+    (
+        f"{_FILE}/salvage.py",
+        "at, first_ns, last_ns = (len(MAGIC), None, 0) -> "
+        "at, first_ns, last_ns = (len(MAGIC), None, 1)",
+    ): _BELOW,
+    (
+        f"{_DRIVER}/status_poller.py",
+        "if reply.value is None: -> pass",
+    ): "a decoded reply has a value; the look is for the type checker",
+    (
+        f"{_DRIVER}/status_poller.py",
+        "self._until_mode = 0 -> self._until_mode = 1",
+    ): "the first cycle asks either way",
+    (
+        f"{_DRIVER}/joint_estimator.py",
+        "ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS -> "
+        "ahead = elapsed if elapsed <= _LONGEST_GUESS else _LONGEST_GUESS",
+    ): _AT_REST,
+    (
+        "wam/model/clearance.py",
+        "slab = coal.Box(6.0, 6.0, 1.0) -> slab = coal.Box(7.0, 6.0, 1.0)",
+    ): "the floor reaches beyond the arm either way",
+    (
+        "wam/model/clearance.py",
+        "slab = coal.Box(6.0, 6.0, 1.0) -> slab = coal.Box(6.0, 7.0, 1.0)",
+    ): "the floor reaches beyond the arm either way",
+    (
+        "wam/calibration/free_space.py",
+        "return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1) -> "
+        "return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=+1)",
+    ): "the last axis of two is the second",
+    ("wam/calibration/poses.py", "_CANDIDATES = 1000 -> _CANDIDATES = 2000"): _TUNED,
+    ("wam/calibration/poses.py", "_SEED = 7 -> _SEED = 8"): _TUNED,
+    (
+        "wam/calibration/poses.py",
+        "information = 0.001 * np.eye(parameters) -> "
+        "information = 1.001 * np.eye(parameters)",
+    ): _TUNED,
+    (
+        "wam/calibration/poses.py",
+        "blocks = [np.append(direction, 1.0)[None, :] for direction in down] -> "
+        "blocks = [np.append(direction, 2.0)[None, :] for direction in down]",
+    ): _TUNED,
+    (
+        f"{_RUN}/tare.py",
+        "while still < STILL_SECONDS: -> while still <= STILL_SECONDS:",
+    ): "a sum of ticks of 0.02 s is never 0.3 s to the last bit",
+    (
+        f"{_RUN}/ready.py",
+        "if (clock.now_ns() - start_ns) * 1e-09 > PATIENCE: -> "
+        "if (clock.now_ns() - start_ns) * 1e-09 >= PATIENCE:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "elif t < ramp: -> elif t <= ramp:",
+    ): _AT_REST,
+    (
+        "wam/calibration/free_space.py",
+        "reach, width = (constants.d[2], abs(constants.a[2])) -> "
+        "reach, width = (constants.d[2], abs(constants.a[3]))",
+    ): "the elbow's axis is as far off the upper arm as off the forearm",
+    (
+        "wam/calibration/poses.py",
+        "down = [-model.plate_pose(q)[1][2] for q in reachable] -> "
+        "down = [+model.plate_pose(q)[1][2] for q in reachable]",
+    ): "up tells as much as down",
+    (
+        "wam/calibration/poses.py",
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "q + side) for side in sides))] -> "
+        "reachable = [q for q in drawn[heights >= space.floor] if all((space.holds("
+        "q + side) for side in sides))]",
+    ): _AT_REST,
+    (
+        "experiments/session/reducer.py",
+        "return value if type(value) is int and value > 0 else 0 -> "
+        "return value if type(value) is int and value >= 0 else 0",
+    ): "0 is 0 either way",
+    (
+        f"{_LOOP}/contact.py",
+        "if growth > limits.contact_growth: -> if growth >= limits.contact_growth:",
+    ): _AT_REST,
+    (
+        f"{_LOOP}/contact.py",
+        "if max((dist(point.sole, seen.sole) for point in points)) >= STANDING: -> "
+        "if max((dist(point.sole, seen.sole) for point in points)) > STANDING:",
+    ): _AT_REST,
+    (
+        "acquisition/ipc/loop_server.py",
+        "elif now_ns - self._orphaned_ns > ORPHAN_NS: -> "
+        "elif now_ns - self._orphaned_ns >= ORPHAN_NS:",
+    ): _BELOW,
+    (
+        "acquisition/ipc/loop_server.py",
+        "if console_ns > LONELY_NS and self._cycles % _BELL_EVERY == 0: -> "
+        "if console_ns >= LONELY_NS and self._cycles % _BELL_EVERY == 0:",
+    ): _BELOW,
+    (
+        "wam/bus/frames.py",
+        "if not -TORQUE_LIMIT <= value <= TORQUE_LIMIT: -> "
+        "if not +TORQUE_LIMIT <= value <= TORQUE_LIMIT:",
+    ): "what is within the limits is clipped to itself",
+    (
+        "wam/calibration/poses.py",
+        "heights = np.min([lowest(model, drawn + side) for side in sides], axis=0) -> "
+        "heights = np.min([lowest(model, drawn - side) for side in sides], axis=0)",
+    ): "the sides are the same on both sides",
+}
+# What is no number makes any sum of it none, whatever the signs.
+_VERDICTS = (
+    "verdicts = (_check_safety(limits, seen), _check_silence(limits, seen), "
+    "_check_master(seen.reading.foreign_id), _check_numbers({}, seen), "
+    "_check_position(limits, state, q), _check_speed(limits, seen, qd), "
+    "_check_torque(limits, tau), _check_trial(limits, seen), load, "
+    "_check_cadence(limits, state, now))"
+)
+for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):
+    _text = _VERDICTS.format("sum(q) + sum(qd) + sum(tau)")
+    EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_VERDICTS.format(_sum)}"] = (
+        "of no number every sum and difference is none"
+    )

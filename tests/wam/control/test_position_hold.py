@@ -1,0 +1,110 @@
+"""The springs and dampers of joints that stand still, one by one."""
+
+import numpy as np
+import pytest
+
+from acquisition.devices import ArmReading
+from wam.control.position_control import PositionHold
+from wam.model.constants import load_constants
+
+CONSTANTS = load_constants()
+MOST = np.array([8.0, 12.0, 6.0, 6.0, 1.0, 1.0, 0.0])  # N m, a person pushes the arm
+SOFT = np.array([0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.0]) * CONSTANTS.kp
+HEAVY = np.array([4.0, 3.0, 1.5, 3.0, 2.0, 2.0, 0.0]) * CONSTANTS.kd
+GUIDED = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) * CONSTANTS.kd
+ZERO = np.zeros(7)
+FAR = np.ones(7)  # rad; every spring is at its limit
+
+
+def seen(q=ZERO, qd=ZERO, *, is_complete=True):
+    return ArmReading(
+        host_ns=0,
+        arm_ns=0,
+        counts=[0] * 7,
+        q=np.array(q, dtype=float),
+        qd=np.array(qd, dtype=float),
+        qd7_raw=0.0,
+        fresh=0x7F,
+        is_complete=is_complete,
+        missing_cycles=0,
+    )
+
+
+@pytest.fixture
+def held():
+    hold = PositionHold(CONSTANTS)
+    hold.begin(ZERO)
+    return hold
+
+
+def test_the_springs_are_half_as_stiff_as_those_that_follow_moves(held):
+    assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_no_spring_gives_more_than_a_person_may_bear(held, side):
+    assert held.spring(seen(side * FAR)) == pytest.approx(-side * MOST)
+
+
+def test_a_guided_arm_has_half_of_it(held):
+    assert held.torque(seen(FAR), is_guided=True) == pytest.approx(-0.5 * MOST)
+
+
+def test_the_dampers_brake_each_joint_as_its_weight_needs(held):
+    qd = np.full(7, 0.5)
+    assert held.torque(seen(qd=qd)) == pytest.approx(-HEAVY * 0.5)
+    assert held.torque(seen(qd=qd), is_guided=True) == pytest.approx(-GUIDED * 0.5)
+
+
+def test_the_reference_follows_a_joint_that_is_pushed_away(held):
+    held.spring(seen(FAR))
+    reach = MOST[:6] / SOFT[:6]
+    here = FAR[:6] - reach  # where the springs are without load now
+    assert held.spring(seen([*here, 0.0]))[:6] == pytest.approx(np.zeros(6), abs=1e-9)
+
+
+def test_an_extrapolated_position_drags_no_reference_along(held):
+    held.spring(seen(FAR, is_complete=False))
+    assert held.spring(seen(ZERO)) == pytest.approx(ZERO)
+
+
+@pytest.mark.parametrize(
+    ("rate", "is_driven"), [(0.049, True), (0.051, False), (-0.2, True)]
+)
+def test_a_spring_drives_no_joint_faster_than_50_mrad_a_second(held, rate, is_driven):
+    """The joint is below its reference: the spring pushes up."""
+    q = np.full(7, -1e-3)
+    spring = held.spring(seen(q, np.full(7, rate)))[:6]
+    assert (spring > 0.0).all() == is_driven
+    if not is_driven:
+        assert held.spring(seen(q))[:6] == pytest.approx(np.zeros(6))
+
+
+def test_a_spring_drives_no_joint_faster_downwards_either(held):
+    q, qd = np.full(7, 1e-3), np.full(7, -0.051)
+    assert held.spring(seen(q, qd))[:6] == pytest.approx(np.zeros(6))
+
+
+def test_arms_that_are_held_stay_where_they_are_held(held):
+    held.begin(FAR)
+    assert held.spring(seen(np.full(7, 1e-3))) == pytest.approx(-1e-3 * SOFT)
+
+
+def test_an_arm_that_was_released_is_held_where_it_is_then(held):
+    held.release()
+    assert held.spring(seen(FAR)) == pytest.approx(ZERO)
+    held.begin(FAR)
+    assert held.spring(seen(FAR)) == pytest.approx(ZERO)
+
+
+@pytest.mark.parametrize(("wanted", "given"), [(0.5, 0.5), (9.0, 1.0), (-9.0, -1.0)])
+def test_a_spring_may_begin_with_a_torque_within_its_limit(wanted, given):
+    """`wanted` and `given` are shares of the limits."""
+    hold = PositionHold(CONSTANTS)
+    hold.begin(FAR, wanted * MOST)
+    assert hold.spring(seen(FAR)) == pytest.approx(given * MOST)
+
+
+def test_joint_7_has_no_spring_and_no_damper(held):
+    assert held.torque(seen(FAR, FAR))[6] == 0.0
+    assert held.torque(seen(FAR, FAR), is_guided=True)[6] == 0.0
