@@ -5,6 +5,7 @@ from .findings import (
     findings_rows,
     plain_findings,
 )
+from .paper_claims import PaperClaim
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
@@ -16,6 +17,7 @@ __all__ = [
     "RESIDUAL_MODELS",
     "SKEW_EDGES",
     "TRACTION_RATIO",
+    "PaperClaim",
     "RigTrial",
     "StudyResults",
     "Surface",

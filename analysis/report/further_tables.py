@@ -7,13 +7,13 @@ from analysis.data import LATEST_MS, LEVELS
 from analysis.figures import ReportSection
 from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
 from analysis.report.page_model import ReportTable
+from analysis.report.paper_tables import with_error
 from analysis.study import (
     TITLES,
     PairedComparison,
     Study,
     TerrainResult,
     compare,
-    mean_of,
 )
 from analysis.terrains import KEPT_PER_SECOND
 
@@ -89,7 +89,9 @@ def uncertainty(study: Study) -> ReportTable:
         name="Predicted uncertainty",
         header=("terrain", "model", *_HEADS),
         rows=rows,
-        note="Means over the trials left out. NLPD: negative log predictive density; "
+        note="Means over the trials left out ± their standard error: a share is no "
+        "surer than that, however many samples it counts. "
+        "NLPD: negative log predictive density; "
         "CRPS: continuous ranked probability score; both reward an honest spread, less "
         "is better. A band that holds much less than it promises is too narrow. The "
         "variance is that of a measurement, noise included.",
@@ -236,12 +238,9 @@ _MEASURES: Sequence[tuple[str, str]] = (("mae", "N"), ("nlpd", "log N"))
 
 
 def _cells(result: TerrainResult, model: str) -> list[str]:
-    scores = {key: mean_of(result.scores(model, key)) for key in _SHOWN}
     return [
-        "–"
-        if value is None
-        else f"{value:.1%}"
-        if key.startswith("coverage")
-        else f"{value:.3f}"
-        for key, value in scores.items()
+        with_error(
+            result.scores(model, key), ".1%" if key.startswith("coverage") else ".3f"
+        )
+        for key in _SHOWN
     ]

@@ -37,6 +37,7 @@ from analysis.report.page_model import ReportFigure, ReportTable
 from analysis.report.paper_tables import (
     choices,
     parameters,
+    statements,
     summary,
     table_one,
     velocity_shares,
@@ -266,6 +267,7 @@ def sections(
     tables = [
         summary(study),
         parameters(study),
+        *([statements(results)] if results.claims else []),
         table_one(study),
         *beyond_tables(results),
         velocity_shares(study),

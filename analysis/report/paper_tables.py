@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from acquisition import RATE_HZ
 from analysis.figures import ReportSection
+from analysis.findings import PaperClaim, StudyResults
 from analysis.report.page_model import ReportTable
 from analysis.study import (
     FITTERS,
@@ -13,6 +14,8 @@ from analysis.study import (
     Study,
     TerrainResult,
     flag_counts,
+    mean_of,
+    standard_error,
     tustin_medians,
 )
 from analysis.tustin import (
@@ -122,6 +125,18 @@ def table_one(study: Study) -> ReportTable:
     )
 
 
+def statements(results: StudyResults) -> ReportTable:
+    """Return the paper's statements beside what the study shows."""
+    return ReportTable(
+        name="What the paper says",
+        header=("in", "the paper says", "this study shows", "agrees?"),
+        rows=[_statement_row(claim) for claim in results.claims],
+        note="Errors: mean absolute errors on trials left out. Beyond chance: paired "
+        "over the trials, p below 0.05 for all comparisons of the row together (Holm).",
+        section=ReportSection.PAPER,
+    )
+
+
 def velocity_shares(study: Study) -> ReportTable:
     """Return how the samples of each terrain divide by velocity."""
     rows = []
@@ -197,14 +212,18 @@ def _widths(study: Study) -> list[list[str]]:
     ]
 
 
+def _statement_row(claim: PaperClaim) -> tuple[str, ...]:
+    return claim.place, claim.statement, claim.shown, claim.agreement.value
+
+
 def _summary_row(result: TerrainResult) -> list[str]:
     return [
         result.terrain,
         str(len(result.trials)),
         str(result.kept),
         str(sum(map(len, result.slips))),
-        *(_with_error(result.maes(model)) for model in FITTERS),
-        _with_error([result.constant_mae]),
+        *(with_error(result.maes(model)) for model in FITTERS),
+        with_error([result.constant_mae]),
         f"{result.lifted_share:.1%}",
     ]
 
@@ -249,15 +268,12 @@ def _rates(study: Study) -> str:
     return f"{low:.0f} Hz" if high < 1.01 * low else f"{low:.0f} to {high:.0f} Hz"
 
 
-def _with_error(values: Sequence[float | None]) -> str:
-    present = [value for value in values if value is not None]
-    if not present:
+def with_error(values: Sequence[float | None], form: str = ".3f") -> str:
+    """Return the mean over trials ± its standard error as text."""
+    mean, error = mean_of(values), standard_error(values)
+    if mean is None:
         return "–"
-    mean = sum(present) / len(present)
-    if len(present) < 2:
-        return f"{mean:.3f}"
-    spread = sum((value - mean) ** 2 for value in present) / (len(present) - 1)
-    return f"{mean:.3f} ± {(spread / len(present)) ** 0.5:.3f}"
+    return f"{mean:{form}}" + ("" if error is None else f" ± {error:{form}}")
 
 
 def _number(value: float | None) -> str:

@@ -1,7 +1,13 @@
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
 from .jobs import Store, Workers, available_cores, run_tasks
-from .metrics import PairedComparison, Prediction, compare
+from .metrics import (
+    PairedComparison,
+    Prediction,
+    adjusted_by_holm,
+    compare,
+    standard_error,
+)
 from .models import (
     FITTERS,
     GP_NN,
@@ -49,6 +55,7 @@ __all__ = [
     "TerrainResult",
     "TustinModel",
     "Workers",
+    "adjusted_by_holm",
     "available_cores",
     "compare",
     "flag_counts",
@@ -57,6 +64,7 @@ __all__ = [
     "run_fold",
     "run_study",
     "run_tasks",
+    "standard_error",
     "to_csv",
     "to_fits",
     "to_plain",

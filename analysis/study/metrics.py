@@ -160,6 +160,21 @@ def compare(
     return PairedComparison(mean, error, float(np.mean(is_as_large)), count)
 
 
+def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
+    """Return p values that hold for all comparisons together, in the order given.
+
+    Holm's step-down: the k-th smallest of m is multiplied by m - k + 1 and never falls
+    below a smaller one's. Below 0.05, the chance of a single false one among all m is
+    below 0.05.
+    """
+    order = sorted(range(len(p_values)), key=p_values.__getitem__)
+    adjusted, highest = [0.0] * len(p_values), 0.0
+    for rank, place in enumerate(order):
+        highest = max(highest, min(1.0, (len(p_values) - rank) * p_values[place]))
+        adjusted[place] = highest
+    return adjusted
+
+
 def standard_error(values: Sequence[float | None]) -> float | None:
     """Return the standard error of the mean over trials, None below two of them."""
     present = [value for value in values if value is not None]

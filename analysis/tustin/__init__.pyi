@@ -1,6 +1,6 @@
 from . import model
 from .bootstrap import bootstrap_tustin
-from .identifiability import Interval, Profiles
+from .identifiability import Interval, Profiles, correlation_samples
 from .model import (
     MINIMUM_ROWS,
     NEGATIVE_B,
@@ -11,6 +11,7 @@ from .model import (
     TustinFit,
     TustinForm,
     TustinParameters,
+    bound,
     fit_tustin,
 )
 
@@ -27,6 +28,8 @@ __all__ = [
     "TustinForm",
     "TustinParameters",
     "bootstrap_tustin",
+    "bound",
+    "correlation_samples",
     "fit_tustin",
     "model",
 ]
