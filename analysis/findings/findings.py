@@ -123,6 +123,7 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
             "nlpd_chosen": "log N",
             "trend means, slope, slope_error, spread": TREND_UNITS,
             "residual quantiles, bias, sd": "N",
+            "autocorrelation_samples": "kept samples",
             "F_n": "N",
             "v_t": "m/s",
             "mean": "N",
@@ -217,6 +218,10 @@ def _residuals(band: ResidualBand) -> dict[str, Any]:
         "quantiles": band.quantiles.tolist(),
         "bias": band.bias,
         "sd": band.sd,
+        "samples": band.samples,
+        "neighbour_correlation": band.correlation,
+        "autocorrelation_samples": band.time,
+        "independent_samples": band.independent,
     }
 
 

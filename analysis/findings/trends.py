@@ -17,6 +17,7 @@ from analysis.study import (
     compare,
     mean_of,
 )
+from analysis.tustin import correlation_samples
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}
@@ -112,12 +113,23 @@ class ResidualBand:
         quantiles: 5 %, median and 95 % of the residual [N], shape (3, k).
         bias: mean residual over all samples [N].
         sd: their standard deviation [N].
+        samples: number of residuals.
+        correlation: of residuals one kept sample apart.
+        time: integrated autocorrelation time [kept samples].
     """
 
     v: Array
     quantiles: Array
     bias: float
     sd: float
+    samples: int
+    correlation: float
+    time: float
+
+    @property
+    def independent(self) -> float:
+        """Number of independent samples that the residuals are worth."""
+        return self.samples / self.time
 
 
 def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
@@ -136,6 +148,9 @@ def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
         .T,
         bias=float(residual.mean()),
         sd=float(residual.std()),
+        samples=residual.size,
+        correlation=_neighbours(residual),
+        time=correlation_samples(residual),
     )
 
 
@@ -160,6 +175,13 @@ def explained_share(result: TerrainResult, model: str) -> float | None:
     F_t = SampleTable.of(held_out_trials(result, model)).F_t
     power = float(((F_t - F_t.mean()) ** 2).sum()) if F_t.size else 0.0
     return 1.0 - float((rest**2).sum()) / power if power else None
+
+
+def _neighbours(residual: Array) -> float:
+    """Return the correlation of values (n,) with those one row on; 0 if all agree."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    return float(centred[1:] @ centred[:-1]) / power if power else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from analysis.study import (
     PairedComparison,
     Study,
     TerrainResult,
+    adjusted_by_holm,
     compare,
 )
 from analysis.terrains import KEPT_PER_SECOND
@@ -34,6 +35,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
     study = results.study
     tables = [
         uncertainty(study),
+        independent_samples(results),
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
         lag_table(study),
@@ -99,39 +101,85 @@ def uncertainty(study: Study) -> ReportTable:
     )
 
 
+def independent_samples(results: StudyResults) -> ReportTable:
+    """Return how many independent samples the held-out residuals are worth."""
+    rows = [
+        (
+            name,
+            TITLES[model],
+            str(band.samples),
+            f"{band.correlation:.3f}",
+            f"{band.time:.0f}",
+            f"{band.independent:.0f}",
+        )
+        for name, bands in results.residuals.items()
+        for model, band in bands.items()
+    ]
+    return ReportTable(
+        name="Independent samples",
+        header=(
+            "terrain",
+            "model",
+            "kept samples",
+            "correlation of neighbours",
+            "autocorrelation time [samples]",
+            "independent samples",
+        ),
+        rows=rows,
+        note="Of measured minus predicted force on trials left out. Independent: kept "
+        "samples over the integrated autocorrelation time, summed until the "
+        "correlation falls below 0.05. Standard errors in this report therefore count "
+        "trials, never samples.",
+        section=ReportSection.BEYOND,
+    )
+
+
 def paired_table(study: Study, key: str, unit: str) -> ReportTable:
     """Return every model against the first one, trial by trial."""
     first, *others = study.options.fit.models
-    rows = [
-        [
-            name,
-            *(
-                paired_cell(
-                    compare(result.scores(first, key), result.scores(model, key))
-                )
-                for model in others
-            ),
-        ]
-        for name, result in study.terrains.items()
-        if others and result.models(first)
+    names = [n for n, r in study.terrains.items() if others and r.models(first)]
+    pairs = [
+        compare(study.terrains[n].scores(first, key), study.terrains[n].scores(m, key))
+        for n in names
+        for m in others
     ]
+    cells = paired_cells(pairs)
+    width = len(others)
+    rows = [[n, *cells[k * width : (k + 1) * width]] for k, n in enumerate(names)]
     return ReportTable(
         name=f"{key.upper()} against {TITLES[first]}, trial by trial",
         header=("terrain", *(f"{TITLES[model]} [{unit}]" for model in others)),
         rows=rows,
         note=f"Difference to {TITLES[first]} ± its standard error over the trials; "
         "below zero is better. p: how often chance alone makes a difference as large, "
-        "by all patterns of signs.",
+        f"by all patterns of signs. {_holm_note(pairs)}",
         section=ReportSection.BEYOND,
     )
 
 
-def paired_cell(paired: PairedComparison | None) -> str:
-    """Return a comparison as text."""
+def paired_cells(pairs: Sequence[PairedComparison | None]) -> list[str]:
+    """Return the comparisons of one table as text, p of each and for all together."""
+    adjusted = iter(adjusted_by_holm([pair.p for pair in pairs if pair is not None]))
+    return [
+        paired_cell(pair, None if pair is None else next(adjusted)) for pair in pairs
+    ]
+
+
+def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) -> str:
+    """Return a comparison as text, with p for all comparisons together if given."""
     if paired is None:
         return "–"
     error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
-    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g})"
+    together = "" if adjusted is None else f", Holm {adjusted:.2g}"
+    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g}{together})"
+
+
+def _holm_note(pairs: Sequence[PairedComparison | None]) -> str:
+    count = sum(pair is not None for pair in pairs)
+    return (
+        f"Holm: p adjusted for the {count} comparisons of this table; only below 0.05 "
+        "is a difference more than chance."
+    )
 
 
 def noise_table(results: StudyResults) -> ReportTable:
@@ -142,14 +190,18 @@ def noise_table(results: StudyResults) -> ReportTable:
             ", ".join(f"{name} in {n}" for name, n in s.counts.items() if n),
             f"{s.before:.3f}",
             f"{s.after:.3f}",
-            paired_cell(s.paired),
+            cell,
         ]
-        for s in results.noise
+        for s, cell in zip(
+            results.noise, paired_cells([s.paired for s in results.noise]), strict=True
+        )
     ]
+    pairs = [s.paired for s in results.noise]
     return ReportTable(
         name="Noise chosen",
         header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
         rows=rows,
+        note=_holm_note(pairs),
         section=ReportSection.BEYOND,
     )
 

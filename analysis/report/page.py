@@ -35,7 +35,6 @@ from analysis.findings import (
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import ReportFigure, ReportTable
 from analysis.report.paper_tables import (
-    choices,
     parameters,
     statements,
     summary,
@@ -43,7 +42,7 @@ from analysis.report.paper_tables import (
     velocity_shares,
     verdicts,
 )
-from analysis.report.rig_tables import rig_tables
+from analysis.report.rig_tables import choices, rig_tables
 from analysis.study import (
     Study,
     available_cores,

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 
-from acquisition import RATE_HZ
 from analysis.figures import ReportSection
 from analysis.findings import PaperClaim, StudyResults
 from analysis.report.page_model import ReportTable
@@ -11,6 +10,7 @@ from analysis.study import (
     LIFTED_WARNING,
     TITLES,
     TUSTIN,
+    PooledTustinFit,
     Study,
     TerrainResult,
     flag_counts,
@@ -23,10 +23,14 @@ from analysis.tustin import (
     NEGATIVE_B,
     NO_STRIBECK,
     NOT_IDENTIFIABLE,
+    SYMBOLS,
     UNITS,
+    Interval,
+    TustinBounds,
     TustinParameters,
 )
 
+_DECADE = 10.0  # ratio of a profile's ends that says nothing about the value
 WORTHWHILE = 0.9  # error over the constant's below which a model says something
 
 # Table I of the paper, as printed
@@ -36,7 +40,6 @@ PAPER = {
     "TF": TustinParameters(mu=0.843, F_s=0.534, v_s=0.079, delta_s=420.0, b=7.49),
     "Tf": TustinParameters(mu=0.952, F_s=0.643, v_s=0.225, delta_s=2.60, b=0.023),
 }
-_SYMBOLS = {"mu": "μ", "F_s": "F_s", "v_s": "v_s", "delta_s": "δ_s", "b": "b"}
 
 
 def summary(study: Study) -> ReportTable:
@@ -69,22 +72,18 @@ def parameters(study: Study) -> ReportTable:
         if whole.fit is None:
             rows.append([name, *["–"] * len(UNITS), "no fit"])
             continue
-        cells = []
-        for key in UNITS:
-            cell = f"{getattr(whole.fit.parameters, key):.3g}"
-            if key in whole.intervals:
-                low, high = whole.intervals[key]
-                cell += f" ({low:.3g} to {high:.3g})"
-            cells.append(cell)
+        cells = [_parameter_cell(whole, key, study.options.fit.bounds) for key in UNITS]
         rows.append([name, *cells, "; ".join(whole.fit.flags) or "none"])
-    units = [f"{_SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
+    units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
     return ReportTable(
         name="Tustin parameters of all trials, with 95% intervals",
         header=("terrain", *units, "flags"),
         rows=rows,
         note="Intervals from whole trials drawn with replacement: samples of one trial "
         "repeat each other. A wide interval means that the curve is known, not the "
-        "parameter.",
+        "parameter. ≤ and ≥: the search ended at the edge of its range, so the value "
+        "may lie beyond. Open: the profile of the squared error (95%, counting "
+        "independent samples) reaches an edge or spans more than a factor of ten.",
         section=ReportSection.SUMMARY,
     )
 
@@ -114,7 +113,7 @@ def table_one(study: Study) -> ReportTable:
         if name in PAPER:
             printed = [f"{getattr(PAPER[name], key):g}" for key in UNITS]
             rows.append([name, "paper, Table I", *printed, ""])
-    units = [f"{_SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
+    units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
     return ReportTable(
         name="Table I: Tustin parameters",
         header=("terrain", "source", *units, "flags"),
@@ -158,58 +157,37 @@ def velocity_shares(study: Study) -> ReportTable:
     )
 
 
-def choices(study: Study, *, is_foreign: bool) -> ReportTable:
-    """Return every choice of the analysis."""
-    prepare, fit = study.options.prepare, study.options.fit
-    box = ", ".join(
-        f"{_SYMBOLS[name]} {low:g} to {high:g}"
-        for name, (low, high) in fit.bounds.items()
-    )
-    rows = [
-        *_widths(study),
-        ["window", f"{prepare.slowest:g} ≤ v_t ≤ {prepare.fastest:g} m/s"],
-        ["folds", "one whole trial left out at a time"],
-        ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
-        [
-            "GP fit",
-            f"squared exponential, one length per input, at most {fit.gp_points} "
-            f"samples chosen at random (seed {fit.seed}), marginal likelihood, three "
-            "starts",
-        ],
-        [
-            "noise of the GP",
-            "constant in the five models of Fig. 9; beside them chosen per fold among "
-            "constant, log-linear and Student's t, by trials left out of the training",
-        ],
-        ["across terrains", "the model of fold k tested on trial k, wrapping round"],
-        ["recorded rate", _rates(study)],
-    ]
-    note = "The tables come from elsewhere." if is_foreign else ""
-    return ReportTable("Choices", ("what", "how"), rows, note)
+def _parameter_cell(whole: PooledTustinFit, key: str, bounds: TustinBounds) -> str:
+    """Return a parameter with its interval, and its profile where that is open."""
+    if whole.fit is None:
+        return "–"
+    value, profiles = getattr(whole.fit.parameters, key), whole.fit.profiles
+    cell = bounded_text(bounds, key, value)
+    if key in whole.intervals:
+        cell += f" ({interval_text(bounds, key, whole.intervals[key])})"
+    profile = getattr(profiles, key, None)
+    if isinstance(profile, Interval) and is_open(bounds, key, profile):
+        cell += f"; open: {interval_text(bounds, key, profile)}"
+    return cell
 
 
-def _widths(study: Study) -> list[list[str]]:
-    """Return how samples were smoothed and thinned, in time and in samples."""
-    prepare = study.options.prepare
-    trials = [trial for result in study.terrains.values() for trial in result.trials]
-    used = sorted({trial.widths for trial in trials if not trial.is_prepared})
-    averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
-    thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
-    prepared = sum(trial.is_prepared for trial in trials)
-    rest = f"; {prepared} trials were prepared before" if prepared else ""
-    span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
-    return [
-        [
-            "smoothing",
-            f"centred moving average over {span:g} ms: {averaged or 'no'} samples"
-            + rest,
-        ],
-        [
-            "downsampling",
-            f"a sample every {step:g} ms, after smoothing: one in {thinned or '1'}"
-            + rest,
-        ],
-    ]
+def is_open(bounds: TustinBounds, key: str, profile: Interval) -> bool:
+    """Return whether a profile reaches an edge of the search or spans a decade."""
+    is_at_edge = any(bounds.reached(key, end) for end in profile)
+    return is_at_edge or profile.upper > _DECADE * profile.lower
+
+
+def interval_text(bounds: TustinBounds, key: str, interval: Interval) -> str:
+    """Return an interval as text, its ends on a bound as inequalities."""
+    low, high = (bounded_text(bounds, key, end) for end in interval)
+    return low if low == high else f"{low} to {high}"
+
+
+def bounded_text(bounds: TustinBounds, key: str, value: float) -> str:
+    """Return a parameter as text, one on a bound of the search as an inequality."""
+    side = bounds.reached(key, value)
+    mark = {"lower": "≤ ", "upper": "≥ "}[side] if side else ""
+    return f"{mark}{value:.3g}"
 
 
 def _statement_row(claim: PaperClaim) -> tuple[str, ...]:
@@ -256,16 +234,6 @@ def _flag_legend() -> str:
         "flagged, compare curves, not parameters. v_s is given as its absolute value. "
         f"A fit needs {MINIMUM_ROWS} samples."
     )
-
-
-def _rates(study: Study) -> str:
-    rates = [
-        (trial.smooth.t.size - 1) / float(trial.smooth.t[-1] - trial.smooth.t[0])
-        for result in study.terrains.values()
-        for trial in result.trials
-    ]
-    low, high = min(rates), max(rates)
-    return f"{low:.0f} Hz" if high < 1.01 * low else f"{low:.0f} to {high:.0f} Hz"
 
 
 def with_error(values: Sequence[float | None], form: str = ".3f") -> str:

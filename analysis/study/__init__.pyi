@@ -26,7 +26,7 @@ from .models import (
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
 from .study import LIFTED_WARNING, Study, StudyOptions, run_study
-from .terrain_fit import TerrainResult, mean_of
+from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
 
 __all__ = [
     "FITTERS",
@@ -47,6 +47,7 @@ __all__ = [
     "ModelFitter",
     "ModelFold",
     "PairedComparison",
+    "PooledTustinFit",
     "Prediction",
     "ResultStore",
     "Store",

@@ -11,7 +11,8 @@ from analysis.figures.selection import busiest_window
 from analysis.figures.style import render, styled
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
-from analysis.report.paper_tables import choices, summary, table_one, verdicts
+from analysis.report.paper_tables import summary, table_one, verdicts
+from analysis.report.rig_tables import choices
 from analysis.study.fits import to_fits
 from analysis.study.models import FitOptions
 from analysis.study.store import write_atomic
