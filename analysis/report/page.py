@@ -18,6 +18,7 @@ from analysis.figures import (
     confusion,
     curves,
     errors,
+    excerpts,
     render,
     rig,
     styled,
@@ -53,8 +54,9 @@ from analysis.study import (
     write_atomic,
 )
 
-_FAMILIES = (curves, surfaces, errors, uncertainty, confusion, trials, rig)
+_FAMILIES = (excerpts, curves, surfaces, errors, uncertainty, confusion, trials, rig)
 _PAGE_ORDER = (
+    "fig2_tustin_model",
     "fig4_excerpts",
     "fig5_tustin",
     "fig6_gp",
