@@ -72,7 +72,13 @@ def _draw_model(ax: Axes, result: TerrainResult, window: PrepareOptions) -> None
     curve = fit.mean(np.full(v.shape, load), v)
     is_seen = v >= window.slowest
     ax.plot(v[is_seen], curve[is_seen], color="#0072B2", lw=1.8, label="fitted curve")
-    ax.plot(v[~is_seen], curve[~is_seen], color="#56B4E9", lw=1.0, label="no samples")
+    ax.plot(
+        v[~is_seen],
+        curve[~is_seen],
+        color="#56B4E9",
+        lw=1.0,
+        label="fitted curve, no samples",
+    )
     ax.plot(v, asymptote, "--", color="#D55E00", lw=1.0, label="$\\mu F_n + b\\,v_t$")
     ax.plot([0.0], [static], "o", color="#009E73", ms=4.5, label="$F_s$", clip_on=False)
     if p.v_s <= window.fastest:

@@ -8,6 +8,7 @@ import numpy as np
 from analysis.findings.paper_measures import (
     ClaimResult,
     PaperEvidence,
+    beyond_chance,
     count_significant,
     ends_of,
     graded,
@@ -85,7 +86,7 @@ def _alike(results: Sequence[TerrainResult]) -> ClaimResult | None:
     text = (
         f"Worst of the five over best: at most {gap:+.0%} on a terrain. GP (SE) minus "
         f"Tustin {mean:+.3f} N on average; GP better beyond chance on "
-        f"{count_significant(present, -1)} of {len(present)} terrains, Tustin on "
+        f"{beyond_chance(present, -1, 'terrains')}, Tustin on "
         f"{count_significant(present, 1)}."
     )
     return ClaimResult(
@@ -105,7 +106,7 @@ def kernels_on_stones(evidence: PaperEvidence) -> ClaimResult | None:
     )
     text = (
         f"NN minus SE {mean:+.3f} N on average over the stones; NN better beyond "
-        f"chance on {better} of {len(present)} terrains."
+        f"chance on {beyond_chance(present, -1, 'terrains')}."
     )
     return ClaimResult(text, graded(better > 0), {"NN - SE [N]": mean or 0.0})
 
@@ -206,14 +207,14 @@ def unlike_surfaces(evidence: PaperEvidence) -> ClaimResult | None:
     back = _foreign(evidence.stones, evidence.plates)
     if not forth or not back:
         return None
-    worse = count_significant([pair.paired for pair in (*forth, *back)], 1)
-    count = len(forth) + len(back)
+    every = [pair.paired for pair in (*forth, *back)]
+    worse, count = count_significant(every, 1), len(every)
     ratios = [[pair.ratio for pair in pairs] for pairs in (forth, back)]
     text = (
         "Error over the own model's: plate models on stones "
         f"{ends_of(ratios[0], '.1f')}, stone models on plates "
-        f"{ends_of(ratios[1], '.1f')}; worse beyond chance in {worse} of {count} pairs "
-        "of terrains."
+        f"{ends_of(ratios[1], '.1f')}; worse beyond chance in "
+        f"{beyond_chance(every, 1, 'pairs of terrains')}."
     )
     agreement = graded(worse == count, is_partly=min(ratios[0] + ratios[1]) > 1.0)
     return ClaimResult(text, agreement, {"worse": worse, "pairs": count})
@@ -268,8 +269,8 @@ def noise_by_input(evidence: PaperEvidence) -> ClaimResult | None:
     better, gains = count_significant(pairs, -1), [-pair.difference for pair in pairs]
     text = (
         "Noise chosen among constant and input-dependent gains "
-        f"{ends_of(gains, '+.3f')} in log density; beyond chance on {better} of "
-        f"{len(pairs)} terrains of stones."
+        f"{ends_of(gains, '+.3f')} in log density; beyond chance on "
+        f"{beyond_chance(pairs, -1, 'terrains of stones')}."
     )
     agreement = graded(better > 0, is_partly=min(gains) > 0.0)
     return ClaimResult(text, agreement, {"largest gain": max(gains), "better": better})
@@ -290,8 +291,7 @@ def _alike_on(pairs: Sequence[ForeignError], which: str) -> ClaimResult | None:
     text = (
         f"Error of {which} over the own model's: {mean:.2f} on average "
         f"({ends_of(ratios, '.2f')}), larger beyond chance in "
-        f"{count_significant([pair.paired for pair in pairs], 1)} of {len(pairs)} "
-        "pairs of terrains."
+        f"{beyond_chance([pair.paired for pair in pairs], 1, 'pairs of terrains')}."
     )
     agreement = graded(mean < 1.0 + _SIMILAR, is_partly=min(ratios) < 1.0 + _SIMILAR)
     return ClaimResult(text, agreement, {"mean": mean, "largest": max(ratios)})

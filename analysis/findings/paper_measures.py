@@ -23,6 +23,7 @@ from analysis.study import (
     adjusted_by_holm,
     compare,
     mean_of,
+    smallest_adjusted,
     tustin_medians,
 )
 from analysis.terrains import Identification
@@ -238,6 +239,15 @@ def ends_of(values: Sequence[float], form: str) -> str:
     return low if low == high else f"{low} to {high}"
 
 
+def beyond_chance(pairs: Sequence[PairedComparison], sign: int, unit: str) -> str:
+    """Return how many of the pairs differ beyond chance, and whether they could."""
+    text = f"{count_significant(pairs, sign)} of {len(pairs)} {unit}"
+    if smallest_adjusted(pairs) < SIGNIFICANT:
+        return text
+    trials = min(pair.trials for pair in pairs)
+    return f"{text} ({trials} trials are too few to show it of {len(pairs)})"
+
+
 def count_significant(pairs: Sequence[PairedComparison], sign: int) -> int:
     """Return how many differences of a sign hold for all comparisons together."""
     adjusted = adjusted_by_holm([pair.p for pair in pairs])
@@ -259,7 +269,7 @@ def more_rows_claim(evidence: PaperEvidence) -> ClaimResult | None:
         f"With {max(entry.rows for entry in entries)} rows in the place of {points} "
         "(hyperparameters kept) the error of GP (SE) changes by "
         f"{ends_of([-gain for gain in gains], '+.1%')}; smaller beyond chance on "
-        f"{better} of {len(entries)} terrains."
+        f"{beyond_chance([entry.paired for entry in entries], -1, 'terrains')}."
     )
     agreement = graded(max(gains) < _NOT_HELPING, is_partly=not better)
     return ClaimResult(text, agreement, {"largest gain": max(gains), "better": better})

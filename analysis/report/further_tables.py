@@ -15,6 +15,7 @@ from analysis.study import (
     TerrainResult,
     adjusted_by_holm,
     compare,
+    smallest_adjusted,
 )
 from analysis.terrains import KEPT_PER_SECOND
 
@@ -92,8 +93,7 @@ def uncertainty(study: Study) -> ReportTable:
         header=("terrain", "model", *_HEADS),
         rows=rows,
         note="Means over the trials left out ± their standard error: a share is no "
-        "surer than that, however many samples it counts. "
-        "NLPD: negative log predictive density; "
+        "surer than that, however many samples it counts. NLPD: negative log density; "
         "CRPS: continuous ranked probability score; both reward an honest spread, less "
         "is better. A band that holds much less than it promises is too narrow. The "
         "variance is that of a measurement, noise included.",
@@ -175,10 +175,11 @@ def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) 
 
 
 def _holm_note(pairs: Sequence[PairedComparison | None]) -> str:
-    count = sum(pair is not None for pair in pairs)
+    present = [pair for pair in pairs if pair is not None]
     return (
-        f"Holm: p adjusted for the {count} comparisons of this table; only below 0.05 "
-        "is a difference more than chance."
+        f"Holm: p adjusted for the {len(present)} comparisons of this table; only "
+        "below 0.05 is a difference more than chance. So many comparisons over so few "
+        f"trials cannot go below {smallest_adjusted(present):.2g}."
     )
 
 

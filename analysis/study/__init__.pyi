@@ -6,6 +6,7 @@ from .metrics import (
     Prediction,
     adjusted_by_holm,
     compare,
+    smallest_adjusted,
     standard_error,
 )
 from .models import (
@@ -65,6 +66,7 @@ __all__ = [
     "run_fold",
     "run_study",
     "run_tasks",
+    "smallest_adjusted",
     "standard_error",
     "to_csv",
     "to_fits",

@@ -175,6 +175,16 @@ def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
     return adjusted
 
 
+def smallest_adjusted(pairs: Sequence[PairedComparison]) -> float:
+    """Return the smallest p that Holm's adjustment can give so many comparisons.
+
+    Of n trials the pattern with all signs alike has p = 2/2^n: with ten trials no more
+    than 25 comparisons can show a single one below 0.05.
+    """
+    trials = min((pair.trials for pair in pairs), default=0)
+    return min(1.0, len(pairs) * 2.0 ** (1 - trials))
+
+
 def standard_error(values: Sequence[float | None]) -> float | None:
     """Return the standard error of the mean over trials, None below two of them."""
     present = [value for value in values if value is not None]

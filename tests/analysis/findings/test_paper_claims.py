@@ -13,11 +13,12 @@ from analysis.findings.paper_measures import (
     MoreRows,
     PaperEvidence,
     StickingBound,
+    beyond_chance,
     gather_evidence,
 )
 from analysis.report.paper_tables import statements
 from analysis.study.fits import to_plain
-from analysis.study.metrics import PairedComparison, adjusted_by_holm
+from analysis.study.metrics import PairedComparison, adjusted_by_holm, smallest_adjusted
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -38,6 +39,17 @@ def test_holms_p_values_are_those_of_the_step_down():
     assert adjusted == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert adjusted_by_holm([0.4, 0.9]) == pytest.approx([0.8, 0.9])
     assert adjusted_by_holm([0.7, 0.6]) == pytest.approx([1.0, 1.0])
+
+
+def test_ten_trials_cannot_tell_more_than_25_comparisons_apart():
+    pairs = [PairedComparison(-0.1, 0.01, 2 / 1024, 10)] * 26
+    assert smallest_adjusted(pairs[:25]) < 0.05 < smallest_adjusted(pairs)
+    assert smallest_adjusted(pairs) == pytest.approx(
+        adjusted_by_holm([pair.p for pair in pairs])[0]
+    )
+    assert beyond_chance(pairs[:25], -1, "terrains") == "25 of 25 terrains"
+    assert beyond_chance(pairs[:25], 1, "terrains") == "0 of 25 terrains"
+    assert "10 trials are too few" in beyond_chance(pairs, -1, "terrains")
 
 
 def test_the_bound_is_counted_over_the_samples_that_stick(evidence, small_study):
