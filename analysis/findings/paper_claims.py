@@ -274,7 +274,7 @@ _STATEMENTS: Sequence[_Statement] = (
     ),
     _Statement(
         "IV-D, Fig. 10",
-        "Models of plates are significantly worse on stones, and vice versa.",
+        "In general plate models are significantly worse on stones, and vice versa.",
         "stones and plates",
         model_claims.unlike_surfaces,
     ),

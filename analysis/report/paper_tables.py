@@ -99,14 +99,17 @@ def verdicts(study: Study) -> list[str]:
 
 def table_one(study: Study) -> ReportTable:
     """Return Table I: median Tustin parameters, the paper's own row beside ours."""
-    rows = []
+    rows, bounds = [], study.options.fit.bounds
     for name, result in study.terrains.items():
         medians = tustin_medians(result)
         rows.append(
             [
                 name,
                 "this study",
-                *(_number(medians[key]) for key in UNITS),
+                *(
+                    "–" if (v := medians[key]) is None else bounded_text(bounds, key, v)
+                    for key in UNITS
+                ),
                 "; ".join(flag_counts(result, TUSTIN)) or "none",
             ]
         )
@@ -119,7 +122,8 @@ def table_one(study: Study) -> ReportTable:
         header=("terrain", "source", *units, "flags"),
         rows=rows,
         note="Medians over the folds, parameter by parameter, so a row is not one "
-        "coherent fit; all predictions come from the coherent fits. " + _flag_legend(),
+        "coherent fit (≤, ≥: on a bound of the search); all predictions come from the "
+        "coherent fits. " + _flag_legend(),
         section=ReportSection.PAPER,
     )
 
@@ -242,10 +246,6 @@ def with_error(values: Sequence[float | None], form: str = ".3f") -> str:
     if mean is None:
         return "–"
     return f"{mean:{form}}" + ("" if error is None else f" ± {error:{form}}")
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"
 
 
 def _percent(value: float | None) -> str:

@@ -238,6 +238,14 @@ def test_the_papers_own_row_stands_beside_ours(small_study):
     assert ("B0", "this study") in rows
 
 
+def test_a_median_on_a_bound_of_the_search_is_an_inequality(small_study):
+    bounds = small_study.options.fit.bounds
+    for row in table_one(small_study).rows:
+        if row[1] == "this study" and row[4].endswith(f"{bounds.v_s[0]:g}"):
+            assert row[4] == f"≤ {bounds.v_s[0]:g}"
+    assert any("≤" in cell for row in table_one(small_study).rows for cell in row[2:7])
+
+
 def test_a_model_that_says_nothing_is_called_so(make_series, moving):
     rng = np.random.default_rng(0)
     trials = [make_series(moving, terrain="noise", seed=k) for k in range(3)]
