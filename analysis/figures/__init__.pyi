@@ -1,5 +1,5 @@
 # pyright: reportUnknownVariableType=false
-from . import confusion, curves, errors, rig, surfaces, trials, uncertainty
+from . import confusion, curves, errors, excerpts, rig, surfaces, trials, uncertainty
 from .sections import ReportSection
 from .spec import FigureSpec
 from .style import Picture, render, styled
@@ -11,6 +11,7 @@ __all__ = [
     "confusion",
     "curves",
     "errors",
+    "excerpts",
     "render",
     "rig",
     "styled",

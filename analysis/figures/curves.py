@@ -1,4 +1,4 @@
-"""Figures 4 to 6: force and velocity over time, and the models over velocity.
+"""Figures 2, 5 and 6: the models over velocity.
 
 All panels of a figure share their axes, so that terrains can be compared by eye.
 """
@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from analysis.data import PrepareOptions, SampleTable
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import (
     Panel,
-    TimeWindow,
     force_range,
     panels,
-    time_windows,
+    representatives,
 )
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -22,35 +22,75 @@ from analysis.figures.style import (
     SPEED_LABEL,
     Axes,
     Figure,
-    new_figure,
     panel_grid,
     plain,
 )
 from analysis.findings import StudyResults
-from analysis.study import GP_SE, TUSTIN
+from analysis.study import GP_SE, TUSTIN, TerrainResult
 
 
-def draw_excerpts(results: StudyResults) -> Figure | None:
-    """Return Fig. 4: F_t and v_t over time, slips marked, one excerpt per kind."""
-    chosen = time_windows(results.study)
+def draw_tustin_model(results: StudyResults) -> Figure | None:
+    """Return Fig. 2: the fitted curve of one terrain per kind, its parameters named."""
+    chosen = [r for r in representatives(results.study) if r.whole.fit is not None]
     if not chosen:
         return None
-    figure = new_figure(3.6)
-    axes = figure.subplots(2, len(chosen), sharex=True, sharey="row", squeeze=False)
-    for column, window in enumerate(chosen):
-        _draw_window(axes[0, column], axes[1, column], window)
-    axes[0, 0].set_ylabel(FORCE_LABEL)
-    axes[1, 0].set_ylabel("velocity $v_t$ [m/s]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    if handles:
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    figure, axes = panel_grid(len(chosen), 2.3)
+    for ax, result in zip(axes, chosen, strict=True):
+        _draw_model(ax, result, results.study.options.prepare)
+        ax.set_title(plain(result.title), loc="left")
+    axes[0].set_ylim(bottom=min(0.0, axes[0].get_ylim()[0]))
+    figure.supxlabel(SPEED_LABEL, fontsize=8)
+    figure.supylabel(FORCE_LABEL, fontsize=8)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
 
 
-def caption_excerpts(results: StudyResults) -> str:
-    """State slips and forces of the stretches in Fig. 4."""
-    parts = [_describe_window(window) for window in time_windows(results.study)]
-    return "Smoothed record at the full rate. " + " ".join(parts)
+def caption_tustin_model(results: StudyResults) -> str:
+    """State the fits that are drawn."""
+    values = [
+        f"{result.terrain}: {'; '.join(fit.flags) or 'no flag'}"
+        for result in representatives(results.study)
+        if (fit := result.whole.fit) is not None
+    ]
+    return (
+        "Eq. (1) with the fit of all trials at the median F_n, from standstill to the "
+        "end of the window; thin below the window, where there are no "
+        "samples. F_s at standstill; the asymptote μF_n + b v_t; v_s where "
+        f"the Stribeck term has fallen to 1/e. Flags of the fits - {'. '.join(values)}."
+    )
+
+
+def _draw_model(ax: Axes, result: TerrainResult, window: PrepareOptions) -> None:
+    fit = result.whole.fit
+    if fit is None:
+        return
+    p, load = fit.parameters, float(np.median(SampleTable.of(result.trials).F_n))
+    v = np.concatenate([[0.0], np.geomspace(1e-5, window.fastest, 400)])
+    asymptote = p.mu * load + p.b * v
+    static = p.F_s * load if fit.form.is_proportional else p.F_s
+    curve = fit.mean(np.full(v.shape, load), v)
+    is_seen = v >= window.slowest
+    ax.plot(v[is_seen], curve[is_seen], color="#0072B2", lw=1.8, label="fitted curve")
+    ax.plot(
+        v[~is_seen],
+        curve[~is_seen],
+        color="#56B4E9",
+        lw=1.0,
+        label="fitted curve, no samples",
+    )
+    ax.plot(v, asymptote, "--", color="#D55E00", lw=1.0, label="$\\mu F_n + b\\,v_t$")
+    ax.plot([0.0], [static], "o", color="#009E73", ms=4.5, label="$F_s$", clip_on=False)
+    if p.v_s <= window.fastest:
+        ax.axvline(p.v_s, color="#808080", lw=0.9, ls=":", label="$v_s$")
+    ax.axhline(0.0, color="#808080", lw=0.6)
+    text = (
+        f"$\\mu$ = {p.mu:.3g}\n$F_s$ = {p.F_s:.3g} N\n$v_s$ = {p.v_s:.3g} m/s\n"
+        f"$\\delta_s$ = {p.delta_s:.3g}\n$b$ = {p.b:.3g} kg/s\n$F_n$ = {load:.3g} N"
+    )
+    ax.text(
+        0.97, 0.97, text, transform=ax.transAxes, ha="right", va="top", fontsize=6.5
+    )
 
 
 def draw_tustin(results: StudyResults) -> Figure | None:
@@ -81,32 +121,23 @@ def caption_gp(results: StudyResults) -> str:
     return (
         "First fold of each terrain. The band of two standard deviations, noise "
         f"included, reaches {', '.join(values)} to either side of the mean."
+        + _bands_below_zero(panels(results.study, GP_SE))
     )
 
 
-def _draw_window(above: Axes, below: Axes, window: TimeWindow) -> None:
-    for k, slip in enumerate(window.slips):
-        for ax in (above, below):
-            ax.axvspan(
-                slip.onset,
-                slip.end,
-                color="#F0E442",
-                alpha=0.55,
-                lw=0,
-                label="slip" if k == 0 else None,
-            )
-            if slip.has_bounce:
-                ax.axvline(slip.end, color="#CC79A7", lw=1.0, ls=":")
-    bounced = [slip.end for slip in window.slips if slip.has_bounce]
-    if bounced:
-        above.axvline(
-            bounced[0], color="#CC79A7", lw=1.0, ls=":", label="bounce-back follows"
-        )
-    above.plot(window.t, window.F_t, color="#0072B2", lw=0.9)
-    below.plot(window.t, window.v_t, color="#D55E00", lw=0.9)
-    below.axhline(0.0, color="#808080", lw=0.6)
-    below.set_xlabel("time [s]")
-    above.set_title(f"{plain(window.title)}, trial {window.trial}", loc="left")
+def _bands_below_zero(chosen: Sequence[Panel]) -> str:
+    """Return which bands go below zero, and how many samples do; empty for none."""
+    parts = [
+        f"{panel.terrain} ({float(np.mean(panel.data.F_t < 0.0)):.1%} of the samples)"
+        for panel in chosen
+        if float((panel.means[1] - 2 * panel.sds[1]).min()) < 0.0
+    ]
+    if not parts:
+        return ""
+    return (
+        " A normal band is symmetric and does not know that traction is rarely "
+        f"negative: it goes below zero (dotted line) on {', '.join(parts)}."
+    )
 
 
 def _draw_panels(
@@ -151,6 +182,7 @@ def _draw_curves(ax: Axes, panel: Panel) -> None:
 
 def _draw_band(ax: Axes, panel: Panel) -> None:
     mean, sd = panel.means[1], panel.sds[1]
+    ax.axhline(0.0, color="black", lw=0.7, ls=":")
     ax.plot(
         panel.data.v_t,
         panel.data.F_t,
@@ -191,25 +223,6 @@ def _note_loads(ax: Axes, panel: Panel) -> None:
     )
 
 
-def _describe_window(window: TimeWindow) -> str:
-    where = f"{window.terrain}, trial {window.trial}"
-    slips = window.slips
-    if not slips:
-        low, middle, high = np.quantile(window.F_t, (0.05, 0.5, 0.95))
-        return (
-            f"{where}: no slip; F_t near {middle:.1f} N, nine tenths of it between "
-            f"{low:.1f} and {high:.1f} N."
-        )
-    peak = np.median([slip.peak for slip in slips])
-    floor = np.median([slip.floor for slip in slips])
-    bounced = sum(slip.has_bounce for slip in slips)
-    return (
-        f"{where}: {_count(len(slips), 'slip')}, F_t falling from {peak:.1f} N before "
-        f"to {floor:.1f} N during one (medians); the foot is thrown back after "
-        f"{bounced}."
-    )
-
-
 def _describe_curve(panel: Panel) -> str:
     start, end = panel.means[1][[0, -1]]
     return (
@@ -225,18 +238,14 @@ def _one_per_kind(chosen: Sequence[Panel]) -> list[Panel]:
     return list(first.values())
 
 
-def _count(number: int, thing: str) -> str:
-    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
-
-
 FIGURES = (
     FigureSpec(
-        "fig4_excerpts",
-        "Fig. 4 Traction force and velocity over time",
-        "Traction force above and velocity below over a few seconds of one trial per "
-        "class of terrain; slips are shaded.",
-        draw_excerpts,
-        caption_excerpts,
+        "fig2_tustin_model",
+        "Fig. 2 The Tustin model with its fitted parameters",
+        "The fitted Tustin curve over slip velocity with its asymptote, the static "
+        "force and the Stribeck velocity, one panel per class of terrain.",
+        draw_tustin_model,
+        caption_tustin_model,
         ReportSection.PAPER,
     ),
     FigureSpec(

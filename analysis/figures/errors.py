@@ -104,13 +104,15 @@ def draw_cross_bars(results: StudyResults) -> Figure | None:
     tested = list(study.terrains)
     colours = terrain_colours(study.kinds)
     for ax, model in zip(axes[:, 0], FITTERS, strict=True):
-        cross = study.cross(model)
+        cross, spread = study.cross(model), study.cross_errors(model)
         width = 0.84 / max(len(cross), 1)
         for k, (terrain, errors) in enumerate(cross.items()):
             ax.bar(
                 np.arange(len(tested)) + (k - (len(cross) - 1) / 2) * width,
                 [errors[name] or 0.0 for name in tested],
                 width,
+                yerr=[spread[terrain][name] or 0.0 for name in tested],
+                error_kw={"elinewidth": 0.6, "capsize": 1.0},
                 color=colours[terrain],
                 edgecolor="white",
                 linewidth=0.4,
@@ -143,8 +145,9 @@ def caption_cross(results: StudyResults) -> str:
         for model in FITTERS
         if study.cross(model)
     ]
-    return "Error of a foreign model over that of the terrain's own. " + " ".join(
-        values
+    return (
+        "Whiskers are standard errors over the trials tested. Error of a foreign model "
+        f"over that of the terrain's own. {' '.join(values)}"
     )
 
 

@@ -14,6 +14,7 @@ LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn
 _MOST_POINTS = 1500  # drawn per panel
 _CURVE_POINTS = 120
 _STEP = 0.1  # s between the windows compared
+_ENOUGH_BOUNCES = 2
 _BEFORE, _AFTER = 0.3, 0.6  # s around a slip that a window should hold
 
 
@@ -86,7 +87,10 @@ def time_windows(study: Study) -> list[TimeWindow]:
 
 
 def busiest_window(result: TerrainResult) -> TimeWindow:
-    """Return the stretch with the most slips and bounces, else with the most motion."""
+    """Return the stretch that shows most: bounce-backs, then slips, then motion.
+
+    Two bounce-backs are enough, as in the paper's figure.
+    """
     candidates = [
         (_events_and_motion(trial.smooth, slips, start), k, start)
         for k, (trial, slips) in enumerate(
@@ -140,11 +144,12 @@ def _is_inside(slip: Slip, start: float) -> bool:
 
 def _events_and_motion(
     smooth: Smoothed, slips: Sequence[Slip], start: float
-) -> tuple[float, float]:
+) -> tuple[int, int, float]:
     inside = [slip for slip in slips if _is_inside(slip, start)]
     rows = slice(*np.searchsorted(smooth.t, [start, start + WINDOW]))
     moving = float(np.mean(smooth.v_t[rows] > 0)) if rows.stop > rows.start else 0.0
-    return len(inside) + 0.5 * sum(slip.has_bounce for slip in inside), moving
+    bounced = sum(slip.has_bounce for slip in inside)
+    return min(bounced, _ENOUGH_BOUNCES), len(inside), moving
 
 
 def _panel(result: TerrainResult, model: str) -> Panel:

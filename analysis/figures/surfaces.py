@@ -6,6 +6,7 @@ All panels share their axes and their colours.
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.data import Array
 from analysis.figures.sections import ReportSection
@@ -26,6 +27,7 @@ _MOST_DIGITS = 15
 _LEVELS = 14  # contours
 _MOST_DOTS = 400  # samples shown per panel
 _ROW = 1.75  # inches
+_VEIL = 0.65  # opacity over what no sample supports
 _MAP = "cividis"  # the same to every kind of colour sight
 
 
@@ -46,8 +48,20 @@ def caption_mean(results: StudyResults) -> str:
         for surface in _representative(results)
     ]
     return (
-        "First fold of each terrain, the same colours everywhere; dots are samples, "
-        f"away from them the process falls back to its mean. {'; '.join(values)}."
+        "First fold of each terrain, the same colours everywhere; dots are samples. "
+        "Faded: no sample within a cell of the coverage map, the process falls back to "
+        f"its mean there. {'; '.join(values)}.{_below_zero(results)}"
+    )
+
+
+def _below_zero(results: StudyResults) -> str:
+    """Return where the mean is negative, though traction is not; empty for nowhere."""
+    lowest = [s.terrain for s in results.surfaces if float(s.mean.min()) < 0.0]
+    if not lowest:
+        return ""
+    return (
+        f" The mean falls below zero on {', '.join(lowest)}: nothing in the process "
+        "keeps a force from being negative."
     )
 
 
@@ -70,7 +84,8 @@ def caption_variance(results: StudyResults) -> str:
         for surface in _representative(results)
     ]
     return (
-        "Variance of a measurement, noise included; logarithmic colours. Medians over "
+        "Variance of a measurement, noise included; logarithmic colours, faded where "
+        "no sample is near. Medians over "
         f"the map: {'; '.join(values)}."
     )
 
@@ -127,6 +142,7 @@ def _draw(
         ax.contourf(
             results.axes.v_t, results.axes.F_n, value, levels, cmap=_MAP, norm=norm
         )
+        _fade(ax, results, surface.terrain)
         _dot(ax, surface)
         ax.set_title(plain(results.study.terrains[surface.terrain].title), loc="left")
         ax.grid(visible=False)
@@ -140,6 +156,32 @@ def _draw(
     bar.ax.minorticks_off()
     bar.ax.set_yticks(ticks, distinct_labels(ticks.tolist()))
     return figure
+
+
+def _fade(ax: Axes, results: StudyResults, terrain: str) -> None:
+    """Cover what lies farther than a cell from every sample with a veil of white."""
+    cells = next(c for c in results.coverage if c.terrain == terrain)
+    veil = np.ma.masked_where(near_samples(cells.counts), np.ones(cells.counts.shape))
+    ax.pcolormesh(
+        results.edges.v_t,
+        results.edges.F_n,
+        veil,
+        cmap="binary_r",
+        vmin=0.0,
+        vmax=1.0,
+        alpha=_VEIL,
+        lw=0,
+    )
+
+
+def near_samples(counts: Array) -> NDArray[np.bool_]:
+    """Return which cells hold a sample or touch one that does, shape of `counts`."""
+    rows, columns = counts.shape
+    padded = np.pad(counts > 0, 1)
+    shifted = [
+        padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)
+    ]
+    return np.logical_or.reduce(shifted)
 
 
 def _dot(ax: Axes, surface: Surface) -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from analysis.data import Array, Smoothed
+from analysis.figures.excerpts import shade_slip
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
@@ -118,10 +119,7 @@ def draw_stick_slip(results: StudyResults) -> Figure | None:
         smooth, way = result.trials[number].smooth, way_of(result.trials[number].smooth)
         for k, slip in enumerate(result.slips[number]):
             start, stop = np.interp((slip.onset, slip.end), smooth.t, way)
-            label = "slip" if k == 0 else None
-            ax.axvspan(
-                1e3 * start, 1e3 * stop, color="#F0E442", alpha=0.55, lw=0, label=label
-            )
+            shade_slip(ax, 1e3 * start, 1e3 * stop, is_named=k == 0)
         ax.plot(1e3 * way, smooth.F_t, color="#0072B2", lw=0.8)
         ax.set_title(f"{plain(result.title)}, trial {number + 1}", loc="left")
     handles, labels = axes[0, 0].get_legend_handles_labels()

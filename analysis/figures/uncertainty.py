@@ -15,7 +15,7 @@ from analysis.figures.style import (
     plain,
 )
 from analysis.findings import RESIDUAL_MODELS, StudyResults
-from analysis.study import GP_SE, TITLES, TerrainResult, mean_of
+from analysis.study import GP_SE, TITLES, TerrainResult, mean_of, standard_error
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 _FIRST, _SECOND = "#0072B2", "#D55E00"
@@ -37,12 +37,14 @@ def draw_calibration(results: StudyResults) -> Figure | None:
         ax.axhline(nominal, color="black", lw=1.0, ls=(0, (4, 2)))
         for k, model in enumerate(models):
             place = np.arange(len(terrains)) + (k - (len(models) - 1) / 2) * width
-            ax.plot(
+            ax.errorbar(
                 place,
                 [coverage_of(result, model, key) for result in terrains],
-                MODEL_MARKERS[k % len(MODEL_MARKERS)],
+                yerr=[standard_error(r.scores(model, key)) or 0.0 for r in terrains],
+                fmt=MODEL_MARKERS[k % len(MODEL_MARKERS)],
                 color=MODEL_COLOURS[k % len(MODEL_COLOURS)],
                 ms=4.5,
+                elinewidth=0.7,
                 label=TITLES[model],
             )
         ax.set_ylabel(f"inside {nominal:.0%} band")
@@ -75,7 +77,8 @@ def caption_calibration(results: StudyResults) -> str:
         )
     return (
         "Share of held-out samples inside the central band, mean over trials; dashed: "
-        f"what the band promises. {'; '.join(parts)}."
+        "what the band promises; whiskers: standard error over trials. "
+        f"{'; '.join(parts)}."
     )
 
 

@@ -6,6 +6,7 @@ from .findings import (
     plain_findings,
 )
 from .force_uncertainty import ForceUncertainty, uncertainties_of, uncertainty_of
+from .paper_claims import PaperClaim
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
@@ -18,6 +19,7 @@ __all__ = [
     "SKEW_EDGES",
     "TRACTION_RATIO",
     "ForceUncertainty",
+    "PaperClaim",
     "RigTrial",
     "StudyResults",
     "Surface",

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from analysis.data import LEVELS
+from analysis.findings.paper_claims import PaperClaim, paper_claims
+from analysis.findings.paper_measures import gather_evidence
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
 from analysis.findings.surfaces import (
     CoverageMap,
@@ -47,6 +49,7 @@ class StudyResults:
         edges: of the cells of `coverage`.
         coverage: of velocity and load by the samples.
         rig: health of the rig by trial; empty for tables from elsewhere.
+        claims: the paper's statements; empty for one terrain.
     """
 
     study: Study
@@ -59,6 +62,7 @@ class StudyResults:
     edges: SurfaceAxes
     coverage: Sequence[CoverageMap]
     rig: Sequence[RigTrial]
+    claims: Sequence[PaperClaim]
 
 
 def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
@@ -71,10 +75,11 @@ def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
 
 def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
     results, axes, edges = study.terrains, surface_axes(study), cell_edges(study)
+    identification, noise = identify_study(study), noise_summaries(study)
     return StudyResults(
         study=study,
-        identification=identify_study(study),
-        noise=noise_summaries(study),
+        identification=identification,
+        noise=noise,
         trends={name: trends_of(result) for name, result in results.items()},
         residuals={
             name: {
@@ -89,6 +94,7 @@ def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
         edges=edges,
         coverage=coverages(study, edges),
         rig=rig,
+        claims=paper_claims(gather_evidence(study, identification, noise)),
     )
 
 
@@ -111,11 +117,13 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         "surfaces": _surfaces(results),
         "coverage": _coverage(results),
         "rig": [trial.numbers() for trial in results.rig],
+        "paper": [_claim(claim) for claim in results.claims],
         "units": {
             "nlpd_constant": "log N",
             "nlpd_chosen": "log N",
             "trend means, slope, slope_error, spread": TREND_UNITS,
             "residual quantiles, bias, sd": "N",
+            "autocorrelation_samples": "kept samples",
             "F_n": "N",
             "v_t": "m/s",
             "mean": "N",
@@ -185,6 +193,16 @@ def _rig_rows(
     ]
 
 
+def _claim(claim: PaperClaim) -> dict[str, Any]:
+    return {
+        "place": claim.place,
+        "statement": claim.statement,
+        "shown": claim.shown,
+        "agrees": claim.agreement.value,
+        "numbers": dict(claim.numbers),
+    }
+
+
 def _noise(summary: NoiseSummary) -> dict[str, Any]:
     return {
         "folds": summary.counts,
@@ -200,6 +218,10 @@ def _residuals(band: ResidualBand) -> dict[str, Any]:
         "quantiles": band.quantiles.tolist(),
         "bias": band.bias,
         "sd": band.sd,
+        "samples": band.samples,
+        "neighbour_correlation": band.correlation,
+        "autocorrelation_samples": band.time,
+        "independent_samples": band.independent,
     }
 
 

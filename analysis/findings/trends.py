@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
+from analysis.data import Array, PreparedTrial, SampleTable
 from analysis.study import (
     GP_SE,
     GP_SE_NOISE,
@@ -17,6 +17,7 @@ from analysis.study import (
     compare,
     mean_of,
 )
+from analysis.tustin import correlation_samples
 
 MEAN_FORCE, TRACTION_RATIO, MEAN_LOAD = "F_t", "F_t/F_n", "F_n"
 TREND_UNITS = {MEAN_FORCE: "N", TRACTION_RATIO: "1", MEAN_LOAD: "N"}
@@ -112,25 +113,31 @@ class ResidualBand:
         quantiles: 5 %, median and 95 % of the residual [N], shape (3, k).
         bias: mean residual over all samples [N].
         sd: their standard deviation [N].
+        samples: number of residuals.
+        correlation: of residuals one kept sample apart.
+        time: integrated autocorrelation time [kept samples].
     """
 
     v: Array
     quantiles: Array
     bias: float
     sd: float
+    samples: int
+    correlation: float
+    time: float
+
+    @property
+    def independent(self) -> float:
+        """Number of independent samples that the residuals are worth."""
+        return self.samples / self.time
 
 
 def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
     """Return the held-out residuals of a model; None without a fold that has it."""
-    pairs = [
-        (trial.v_t, trial.F_t - fold.models[model].model.mean(trial.F_n, trial.v_t))
-        for fold in result.folds
-        if model in fold.models
-        for trial in (result.trials[fold.fold],)
-    ]
-    if not pairs:
+    residual = held_out_residual(result, model)
+    if residual.size == 0:
         return None
-    v, residual = (np.concatenate(column) for column in zip(*pairs, strict=True))
+    v = SampleTable.of(held_out_trials(result, model)).v_t
     edges = np.linspace(v.min(), v.max(), _BINS + 1)
     place = np.clip(np.searchsorted(edges, v, "right") - 1, 0, _BINS - 1)
     full = [k for k in range(_BINS) if np.count_nonzero(place == k) >= _FEWEST]
@@ -141,7 +148,40 @@ def residual_band(result: TerrainResult, model: str) -> ResidualBand | None:
         .T,
         bias=float(residual.mean()),
         sd=float(residual.std()),
+        samples=residual.size,
+        correlation=_neighbours(residual),
+        time=correlation_samples(residual),
     )
+
+
+def held_out_trials(result: TerrainResult, model: str) -> list[PreparedTrial]:
+    """Return the trials that a fold of the model was tested on, in its order."""
+    return [result.trials[fold.fold] for fold in result.folds if model in fold.models]
+
+
+def held_out_residual(result: TerrainResult, model: str) -> Array:
+    """Return measured minus predicted F_t [N] of all trials left out, shape (n,)."""
+    trials, folds = held_out_trials(result, model), result.models(model)
+    rests = [
+        trial.F_t - fold.model.mean(trial.F_n, trial.v_t)
+        for trial, fold in zip(trials, folds, strict=True)
+    ]
+    return np.concatenate([np.zeros(0), *rests])
+
+
+def explained_share(result: TerrainResult, model: str) -> float | None:
+    """Return R^2 on trials left out: the share of F_t's variance that is predicted."""
+    rest = held_out_residual(result, model)
+    F_t = SampleTable.of(held_out_trials(result, model)).F_t
+    power = float(((F_t - F_t.mean()) ** 2).sum()) if F_t.size else 0.0
+    return 1.0 - float((rest**2).sum()) / power if power else None
+
+
+def _neighbours(residual: Array) -> float:
+    """Return the correlation of values (n,) with those one row on; 0 if all agree."""
+    centred = residual - residual.mean()
+    power = float(centred @ centred)
+    return float(centred[1:] @ centred[:-1]) / power if power else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 Equations 6 and 7 of the traction paper.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -63,6 +63,25 @@ class GaussianProcess:
             for i in range(0, Z.shape[0], _BLOCK)
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
+
+    def given(self, inputs: Array, y: Array) -> "GaussianProcess":
+        """Return the process with these hyperparameters, given other training rows.
+
+        Standardisation and offset stay those of the rows it was fitted to.
+
+        Args:
+            inputs: training inputs in their units, shape (n, d).
+            y: training outputs, shape (n,).
+        """
+        theta, theta_noise = split(self.kernel, self.theta)
+        X, r = (inputs - self.centre) / self.scale, y - self.offset
+        S = self.noise.variance(theta_noise, X)
+        factor = factorise(self.kernel.matrix(theta, X, X), S)
+        alpha = factor.solve(r)
+        spread = float(np.log(np.diagonal(factor.L)).sum())
+        prior = self.noise.log_prior(theta_noise)[0]
+        lml = prior - 0.5 * float(r @ alpha + r.size * np.log(2.0 * np.pi)) - spread
+        return replace(self, X=X, alpha=alpha, lml=lml, jitter=factor.jitter)
 
     def predict(
         self, inputs: Array, *, include_noise: bool = True

@@ -7,13 +7,15 @@ from analysis.data import LATEST_MS, LEVELS
 from analysis.figures import ReportSection
 from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
 from analysis.report.page_model import ReportTable
+from analysis.report.paper_tables import with_error
 from analysis.study import (
     TITLES,
     PairedComparison,
     Study,
     TerrainResult,
+    adjusted_by_holm,
     compare,
-    mean_of,
+    smallest_adjusted,
 )
 from analysis.terrains import KEPT_PER_SECOND
 
@@ -34,6 +36,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
     study = results.study
     tables = [
         uncertainty(study),
+        independent_samples(results),
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
         lag_table(study),
@@ -89,7 +92,8 @@ def uncertainty(study: Study) -> ReportTable:
         name="Predicted uncertainty",
         header=("terrain", "model", *_HEADS),
         rows=rows,
-        note="Means over the trials left out. NLPD: negative log predictive density; "
+        note="Means over the trials left out ± their standard error: a share is no "
+        "surer than that, however many samples it counts. NLPD: negative log density; "
         "CRPS: continuous ranked probability score; both reward an honest spread, less "
         "is better. A band that holds much less than it promises is too narrow. The "
         "variance is that of a measurement, noise included.",
@@ -97,39 +101,86 @@ def uncertainty(study: Study) -> ReportTable:
     )
 
 
+def independent_samples(results: StudyResults) -> ReportTable:
+    """Return how many independent samples the held-out residuals are worth."""
+    rows = [
+        (
+            name,
+            TITLES[model],
+            str(band.samples),
+            f"{band.correlation:.3f}",
+            f"{band.time:.0f}",
+            f"{band.independent:.0f}",
+        )
+        for name, bands in results.residuals.items()
+        for model, band in bands.items()
+    ]
+    return ReportTable(
+        name="Independent samples",
+        header=(
+            "terrain",
+            "model",
+            "kept samples",
+            "correlation of neighbours",
+            "autocorrelation time [samples]",
+            "independent samples",
+        ),
+        rows=rows,
+        note="Of measured minus predicted force on trials left out. Independent: kept "
+        "samples over the integrated autocorrelation time, summed until the "
+        "correlation falls below 0.05. Standard errors in this report therefore count "
+        "trials, never samples.",
+        section=ReportSection.BEYOND,
+    )
+
+
 def paired_table(study: Study, key: str, unit: str) -> ReportTable:
     """Return every model against the first one, trial by trial."""
     first, *others = study.options.fit.models
-    rows = [
-        [
-            name,
-            *(
-                paired_cell(
-                    compare(result.scores(first, key), result.scores(model, key))
-                )
-                for model in others
-            ),
-        ]
-        for name, result in study.terrains.items()
-        if others and result.models(first)
+    names = [n for n, r in study.terrains.items() if others and r.models(first)]
+    pairs = [
+        compare(study.terrains[n].scores(first, key), study.terrains[n].scores(m, key))
+        for n in names
+        for m in others
     ]
+    cells = paired_cells(pairs)
+    width = len(others)
+    rows = [[n, *cells[k * width : (k + 1) * width]] for k, n in enumerate(names)]
     return ReportTable(
         name=f"{key.upper()} against {TITLES[first]}, trial by trial",
         header=("terrain", *(f"{TITLES[model]} [{unit}]" for model in others)),
         rows=rows,
         note=f"Difference to {TITLES[first]} ± its standard error over the trials; "
         "below zero is better. p: how often chance alone makes a difference as large, "
-        "by all patterns of signs.",
+        f"by all patterns of signs. {_holm_note(pairs)}",
         section=ReportSection.BEYOND,
     )
 
 
-def paired_cell(paired: PairedComparison | None) -> str:
-    """Return a comparison as text."""
+def paired_cells(pairs: Sequence[PairedComparison | None]) -> list[str]:
+    """Return the comparisons of one table as text, p of each and for all together."""
+    adjusted = iter(adjusted_by_holm([pair.p for pair in pairs if pair is not None]))
+    return [
+        paired_cell(pair, None if pair is None else next(adjusted)) for pair in pairs
+    ]
+
+
+def paired_cell(paired: PairedComparison | None, adjusted: float | None = None) -> str:
+    """Return a comparison as text, with p for all comparisons together if given."""
     if paired is None:
         return "–"
     error = "" if paired.standard_error is None else f" ± {paired.standard_error:.3f}"
-    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g})"
+    together = "" if adjusted is None else f", Holm {adjusted:.2g}"
+    return f"{paired.difference:+.3f}{error} (p {paired.p:.2g}{together})"
+
+
+def _holm_note(pairs: Sequence[PairedComparison | None]) -> str:
+    present = [pair for pair in pairs if pair is not None]
+    return (
+        f"Holm: p adjusted for the {len(present)} comparisons of this table; only "
+        "below 0.05 is a difference more than chance. So many comparisons over so few "
+        f"trials cannot go below {smallest_adjusted(present):.2g}."
+    )
 
 
 def noise_table(results: StudyResults) -> ReportTable:
@@ -140,14 +191,18 @@ def noise_table(results: StudyResults) -> ReportTable:
             ", ".join(f"{name} in {n}" for name, n in s.counts.items() if n),
             f"{s.before:.3f}",
             f"{s.after:.3f}",
-            paired_cell(s.paired),
+            cell,
         ]
-        for s in results.noise
+        for s, cell in zip(
+            results.noise, paired_cells([s.paired for s in results.noise]), strict=True
+        )
     ]
+    pairs = [s.paired for s in results.noise]
     return ReportTable(
         name="Noise chosen",
         header=("terrain", "folds", "NLPD constant", "NLPD chosen", "difference"),
         rows=rows,
+        note=_holm_note(pairs),
         section=ReportSection.BEYOND,
     )
 
@@ -236,12 +291,9 @@ _MEASURES: Sequence[tuple[str, str]] = (("mae", "N"), ("nlpd", "log N"))
 
 
 def _cells(result: TerrainResult, model: str) -> list[str]:
-    scores = {key: mean_of(result.scores(model, key)) for key in _SHOWN}
     return [
-        "–"
-        if value is None
-        else f"{value:.1%}"
-        if key.startswith("coverage")
-        else f"{value:.3f}"
-        for key, value in scores.items()
+        with_error(
+            result.scores(model, key), ".1%" if key.startswith("coverage") else ".3f"
+        )
+        for key in _SHOWN
     ]

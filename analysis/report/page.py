@@ -18,6 +18,7 @@ from analysis.figures import (
     confusion,
     curves,
     errors,
+    excerpts,
     render,
     rig,
     styled,
@@ -35,14 +36,14 @@ from analysis.findings import (
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import ReportFigure, ReportTable
 from analysis.report.paper_tables import (
-    choices,
     parameters,
+    statements,
     summary,
     table_one,
     velocity_shares,
     verdicts,
 )
-from analysis.report.rig_tables import rig_tables
+from analysis.report.rig_tables import choices, rig_tables
 from analysis.study import (
     Study,
     available_cores,
@@ -53,8 +54,9 @@ from analysis.study import (
     write_atomic,
 )
 
-_FAMILIES = (curves, surfaces, errors, uncertainty, confusion, trials, rig)
+_FAMILIES = (excerpts, curves, surfaces, errors, uncertainty, confusion, trials, rig)
 _PAGE_ORDER = (
+    "fig2_tustin_model",
     "fig4_excerpts",
     "fig5_tustin",
     "fig6_gp",
@@ -266,6 +268,7 @@ def sections(
     tables = [
         summary(study),
         parameters(study),
+        *([statements(results)] if results.claims else []),
         table_one(study),
         *beyond_tables(results),
         velocity_shares(study),

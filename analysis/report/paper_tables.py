@@ -2,17 +2,20 @@
 
 from collections.abc import Sequence
 
-from acquisition import RATE_HZ
 from analysis.data import PULLED_WARNING, SENSOR_ERROR
 from analysis.figures import ReportSection
+from analysis.findings import PaperClaim, StudyResults
 from analysis.report.page_model import ReportTable
 from analysis.study import (
     FITTERS,
     TITLES,
     TUSTIN,
+    PooledTustinFit,
     Study,
     TerrainResult,
     flag_counts,
+    mean_of,
+    standard_error,
     tustin_medians,
 )
 from analysis.tustin import (
@@ -20,10 +23,14 @@ from analysis.tustin import (
     NEGATIVE_B,
     NO_STRIBECK,
     NOT_IDENTIFIABLE,
+    SYMBOLS,
     UNITS,
+    Interval,
+    TustinBounds,
     TustinParameters,
 )
 
+_DECADE = 10.0  # ratio of a profile's ends that says nothing about the value
 WORTHWHILE = 0.9  # error over the constant's below which a model says something
 
 # Table I of the paper, as printed
@@ -33,7 +40,6 @@ PAPER = {
     "TF": TustinParameters(mu=0.843, F_s=0.534, v_s=0.079, delta_s=420.0, b=7.49),
     "Tf": TustinParameters(mu=0.952, F_s=0.643, v_s=0.225, delta_s=2.60, b=0.023),
 }
-_SYMBOLS = {"mu": "μ", "F_s": "F_s", "v_s": "v_s", "delta_s": "δ_s", "b": "b"}
 
 
 def summary(study: Study) -> ReportTable:
@@ -67,22 +73,18 @@ def parameters(study: Study) -> ReportTable:
         if whole.fit is None:
             rows.append([name, *["–"] * len(UNITS), "no fit"])
             continue
-        cells = []
-        for key in UNITS:
-            cell = f"{getattr(whole.fit.parameters, key):.3g}"
-            if key in whole.intervals:
-                low, high = whole.intervals[key]
-                cell += f" ({low:.3g} to {high:.3g})"
-            cells.append(cell)
+        cells = [_parameter_cell(whole, key, study.options.fit.bounds) for key in UNITS]
         rows.append([name, *cells, "; ".join(whole.fit.flags) or "none"])
-    units = [f"{_SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
+    units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
     return ReportTable(
         name="Tustin parameters of all trials, with 95% intervals",
         header=("terrain", *units, "flags"),
         rows=rows,
         note="Intervals from whole trials drawn with replacement: samples of one trial "
         "repeat each other. A wide interval means that the curve is known, not the "
-        "parameter.",
+        "parameter. ≤ and ≥: the search ended at the edge of its range, so the value "
+        "may lie beyond. Open: the profile of the squared error (95%, counting "
+        "independent samples) reaches an edge or spans more than a factor of ten.",
         section=ReportSection.SUMMARY,
     )
 
@@ -98,27 +100,43 @@ def verdicts(study: Study) -> list[str]:
 
 def table_one(study: Study) -> ReportTable:
     """Return Table I: median Tustin parameters, the paper's own row beside ours."""
-    rows = []
+    rows, bounds = [], study.options.fit.bounds
     for name, result in study.terrains.items():
         medians = tustin_medians(result)
         rows.append(
             [
                 name,
                 "this study",
-                *(_number(medians[key]) for key in UNITS),
+                *(
+                    "–" if (v := medians[key]) is None else bounded_text(bounds, key, v)
+                    for key in UNITS
+                ),
                 "; ".join(flag_counts(result, TUSTIN)) or "none",
             ]
         )
         if name in PAPER:
             printed = [f"{getattr(PAPER[name], key):g}" for key in UNITS]
             rows.append([name, "paper, Table I", *printed, ""])
-    units = [f"{_SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
+    units = [f"{SYMBOLS[key]} [{unit}]" for key, unit in UNITS.items()]
     return ReportTable(
         name="Table I: Tustin parameters",
         header=("terrain", "source", *units, "flags"),
         rows=rows,
         note="Medians over the folds, parameter by parameter, so a row is not one "
-        "coherent fit; all predictions come from the coherent fits. " + _flag_legend(),
+        "coherent fit (≤, ≥: on a bound of the search); all predictions come from the "
+        "coherent fits. " + _flag_legend(),
+        section=ReportSection.PAPER,
+    )
+
+
+def statements(results: StudyResults) -> ReportTable:
+    """Return the paper's statements beside what the study shows."""
+    return ReportTable(
+        name="What the paper says",
+        header=("in", "the paper says", "this study shows", "agrees?"),
+        rows=[_statement_row(claim) for claim in results.claims],
+        note="Errors: mean absolute errors on trials left out. Beyond chance: paired "
+        "over the trials, p below 0.05 for all comparisons of the row together (Holm).",
         section=ReportSection.PAPER,
     )
 
@@ -144,58 +162,41 @@ def velocity_shares(study: Study) -> ReportTable:
     )
 
 
-def choices(study: Study, *, is_foreign: bool) -> ReportTable:
-    """Return every choice of the analysis."""
-    prepare, fit = study.options.prepare, study.options.fit
-    box = ", ".join(
-        f"{_SYMBOLS[name]} {low:g} to {high:g}"
-        for name, (low, high) in fit.bounds.items()
-    )
-    rows = [
-        *_widths(study),
-        ["window", f"{prepare.slowest:g} ≤ v_t ≤ {prepare.fastest:g} m/s"],
-        ["folds", "one whole trial left out at a time"],
-        ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
-        [
-            "GP fit",
-            f"squared exponential, one length per input, at most {fit.gp_points} "
-            f"samples chosen at random (seed {fit.seed}), marginal likelihood, three "
-            "starts",
-        ],
-        [
-            "noise of the GP",
-            "constant in the five models of Fig. 9; beside them chosen per fold among "
-            "constant, log-linear and Student's t, by trials left out of the training",
-        ],
-        ["across terrains", "the model of fold k tested on trial k, wrapping round"],
-        ["recorded rate", _rates(study)],
-    ]
-    note = "The tables come from elsewhere." if is_foreign else ""
-    return ReportTable("Choices", ("what", "how"), rows, note)
+def _parameter_cell(whole: PooledTustinFit, key: str, bounds: TustinBounds) -> str:
+    """Return a parameter with its interval, and its profile where that is open."""
+    if whole.fit is None:
+        return "–"
+    value, profiles = getattr(whole.fit.parameters, key), whole.fit.profiles
+    cell = bounded_text(bounds, key, value)
+    if key in whole.intervals:
+        cell += f" ({interval_text(bounds, key, whole.intervals[key])})"
+    profile = getattr(profiles, key, None)
+    if isinstance(profile, Interval) and is_open(bounds, key, profile):
+        cell += f"; open: {interval_text(bounds, key, profile)}"
+    return cell
 
 
-def _widths(study: Study) -> list[list[str]]:
-    """Return how samples were smoothed and thinned, in time and in samples."""
-    prepare = study.options.prepare
-    trials = [trial for result in study.terrains.values() for trial in result.trials]
-    used = sorted({trial.widths for trial in trials if not trial.is_prepared})
-    averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
-    thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
-    prepared = sum(trial.is_prepared for trial in trials)
-    rest = f"; {prepared} trials were prepared before" if prepared else ""
-    span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
-    return [
-        [
-            "smoothing",
-            f"centred moving average over {span:g} ms: {averaged or 'no'} samples"
-            + rest,
-        ],
-        [
-            "downsampling",
-            f"a sample every {step:g} ms, after smoothing: one in {thinned or '1'}"
-            + rest,
-        ],
-    ]
+def is_open(bounds: TustinBounds, key: str, profile: Interval) -> bool:
+    """Return whether a profile reaches an edge of the search or spans a decade."""
+    is_at_edge = any(bounds.reached(key, end) for end in profile)
+    return is_at_edge or profile.upper > _DECADE * profile.lower
+
+
+def interval_text(bounds: TustinBounds, key: str, interval: Interval) -> str:
+    """Return an interval as text, its ends on a bound as inequalities."""
+    low, high = (bounded_text(bounds, key, end) for end in interval)
+    return low if low == high else f"{low} to {high}"
+
+
+def bounded_text(bounds: TustinBounds, key: str, value: float) -> str:
+    """Return a parameter as text, one on a bound of the search as an inequality."""
+    side = bounds.reached(key, value)
+    mark = {"lower": "≤ ", "upper": "≥ "}[side] if side else ""
+    return f"{mark}{value:.3g}"
+
+
+def _statement_row(claim: PaperClaim) -> tuple[str, ...]:
+    return claim.place, claim.statement, claim.shown, claim.agreement.value
 
 
 def _summary_row(result: TerrainResult) -> list[str]:
@@ -204,8 +205,8 @@ def _summary_row(result: TerrainResult) -> list[str]:
         str(len(result.trials)),
         str(result.kept),
         str(sum(map(len, result.slips))),
-        *(_with_error(result.maes(model)) for model in FITTERS),
-        _with_error([result.constant_mae]),
+        *(with_error(result.maes(model)) for model in FITTERS),
+        with_error([result.constant_mae]),
         f"{result.lifted_share:.1%}",
     ]
 
@@ -240,29 +241,12 @@ def _flag_legend() -> str:
     )
 
 
-def _rates(study: Study) -> str:
-    rates = [
-        (trial.smooth.t.size - 1) / float(trial.smooth.t[-1] - trial.smooth.t[0])
-        for result in study.terrains.values()
-        for trial in result.trials
-    ]
-    low, high = min(rates), max(rates)
-    return f"{low:.0f} Hz" if high < 1.01 * low else f"{low:.0f} to {high:.0f} Hz"
-
-
-def _with_error(values: Sequence[float | None]) -> str:
-    present = [value for value in values if value is not None]
-    if not present:
+def with_error(values: Sequence[float | None], form: str = ".3f") -> str:
+    """Return the mean over trials ± its standard error as text."""
+    mean, error = mean_of(values), standard_error(values)
+    if mean is None:
         return "–"
-    mean = sum(present) / len(present)
-    if len(present) < 2:
-        return f"{mean:.3f}"
-    spread = sum((value - mean) ** 2 for value in present) / (len(present) - 1)
-    return f"{mean:.3f} ± {(spread / len(present)) ** 0.5:.3f}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"
+    return f"{mean:{form}}" + ("" if error is None else f" ± {error:{form}}")
 
 
 def _percent(value: float | None) -> str:

@@ -1,12 +1,15 @@
-"""Tables about the rig: how it behaved, and what it could have seen."""
+"""Tables about where numbers come from: the rig, and the choices of the analysis."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from acquisition import RATE_HZ
 from analysis.figures import ReportSection
 from analysis.findings import RigTrial, StudyResults
 from analysis.report.page_model import ReportTable
+from analysis.study import Study
+from analysis.tustin import SYMBOLS
 
 _SATURATED = 1e-9  # share of cycles
 
@@ -142,3 +145,67 @@ def _range(values: Sequence[float]) -> str:
         return "–"
     low, high = min(values), max(values)
     return f"{low:.0f}" if low == high else f"{low:.0f} to {high:.0f}"
+
+
+def choices(study: Study, *, is_foreign: bool) -> ReportTable:
+    """Return every choice of the analysis."""
+    prepare, fit = study.options.prepare, study.options.fit
+    box = ", ".join(
+        f"{SYMBOLS[name]} {low:g} to {high:g}"
+        for name, (low, high) in fit.bounds.items()
+    )
+    rows = [
+        *_widths(study),
+        ["window", f"{prepare.slowest:g} ≤ v_t ≤ {prepare.fastest:g} m/s"],
+        ["folds", "one whole trial left out at a time"],
+        ["Tustin fit", f"least squares on all kept samples; bounds {box}"],
+        [
+            "GP fit",
+            f"squared exponential, one length per input, at most {fit.gp_points} "
+            f"samples chosen at random (seed {fit.seed}), marginal likelihood, three "
+            "starts",
+        ],
+        [
+            "noise of the GP",
+            "constant in the five models of Fig. 9; beside them chosen per fold among "
+            "constant, log-linear and Student's t, by trials left out of the training",
+        ],
+        ["across terrains", "the model of fold k tested on trial k, wrapping round"],
+        ["recorded rate", _rates(study)],
+    ]
+    note = "The tables come from elsewhere." if is_foreign else ""
+    return ReportTable("Choices", ("what", "how"), rows, note)
+
+
+def _widths(study: Study) -> list[list[str]]:
+    """Return how samples were smoothed and thinned, in time and in samples."""
+    prepare = study.options.prepare
+    trials = [trial for result in study.terrains.values() for trial in result.trials]
+    used = sorted({trial.widths for trial in trials if not trial.is_prepared})
+    averaged = " or ".join(str(width) for width in sorted({w for w, _ in used}))
+    thinned = " or ".join(str(every) for every in sorted({e for _, e in used}))
+    prepared = sum(trial.is_prepared for trial in trials)
+    rest = f"; {prepared} trials were prepared before" if prepared else ""
+    span, step = (1e3 * n / RATE_HZ for n in (prepare.smoothing, prepare.downsample))
+    return [
+        [
+            "smoothing",
+            f"centred moving average over {span:g} ms: {averaged or 'no'} samples"
+            + rest,
+        ],
+        [
+            "downsampling",
+            f"a sample every {step:g} ms, after smoothing: one in {thinned or '1'}"
+            + rest,
+        ],
+    ]
+
+
+def _rates(study: Study) -> str:
+    rates = [
+        (trial.smooth.t.size - 1) / float(trial.smooth.t[-1] - trial.smooth.t[0])
+        for result in study.terrains.values()
+        for trial in result.trials
+    ]
+    low, high = min(rates), max(rates)
+    return f"{low:.0f} Hz" if high < 1.01 * low else f"{low:.0f} to {high:.0f} Hz"

@@ -1,7 +1,14 @@
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
 from .jobs import Store, Workers, available_cores, run_tasks
-from .metrics import PairedComparison, Prediction, compare
+from .metrics import (
+    PairedComparison,
+    Prediction,
+    adjusted_by_holm,
+    compare,
+    smallest_adjusted,
+    standard_error,
+)
 from .models import (
     FITTERS,
     GP_NN,
@@ -20,7 +27,7 @@ from .models import (
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
-from .terrain_fit import TerrainResult, mean_of
+from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
 
 __all__ = [
     "FITTERS",
@@ -40,6 +47,7 @@ __all__ = [
     "ModelFitter",
     "ModelFold",
     "PairedComparison",
+    "PooledTustinFit",
     "Prediction",
     "ResultStore",
     "Store",
@@ -48,6 +56,7 @@ __all__ = [
     "TerrainResult",
     "TustinModel",
     "Workers",
+    "adjusted_by_holm",
     "available_cores",
     "compare",
     "flag_counts",
@@ -56,6 +65,8 @@ __all__ = [
     "run_fold",
     "run_study",
     "run_tasks",
+    "smallest_adjusted",
+    "standard_error",
     "to_csv",
     "to_fits",
     "to_plain",

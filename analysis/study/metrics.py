@@ -160,6 +160,31 @@ def compare(
     return PairedComparison(mean, error, float(np.mean(is_as_large)), count)
 
 
+def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
+    """Return p values that hold for all comparisons together, in the order given.
+
+    Holm's step-down: the k-th smallest of m is multiplied by m - k + 1 and never falls
+    below a smaller one's. Below 0.05, the chance of a single false one among all m is
+    below 0.05.
+    """
+    order = sorted(range(len(p_values)), key=p_values.__getitem__)
+    adjusted, highest = [0.0] * len(p_values), 0.0
+    for rank, place in enumerate(order):
+        highest = max(highest, min(1.0, (len(p_values) - rank) * p_values[place]))
+        adjusted[place] = highest
+    return adjusted
+
+
+def smallest_adjusted(pairs: Sequence[PairedComparison]) -> float:
+    """Return the smallest p that Holm's adjustment can give so many comparisons.
+
+    Of n trials the pattern with all signs alike has p = 2/2^n: with ten trials no more
+    than 25 comparisons can show a single one below 0.05.
+    """
+    trials = min((pair.trials for pair in pairs), default=0)
+    return min(1.0, len(pairs) * 2.0 ** (1 - trials))
+
+
 def standard_error(values: Sequence[float | None]) -> float | None:
     """Return the standard error of the mean over trials, None below two of them."""
     present = [value for value in values if value is not None]

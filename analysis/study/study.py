@@ -22,6 +22,7 @@ from analysis.data import (
 )
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
+from analysis.study.metrics import standard_error
 from analysis.study.models import FitOptions
 from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
 
@@ -78,6 +79,21 @@ class Study:
                 tested: result.mae(model)
                 if tested == name
                 else _cross_mae(result, model, tested)
+                for tested in self.terrains
+            }
+            for name, result in self.terrains.items()
+            if result.models(model)
+        }
+
+    def cross_errors(self, model: str) -> dict[str, dict[str, float | None]]:
+        """Return the standard errors [N] of `cross` over the trials tested."""
+        return {
+            name: {
+                tested: standard_error(
+                    result.maes(model)
+                    if tested == name
+                    else _foreign_errors(result, model, tested)
+                )
                 for tested in self.terrains
             }
             for name, result in self.terrains.items()
@@ -168,8 +184,11 @@ def _wholes(
 
 
 def _cross_mae(result: TerrainResult, model: str, tested: str) -> float | None:
-    errors = [e for fold in result.models(model) for e in fold.cross[tested]]
-    return mean_of(errors)
+    return mean_of(_foreign_errors(result, model, tested))
+
+
+def _foreign_errors(result: TerrainResult, model: str, tested: str) -> list[float]:
+    return [e for fold in result.models(model) for e in fold.cross[tested]]
 
 
 def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]:

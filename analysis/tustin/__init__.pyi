@@ -1,16 +1,18 @@
 from . import model
 from .bootstrap import bootstrap_tustin
-from .identifiability import Interval, Profiles
+from .identifiability import Interval, Profiles, correlation_samples
 from .model import (
     MINIMUM_ROWS,
     NEGATIVE_B,
     NO_STRIBECK,
     NOT_IDENTIFIABLE,
+    SYMBOLS,
     UNITS,
     TustinBounds,
     TustinFit,
     TustinForm,
     TustinParameters,
+    bound,
     fit_tustin,
 )
 
@@ -19,6 +21,7 @@ __all__ = [
     "NEGATIVE_B",
     "NOT_IDENTIFIABLE",
     "NO_STRIBECK",
+    "SYMBOLS",
     "UNITS",
     "Interval",
     "Profiles",
@@ -27,6 +30,8 @@ __all__ = [
     "TustinForm",
     "TustinParameters",
     "bootstrap_tustin",
+    "bound",
+    "correlation_samples",
     "fit_tustin",
     "model",
 ]

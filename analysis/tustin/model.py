@@ -22,6 +22,7 @@ NEGATIVE_B = "b negative"  # nonphysical, like a negative mu or F_s
 NOT_IDENTIFIABLE = "not identifiable"
 NO_STRIBECK = "no Stribeck shape"
 UNITS = {"mu": "1", "F_s": "N", "v_s": "m/s", "delta_s": "1", "b": "kg/s"}
+SYMBOLS = {"mu": "μ", "F_s": "F_s", "v_s": "v_s", "delta_s": "δ_s", "b": "b"}
 
 _LOG_EDGE = 0.01  # v_s, delta_s: relative closeness that counts as on a bound
 _LINEAR_EDGE = 1e-5  # mu, F_s, b: the same, of the width of the range
@@ -98,6 +99,15 @@ class TustinBounds:
     def items(self) -> list[tuple[str, tuple[float, float]]]:
         """Return (parameter, (lower, upper)) in the order of the parameters."""
         return [(item.name, getattr(self, item.name)) for item in fields(self)]
+
+    def reached(self, name: str, value: float) -> Literal["lower", "upper"] | None:
+        """Return the bound that a value of the parameter `name` lies on, if any."""
+        edges: tuple[float, float] = getattr(self, name)
+        width, is_logarithmic = edges[1] - edges[0], name in {"v_s", "delta_s"}
+        for side, edge in zip(("lower", "upper"), edges, strict=True):
+            if _is_at(value, edge, width, is_logarithmic):
+                return side
+        return None
 
     def box(self) -> Box:
         """Return the same bounds as the search takes them."""
@@ -244,11 +254,8 @@ def _flags(
     parameters = parameters_at(point)
     flags = [
         f"{name} at {side} bound"
-        for (name, (lower, upper)), value in zip(
-            bounds.items(), astuple(parameters), strict=True
-        )
-        for side, edge in (("lower", lower), ("upper", upper))
-        if _is_at(value, edge, upper - lower, name in {"v_s", "delta_s"})
+        for (name, _), value in zip(bounds.items(), astuple(parameters), strict=True)
+        if (side := bounds.reached(name, value))
     ]
     flags += [
         f"{name} negative"

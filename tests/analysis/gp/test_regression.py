@@ -295,3 +295,14 @@ def test_an_input_that_does_not_vary_is_carried_along():
 def test_outputs_that_teach_nothing_are_refused(y, reason):
     with pytest.raises(SettingsError, match=reason):
         fit_gp(np.random.default_rng(0).normal(size=(y.size, 2)), y)
+
+
+def test_a_process_given_its_own_rows_is_the_same_and_others_change_it(vectors):
+    X, y, Xt, _ = load(vectors, "n60")
+    fitted = fit_gp(X[:40], y[:40])
+    same, more = fitted.given(X[:40], y[:40]), fitted.given(X, y)
+    assert same.mean(Xt) == pytest.approx(fitted.mean(Xt))
+    assert same.lml == pytest.approx(fitted.lml)
+    assert more.predict(Xt)[1].sum() < fitted.predict(Xt)[1].sum()
+    own = np.abs(fitted.mean(X[40:]) - y[40:]).mean()
+    assert np.abs(more.mean(X[40:]) - y[40:]).mean() < own

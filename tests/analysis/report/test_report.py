@@ -5,15 +5,18 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.figures.curves import draw_excerpts
-from analysis.figures.errors import draw_cross_map, draw_errors
-from analysis.figures.selection import busiest_window
+from analysis.figures.curves import caption_gp, draw_tustin_model
+from analysis.figures.errors import draw_cross_bars, draw_cross_map, draw_errors
+from analysis.figures.excerpts import draw_excerpts
+from analysis.figures.selection import busiest_window, panels
 from analysis.figures.style import render, styled
+from analysis.figures.surfaces import near_samples
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
-from analysis.report.paper_tables import choices, summary, table_one, verdicts
+from analysis.report.paper_tables import summary, table_one, verdicts
+from analysis.report.rig_tables import choices
 from analysis.study.fits import to_fits
-from analysis.study.models import FitOptions
+from analysis.study.models import GP_SE, FitOptions
 from analysis.study.store import write_atomic
 from analysis.study.study import StudyOptions, run_study
 
@@ -160,6 +163,60 @@ def test_excerpt_holds_slips_where_there_are_some(small_study):
     assert len(busiest_window(small_study.terrains["TF"]).slips) == 0
 
 
+def test_excerpt_holds_bounce_backs_where_there_are_some(small_study):
+    for name in ("S0", "B0"):
+        result = small_study.terrains[name]
+        most = max(sum(s.has_bounce for s in trial) for trial in result.slips)
+        shown = sum(slip.has_bounce for slip in busiest_window(result).slips)
+        assert most >= 1
+        assert shown >= 1
+
+
+def test_bars_across_terrains_carry_the_error_over_trials(small_study):
+    errors = small_study.cross_errors(GP_SE)
+    foreign = [
+        e for f in small_study.terrains["S0"].folds for e in f.models[GP_SE].cross["TF"]
+    ]
+    assert errors["S0"]["TF"] == pytest.approx(np.std(foreign, ddof=1) / 3**0.5)
+    own = small_study.terrains["TF"].maes(GP_SE)
+    assert errors["TF"]["TF"] == pytest.approx(np.std(own, ddof=1) / 3**0.5)
+    with styled():
+        figure = draw_cross_bars(compute_results(small_study))
+    whiskers = [c for c in figure.axes[0].containers if hasattr(c, "has_yerr")]
+    assert len(whiskers) == 3
+
+
+def test_figure_2_names_the_parameters_of_the_fit_of_all_trials(small_study):
+    results = compute_results(small_study)
+    with styled():
+        figure = draw_tustin_model(results)
+    for ax, name in zip(figure.axes, ("S0", "B0", "TF"), strict=False):
+        parameters = small_study.terrains[name].whole.fit.parameters
+        assert f"= {parameters.mu:.3g}" in ax.texts[0].get_text()
+        assert f"= {parameters.b:.3g} kg/s" in ax.texts[0].get_text()
+        assert ax.get_ylim()[0] <= 0.0
+
+
+def test_only_cells_that_touch_a_sample_are_not_faded():
+    counts = np.zeros((5, 6))
+    counts[1, 1] = 3
+    near = near_samples(counts)
+    assert near[:3, :3].all()
+    assert near.sum() == 9
+
+
+def test_a_band_below_zero_is_stated(small_study):
+    results = compute_results(small_study)
+    lowest = {
+        p.terrain: float((p.means[1] - 2 * p.sds[1]).min())
+        for p in panels(small_study, GP_SE)
+    }
+    stated = caption_gp(results).partition("below zero")[2]
+    assert min(lowest.values()) < 0
+    for name, low in lowest.items():
+        assert (f"{name} (" in stated) == (low < 0)
+
+
 def test_summary_counts_what_was_kept(small_study):
     row = dict(
         zip(summary(small_study).header, summary(small_study).rows[0], strict=True)
@@ -179,6 +236,14 @@ def test_the_papers_own_row_stands_beside_ours(small_study):
         "7.49",
     ]
     assert ("B0", "this study") in rows
+
+
+def test_a_median_on_a_bound_of_the_search_is_an_inequality(small_study):
+    bounds = small_study.options.fit.bounds
+    for row in table_one(small_study).rows:
+        if row[1] == "this study" and row[4].endswith(f"{bounds.v_s[0]:g}"):
+            assert row[4] == f"≤ {bounds.v_s[0]:g}"
+    assert any("≤" in cell for row in table_one(small_study).rows for cell in row[2:7])
 
 
 def test_a_model_that_says_nothing_is_called_so(make_series, moving):

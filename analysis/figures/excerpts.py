@@ -1,0 +1,92 @@
+"""Figure 4: force and velocity over time, and how slips are marked in any figure."""
+
+import numpy as np
+
+from analysis.figures.sections import ReportSection
+from analysis.figures.selection import TimeWindow, time_windows
+from analysis.figures.spec import FigureSpec
+from analysis.figures.style import FORCE_LABEL, Axes, Figure, new_figure, plain
+from analysis.findings import StudyResults
+
+
+def draw_excerpts(results: StudyResults) -> Figure | None:
+    """Return Fig. 4: F_t and v_t over time, slips marked, one excerpt per kind."""
+    chosen = time_windows(results.study)
+    if not chosen:
+        return None
+    figure = new_figure(3.6)
+    axes = figure.subplots(2, len(chosen), sharex=True, sharey="row", squeeze=False)
+    for column, window in enumerate(chosen):
+        _draw_window(axes[0, column], axes[1, column], window)
+    axes[0, 0].set_ylabel(FORCE_LABEL)
+    axes[1, 0].set_ylabel("velocity $v_t$ [m/s]")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
+
+
+def caption_excerpts(results: StudyResults) -> str:
+    """State slips and forces of the stretches in Fig. 4."""
+    parts = [_describe_window(window) for window in time_windows(results.study)]
+    return "Smoothed record at the full rate. " + " ".join(parts)
+
+
+def shade_slip(ax: Axes, start: float, stop: float, *, is_named: bool) -> None:
+    """Shade a slip from `start` to `stop` along the axis; one of them is named."""
+    label = "slip" if is_named else None
+    ax.axvspan(start, stop, color="#F0E442", alpha=0.55, lw=0, label=label)
+
+
+def _draw_window(above: Axes, below: Axes, window: TimeWindow) -> None:
+    for k, slip in enumerate(window.slips):
+        for ax in (above, below):
+            shade_slip(ax, slip.onset, slip.end, is_named=k == 0)
+            if slip.has_bounce:
+                ax.axvline(slip.end, color="#CC79A7", lw=1.0, ls=":")
+    bounced = [slip.end for slip in window.slips if slip.has_bounce]
+    if bounced:
+        above.axvline(
+            bounced[0], color="#CC79A7", lw=1.0, ls=":", label="bounce-back follows"
+        )
+    above.plot(window.t, window.F_t, color="#0072B2", lw=0.9)
+    below.plot(window.t, window.v_t, color="#D55E00", lw=0.9)
+    below.axhline(0.0, color="#808080", lw=0.6)
+    below.set_xlabel("time [s]")
+    above.set_title(f"{plain(window.title)}, trial {window.trial}", loc="left")
+
+
+def _describe_window(window: TimeWindow) -> str:
+    where = f"{window.terrain}, trial {window.trial}"
+    slips = window.slips
+    if not slips:
+        low, middle, high = np.quantile(window.F_t, (0.05, 0.5, 0.95))
+        return (
+            f"{where}: no slip; F_t near {middle:.1f} N, nine tenths of it between "
+            f"{low:.1f} and {high:.1f} N."
+        )
+    peak = np.median([slip.peak for slip in slips])
+    floor = np.median([slip.floor for slip in slips])
+    bounced = sum(slip.has_bounce for slip in slips)
+    return (
+        f"{where}: {_count(len(slips), 'slip')}, F_t falling from {peak:.1f} N before "
+        f"to {floor:.1f} N during one (medians); the foot is thrown back after "
+        f"{bounced}."
+    )
+
+
+def _count(number: int, thing: str) -> str:
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
+FIGURES = (
+    FigureSpec(
+        "fig4_excerpts",
+        "Fig. 4 Traction force and velocity over time",
+        "Traction force above and velocity below over a few seconds of one trial per "
+        "class of terrain; slips are shaded.",
+        draw_excerpts,
+        caption_excerpts,
+        ReportSection.PAPER,
+    ),
+)
