@@ -28,7 +28,7 @@ JOINT7_WARNING = 0.020  # motion of the locked joint that is reported [rad]
 ENOUGH = 0.02  # share of the samples a cell should hold
 # In slips the foot hops, and F_n is nothing but the error of a sound sensor. No ground
 # pulls: what is further below zero is the tare's or the plane's.
-SENSOR_ERROR = 0.4  # N
+SENSOR_ERROR = 0.4  # N, mean error of the paper's force sensor
 PULLED_WARNING = 0.03  # share of the kept samples below that
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.data import SENSOR_ERROR
 from analysis.findings.paper_measures import (
     ClaimResult,
     PaperEvidence,
@@ -28,7 +29,6 @@ from analysis.study import (
 from analysis.terrains import KEPT_PER_SECOND
 from analysis.tustin import NO_STRIBECK, NOT_IDENTIFIABLE
 
-SENSOR_ERROR = 0.4  # N, mean error of the paper's force sensor
 _SIMILAR = 0.15  # relative difference of errors that are called similar
 _BAND, _BAND_SLACK = 0.95, 0.05  # nominal coverage, and what it may be off by
 _IN_GENERAL = 0.8  # share of the pairs that makes a statement hold in general

@@ -17,6 +17,8 @@ from tests.experiments.program import (
     traction,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @dataclass(frozen=True)
 class Moment:

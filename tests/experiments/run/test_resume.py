@@ -22,6 +22,8 @@ from tests.experiments.program import (
     traction,
 )
 
+pytestmark = pytest.mark.slow
+
 AUTO = ("--operator-script", "auto")
 
 
@@ -191,7 +193,6 @@ def test_a_redo_under_other_conditions_is_refused_with_the_differences(
     assert digests(only_session(data)) == digests(recorded.folder)
 
 
-@pytest.mark.slow
 def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
     tmp_path, recorded
 ):
