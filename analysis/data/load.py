@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Flag, Record, SettingsError, TrialFileError
+from acquisition import Flag, Record, SettingsError, TrialFileError, parse_toml
 from acquisition.trial_file import TrialReader
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
@@ -48,6 +48,8 @@ class RecordedTrial:
         constants: the arm model that was applied.
         sole_point: centre of the sole in the frame of the tool plate [m], shape (3,).
         bracket: the tares before and after it; None where one is not known.
+        sensor_height: of the sensor's origin above the tool plate [m]; None where the
+            recorded settings do not tell.
     """
 
     path: Path
@@ -66,6 +68,7 @@ class RecordedTrial:
     constants: ArmConstants
     sole_point: Array
     bracket: TareBracket | None = None
+    sensor_height: float | None = None
 
     @property
     def name(self) -> str:
@@ -187,6 +190,7 @@ def load_trial(path: Path) -> RecordedTrial:
             payload.bias,
             int(cycles["host_ns"][0]),
         ),
+        sensor_height=_sensor_height(reader),
     )
     try:
         trial.series()
@@ -226,6 +230,14 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
         ) from error
     point = np.asarray(sole_point, dtype=np.float64)
     return _Calibrated(payload, point, terrain, frame, constants, model)
+
+
+def _sensor_height(reader: TrialReader) -> float | None:
+    try:
+        height = parse_toml(_text(reader, "config.toml"))["ft_sensor"]["height"]
+    except (TrialFileError, ValueError, KeyError, TypeError):
+        return None
+    return float(height) if type(height) in {int, float} and 0 <= height < 1 else None
 
 
 def _check_metadata(reader: TrialReader) -> None:

@@ -17,11 +17,13 @@ from analysis.data.series import Array
 
 SLOWEST = 0.005  # m/s; a slower foot sticks, and its forces may point anywhere
 PRESSED = 1.0  # N; below it the direction of a force is the sensor's noise
+_REST = 0.2  # s of standing before the foot first moves
 FEWEST = 20  # moving samples below which nothing is judged
 FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
 LATEST_MS = 3.0  # of the force against the motion, its time stamps' age apart
 SHORTEST = 0.05  # m of a way that has a direction
 HEADING, INCLINE = 5.0, 4.0  # degrees that a way may differ from the container's
+FARTHEST = 0.06  # m of the centre of pressure from the sole's centre
 FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
@@ -35,7 +37,7 @@ class Doubt:
 
     Attributes:
         name: "power", "ratio", "direction", "normal", "friction", "lateral", "moment",
-            "unit", "lag", "swapped", "incline" or "heading".
+            "unit", "lag", "swapped", "incline", "heading" or "pressure".
         seen: what was measured, with the number.
         cause: the likely cause.
         remedy: what to do.
@@ -82,6 +84,7 @@ def doubts_of_record(recorded: RecordedTrial) -> list[Doubt]:
         *_way(recorded, moving),
         *_sideways(recorded.lateral[moving], F_t[moving]),
         *_free_moment(wrench[:, :3], wrench[:, 3:]),
+        *_pressure(recorded, wrench),
     ]
 
 
@@ -128,12 +131,9 @@ def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
 
 def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
     if trial.is_load_driven:
-        yield Doubt(
-            "swapped",
-            "the motion follows F_n and not F_t",
-            "the columns F_t and F_n are swapped",
-            "--columns F_n=...,F_t=...",
-        )
+        yield _swapped("the motion follows F_n and not F_t")
+    elif not trial.is_prepared and _is_lying(trial.smooth):
+        yield _swapped("the foot rests with more force along the way than on it")
     if trial.lag is None:
         return
     late = (trial.lag.seconds - trial.stamped_lag) * 1e3
@@ -145,6 +145,24 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
             "a filter in the sensor, the latency of its port, or two clocks",
             f"--what-if lag={trial.lag.seconds * 1e3:.0f} shows what it changes",
         )
+
+
+def _swapped(seen: str) -> Doubt:
+    cause = "the columns F_t and F_n are swapped"
+    return Doubt("swapped", seen, cause, "--columns F_n=...,F_t=...")
+
+
+def _is_lying(smooth: Smoothed) -> bool:
+    """Return whether the foot, before it first moves, is loaded along the way only.
+
+    It stands there with its weight, and nobody pushes it yet.
+    """
+    moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
+    end = int(moving[0]) if moving.size else 0
+    if end < 2 or smooth.t[end] - smooth.t[0] < _REST:
+        return False
+    load, along = float(np.median(smooth.F_n[:end])), float(np.median(smooth.F_t[:end]))
+    return along > max(PRESSED, 2.0 * abs(load))
 
 
 def _normal(load: Array) -> Iterator[Doubt]:
@@ -236,4 +254,25 @@ def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
             f"moment along the force {pitch * 1e3:.0f} mm times the force "
             f"(limit {FREE_MOMENT * 1e3:.0f})",
             "axes of the moment are swapped, or the sensor's calibration is another's",
+        )
+
+
+def _pressure(recorded: RecordedTrial, wrench: Array) -> Iterator[Doubt]:
+    """Judge where on the sole the ground presses: under it, not beside it."""
+    if recorded.sensor_height is None:
+        return
+    origin = np.array([0.0, 0.0, recorded.sensor_height])
+    sole = recorded.payload.rotation.T @ (recorded.sole_point - origin)
+    moment = wrench[:, 3:] - np.cross(sole, wrench[:, :3])
+    pressed = np.abs(wrench[:, 2]) > PRESSED
+    if np.count_nonzero(pressed) < FEWEST:
+        return
+    aside = moment[pressed, :2] / wrench[pressed, 2:3]
+    distance = float(np.hypot(*np.median(aside, axis=0)))
+    if distance > FARTHEST:
+        yield Doubt(
+            "pressure",
+            f"the ground presses {distance * 1e3:.0f} mm beside the sole's centre "
+            f"(limit {FARTHEST * 1e3:.0f})",
+            "a moment of the sensor has the other sign, or another foot is mounted",
         )

@@ -10,8 +10,6 @@ What can be wrong with a trial without a single fault being raised, and what com
 it. None passes in silence: it is refused, flagged with its likely cause, or harmless,
 and then a number says how harmless. Made by
 `python -m tests.disturbances > docs/disturbances.md`; held by `tests/disturbances`.
-Known to pass in silence: F_n and F_t swapped in a table from a smooth plate, where no
-slip shows which force moves the foot.
 """
 _LONGEST = 160  # characters of what was said
 

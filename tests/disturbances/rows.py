@@ -119,6 +119,7 @@ TABLES = (
     TableRow("F_n in kN", times(N, 1e-3), FLAGGED, "--unit F_n=kN"),
     TableRow("F_t in mN, F_n in N", times(F, 1e3), FLAGGED, "friction"),
     TableRow("F_n and F_t swapped", swapped, FLAGGED, "swapped"),
+    TableRow("F_n and F_t swapped, plate", swapped, FLAGGED, "swapped", "TF"),
     TableRow("force 20 ms late", late(10), FLAGGED, "--what-if lag=2"),
     TableRow("force 8 ms late", late(4), FLAGGED, "lag"),
     TableRow("clock jumps by 1 s", jumped, HARMLESS, 0.01),
@@ -208,6 +209,10 @@ def swap_moments(cycles: Record) -> None:
     cycles["wrench_raw"] = cycles["wrench_raw"][:, [0, 1, 2, 4, 3, 5]]
 
 
+def flip_moments(cycles: Record) -> None:
+    cycles["wrench_raw"] = cycles["wrench_raw"] * [1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
+
+
 def saturate(cycles: Record) -> None:
     rows = slice(len(cycles) // 2, None, 3)
     cycles["flags"][rows] |= np.uint32(Flag.FT_SATURATED)
@@ -236,6 +241,9 @@ RECORDINGS = (
     RecordingRow("sensor turned by 5 degrees", turned(5.0), HARMLESS, 0.03),
     RecordingRow(
         "axes of the moment swapped", of_cycles(swap_moments), FLAGGED, "moment"
+    ),
+    RecordingRow(
+        "moments with the other sign", of_cycles(flip_moments), FLAGGED, "presses"
     ),
     RecordingRow("foot 5 % heavier than entered", heavier(0.05), HARMLESS, 0.01),
     RecordingRow("foot 20 % heavier than entered", heavier(0.2), HARMLESS, 0.03),
