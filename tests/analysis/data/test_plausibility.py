@@ -135,4 +135,4 @@ def test_swapped_axes_of_the_moment_do_not_belong_to_the_force(recorded):
     raw = cycles["wrench_raw"]
     raw[:, [3, 4]] = raw[:, [4, 3]]
     swapped = replace(recorded, cycles=cycles)
-    assert kinds(swapped) == {"moment"}
+    assert kinds(swapped) == {"moment", "pressure"}
