@@ -130,10 +130,13 @@ def _unit(name: str, value: float, unit: str, looks: str) -> Doubt:
 
 
 def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
-    if trial.is_load_driven:
-        yield _swapped("the motion follows F_n and not F_t")
-    elif not trial.is_prepared and _is_lying(trial.smooth):
-        yield _swapped("the foot rests with more force along the way than on it")
+    if not trial.is_prepared and _is_swapped(trial):
+        yield Doubt(
+            "swapped",
+            "the foot rests with more force along the way than on it",
+            "the columns F_t and F_n are swapped",
+            "--columns F_n=...,F_t=...",
+        )
     if trial.lag is None:
         return
     late = (trial.lag.seconds - trial.stamped_lag) * 1e3
@@ -147,22 +150,20 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
         )
 
 
-def _swapped(seen: str) -> Doubt:
-    cause = "the columns F_t and F_n are swapped"
-    return Doubt("swapped", seen, cause, "--columns F_n=...,F_t=...")
+def _is_swapped(trial: PreparedTrial) -> bool:
+    """Return whether the foot, before it first moves, is loaded along the way.
 
-
-def _is_lying(smooth: Smoothed) -> bool:
-    """Return whether the foot, before it first moves, is loaded along the way only.
-
-    It stands there with its weight, and nobody pushes it yet.
+    It stands there with its weight, and nobody pushes it yet. A smaller difference
+    counts where the motion follows F_n and not F_t, too.
     """
+    smooth = trial.smooth
     moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
     end = int(moving[0]) if moving.size else 0
     if end < 2 or smooth.t[end] - smooth.t[0] < _REST:
         return False
     load, along = float(np.median(smooth.F_n[:end])), float(np.median(smooth.F_t[:end]))
-    return along > max(PRESSED, 2.0 * abs(load))
+    times = 1.0 if trial.is_load_driven else 2.0
+    return along > max(PRESSED, times * abs(load))
 
 
 def _normal(load: Array) -> Iterator[Doubt]:

@@ -124,11 +124,40 @@ def test_three_milliseconds_are_no_reason_for_doubt():
     assert "lag" not in named(jamming(0.002))
 
 
-def test_a_load_that_moves_the_foot_is_a_swapped_column():
-    series = jamming()
-    swapped = replace(series, F_n=series.F_t, F_t=series.F_n)
-    assert "swapped" in named(swapped)
-    assert "swapped" not in named(series)
+def after_a_rest(series, F_n, F_t, seconds=1.0):
+    """Return the trial behind a time of standing with these forces [N]."""
+    count = round(seconds * 500)
+    t = np.arange(count) / 500.0
+    still = np.zeros(count)
+    return replace(
+        series,
+        t=np.concatenate([t, series.t + seconds]),
+        v_t=np.concatenate([still, series.v_t]),
+        F_n=np.concatenate([still + F_n, series.F_n]),
+        F_t=np.concatenate([still + F_t, series.F_t]),
+    )
+
+
+def test_a_foot_that_rests_on_its_traction_is_a_swapped_column():
+    assert "swapped" in named(after_a_rest(jamming(), F_n=0.3, F_t=3.0))
+
+
+def test_a_foot_that_rests_on_its_weight_is_not_doubted():
+    assert "swapped" not in named(after_a_rest(jamming(), F_n=3.0, F_t=1.4))
+
+
+def test_a_motion_that_follows_the_load_makes_a_smaller_difference_count():
+    rested = after_a_rest(jamming(), F_n=2.0, F_t=3.0)
+    assert "swapped" not in named(rested)
+    driven = jamming()
+    swapped = replace(driven, F_n=driven.F_t, F_t=driven.F_n)
+    assert "swapped" in named(after_a_rest(swapped, F_n=2.0, F_t=3.0))
+
+
+def test_a_motion_that_follows_the_load_alone_is_no_reason_for_doubt():
+    driven = jamming()
+    swapped = replace(driven, F_n=driven.F_t, F_t=driven.F_n)
+    assert "swapped" not in named(after_a_rest(swapped, F_n=3.0, F_t=0.2))
 
 
 def test_forces_taken_later_undo_the_offset():
