@@ -184,12 +184,7 @@ def load_trial(path: Path) -> RecordedTrial:
         payload=payload,
         constants=at_hand.constants,
         sole_point=at_hand.sole_point,
-        bracket=read_bracket(
-            path,
-            reader.metadata["trial"],
-            payload.bias,
-            int(cycles["host_ns"][0]),
-        ),
+        bracket=_bracket(reader, payload, int(cycles["host_ns"][0])),
         sensor_height=_sensor_height(reader),
     )
     try:
@@ -230,6 +225,13 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
         ) from error
     point = np.asarray(sole_point, dtype=np.float64)
     return _Calibrated(payload, point, terrain, frame, constants, model)
+
+
+def _bracket(
+    reader: TrialReader, payload: Payload, start_ns: int
+) -> TareBracket | None:
+    metadata = reader.metadata["trial"]
+    return read_bracket(reader.path, metadata, payload.bias, start_ns)
 
 
 def _sensor_height(reader: TrialReader) -> float | None:

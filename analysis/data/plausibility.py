@@ -22,8 +22,9 @@ FEWEST = 20  # moving samples below which nothing is judged
 FRICTION = (0.15, 5.0)  # F_t over F_n; a smooth plate has 0.18 in some trials
 LATEST_MS = 3.0  # of the force against the motion, its time stamps' age apart
 SHORTEST = 0.05  # m of a way that has a direction
+UNEVEN = 0.010  # m that stones lift or turn a foot aside, however short its way
 HEADING, INCLINE = 5.0, 4.0  # degrees that a way may differ from the container's
-FARTHEST = 0.06  # m of the centre of pressure from the sole's centre
+FARTHEST = 0.08  # m of the centre of pressure from the sole's centre
 FREE_MOMENT = 0.03  # moment along the force over the force [m]
 # Medians beyond which a column is in another unit than its own.
 _FASTEST, _STRONGEST, _WEAKEST, _RAREST = 2.0, 500.0, 0.02, 0.2
@@ -221,7 +222,8 @@ def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
             "the plane is inclined otherwise, or its incline is",
         ),
     ):
-        if abs(angle) > limit:
+        beside = float(np.ptp(ahead)) * np.tan(np.radians(abs(angle)))
+        if abs(angle) > limit and beside > UNEVEN:
             yield Doubt(
                 name,
                 f"the sole's way is {angle:+.1f} degrees off the container's "

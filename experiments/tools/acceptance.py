@@ -12,7 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import SessionError
-from analysis.data import FLAT, PrepareOptions, RecordedTrial, load_trial
+from analysis.data import (
+    FLAT,
+    PrepareOptions,
+    RecordedTrial,
+    doubts_of,
+    doubts_of_record,
+    load_trial,
+)
 from analysis.study import GP_SE, TUSTIN, FitOptions, Study, StudyOptions, run_study
 from analysis.validation import (
     Band,
@@ -36,6 +43,8 @@ TRUTH_BANDS = (
     Band("T3", "F_n against the truth, mean |error|, all trials (N)", 0.2, 0.6),
     Band("T4", "error of mean F_t and F_n / uncertainty by the tares, rms", 0.8, 1.2),
 )
+# A rig without faults is not doubted; too few samples are, which E11 judges.
+DOUBT_BAND = Band("T5", "trials that are doubted without a fault", 0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +120,13 @@ def analyse(plan: AcceptancePlan, data: Path) -> list[BandResult]:
         **(measure_models(study) if is_whole else {}),
         **measure_slips(_grounds(study, trials)),
     }
-    results = [*hold_against_bands(measures), *_truth(trials)]
+    doubted = sum(
+        bool([*doubts_of(prepared), *doubts_of_record(recorded)])
+        for name, result in study.terrains.items()
+        for prepared, recorded in zip(result.trials, trials[name], strict=True)
+    )
+    doubts = BandResult(DOUBT_BAND, (doubted,))
+    results = [*hold_against_bands(measures), *_truth(trials), doubts]
     if is_whole:
         return results
     return [f for f in results if f.band.id[0] in _OF_FEW and f.band.id != "E7"]

@@ -250,9 +250,13 @@ RECORDINGS = (
     RecordingRow(
         "tared with the foot on the ground", tared_on_the_ground, FLAGGED, "tare"
     ),
-    RecordingRow("incline wrong by 6 degrees", moved(incline=6.0), FLAGGED, "incline"),
+    RecordingRow(
+        "incline wrong by 10 degrees", moved(incline=10.0), FLAGGED, "incline"
+    ),
     RecordingRow("incline wrong by 2 degrees", moved(incline=2.0), HARMLESS, 0.15),
-    RecordingRow("heading wrong by 8 degrees", moved(heading=8.0), FLAGGED, "heading"),
+    RecordingRow(
+        "heading wrong by 10 degrees", moved(heading=10.0), FLAGGED, "heading"
+    ),
     RecordingRow("heading wrong by 4 degrees", moved(heading=4.0), HARMLESS, 0.02),
     RecordingRow("an axis saturated", of_cycles(saturate), FLAGGED, "saturated"),
     RecordingRow("force samples stale", of_cycles(go_stale), FLAGGED, "stale"),

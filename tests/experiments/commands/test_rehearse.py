@@ -95,6 +95,7 @@ def test_the_bands_are_written_for_programs(rehearsed):
     assert found["plan"]["seed"] == 3
     assert by_id["E11"]["is_met"] is False
     assert by_id["T1"]["is_met"] is True  # signs, frames and kinematics are right
+    assert by_id["T5"]["values"] == [0]
 
 
 def test_with_few_trials_the_bands_of_models_are_left_out(rehearsed):
