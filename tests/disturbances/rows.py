@@ -187,6 +187,12 @@ def moved(**changes: float) -> Callable[[Recording], Recording]:
     return disturb
 
 
+def longer(height: float) -> Callable[[Recording], Recording]:
+    """Return what mounts a foot that is longer than the one that is entered [m]."""
+    lower = np.array([0.0, 0.0, height])
+    return lambda recording: replace(recording, sole=recording.sole - lower)
+
+
 def tared_on_the_ground(recording: Recording) -> Recording:
     """Let the foot have stood on the ground with 8 N when it was tared."""
     bias = recording.payload.bias.copy()
@@ -247,6 +253,7 @@ RECORDINGS = (
     ),
     RecordingRow("foot 5 % heavier than entered", heavier(0.05), HARMLESS, 0.01),
     RecordingRow("foot 20 % heavier than entered", heavier(0.2), HARMLESS, 0.03),
+    RecordingRow("foot 30 mm longer than entered", longer(0.03), HARMLESS, 0.01),
     RecordingRow(
         "tared with the foot on the ground", tared_on_the_ground, FLAGGED, "tare"
     ),
