@@ -1,0 +1,69 @@
+"""README's figures of the demo, read from its results; exit 1 where README drifted.
+
+make demo && python benchmarks/readme.py [--folder demo]
+"""
+
+import argparse
+import json
+import re
+import statistics
+import sys
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+_DRIFT = 0.05
+
+
+def demo_rows(fits: dict[str, Any]) -> list[str]:
+    """Return the rows of README's table that the demo's fits.json gives."""
+    plate, stones = fits["terrains"]["TF"], fits["terrains"]["S0"]
+    true = next(t for t in fits["tables"] if t["name"] == "Measured against true")
+    v_t, F_t, F_n = (
+        statistics.median(float(row[column]) for row in true["rows"])
+        for column in (1, 2, 3)
+    )
+    return [
+        "| mean absolute error, plate with tread (TF): Tustin, GP, a constant "
+        f"| {_errors(plate)} | `make demo`, Summary of the report |",
+        f"| the same, small stones (S0) | {_errors(stones)} | same |",
+        f"| measured against true over the {len(true['rows'])} trials, median: v_t, "
+        f"F_t, F_n | {v_t:.1f} mm/s, {F_t:.2f} N, {F_n:.2f} N | same, table "
+        '"Measured against true" |',
+    ]
+
+
+def _errors(terrain: dict[str, Any]) -> str:
+    mae = terrain["mae"]
+    values = (mae["tustin"], mae["gp_se"], terrain["constant_mae"])
+    return ", ".join(f"{value:.2f}" for value in values) + " N"
+
+
+def is_same(row: str, told: str) -> bool:
+    """Return whether a line of README says what a row does, to 5 % of each number.
+
+    Libraries of linear algebra differ in the last digits from machine to machine.
+    """
+    if _NUMBER.sub("#", row) != _NUMBER.sub("#", told):
+        return False
+    pairs = zip(_NUMBER.findall(row), _NUMBER.findall(told), strict=True)
+    return all(abs(float(a) - float(b)) <= _DRIFT * float(a) for a, b in pairs)
+
+
+def main() -> int:
+    """Print the rows; say which README does not have."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--folder", type=Path, default=ROOT / "demo")
+    folder = parser.parse_args().folder
+    rows = demo_rows(json.loads((folder / "study" / "fits.json").read_text()))
+    told = README.read_text().splitlines()
+    drifted = [row for row in rows if not any(is_same(row, line) for line in told)]
+    for row in rows:
+        print(f"{'!' if row in drifted else ' '} {row}")
+    return 1 if drifted else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

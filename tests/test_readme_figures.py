@@ -1,0 +1,27 @@
+"""README's figures are those of a run: a drift of 5 % is noticed."""
+
+import pytest
+
+from benchmarks.readme import README, demo_rows, is_same
+
+
+def results(mae):
+    terrain = {"mae": {"tustin": mae, "gp_se": 0.39}, "constant_mae": 0.66}
+    table = {"name": "Measured against true", "rows": [["T01", "0.5", "0.3", "0.2"]]}
+    return {"terrains": {"TF": terrain, "S0": terrain}, "tables": [table]}
+
+
+@pytest.mark.parametrize(("mae", "same"), [(0.40, True), (0.41, True), (0.45, False)])
+def test_a_figure_may_drift_by_five_percent(mae, same):
+    told, seen = demo_rows(results(0.40))[0], demo_rows(results(mae))[0]
+    assert is_same(seen, told) is same
+
+
+def test_another_sentence_is_another_row():
+    first, second, _ = demo_rows(results(0.40))
+    assert not is_same(first, second)
+
+
+def test_readme_has_every_row():
+    words = {row.split("|")[1].strip()[:30] for row in demo_rows(results(0.4))}
+    assert all(word in README.read_text() for word in words)
