@@ -1,7 +1,9 @@
 """Arguments that more than one command takes; imports nothing slow."""
 
+import math
 import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError
+from collections.abc import Callable
 from pathlib import Path
 
 FRICTION = 0.02  # of the simulated joints, as a share of another arm's
@@ -50,6 +52,24 @@ def whole_number(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) <= 18):
         raise ArgumentTypeError(f"{text!r} - expected a whole number >= 0, e.g. 1")
     return int(text)
+
+
+def number_within(least: float, most: float, wanted: str) -> Callable[[str], float]:
+    """Return a reader of numbers from `least` to `most`; `wanted` says what is meant.
+
+    The reader raises ArgumentTypeError.
+    """
+
+    def read(text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.nan
+        if not least <= number <= most:
+            raise ArgumentTypeError(f"{text!r} - expected {wanted}")
+        return number
+
+    return read
 
 
 def add_seed(parser: ArgumentParser) -> None:

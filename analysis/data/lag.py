@@ -22,7 +22,7 @@ LONGEST = 0.05  # s
 EXPLAINED = 0.5  # of the force's variance in the band, below which nothing is said
 _SLOWEST_RATE = 200.0  # Hz
 _SHORTEST = 1.0  # s of a trial
-_SPARSEST = 2  # times the rows that there would be without gaps
+_FEWEST_ROWS = 0.5  # share of its rows that a trial may have lost
 _ORDER = 2  # of the band's filter
 _SINGULAR = 1e12  # condition number: a foot that never moves
 
@@ -48,11 +48,13 @@ def force_lag(t: Array, v_t: Array, F_t: Array) -> ForceLag | None:
         v_t: velocity [m/s], shape (n,).
         F_t: traction force [N], shape (n,).
     """
-    steps = np.diff(t)
-    rate = float(1.0 / np.median(steps))
-    count = round((t[-1] - t[0]) * rate) + 1
-    if rate < _SLOWEST_RATE or t.size < _SHORTEST * rate or count > _SPARSEST * t.size:
+    with np.errstate(all="ignore"):
+        rate = float(1.0 / np.median(np.diff(t)))
+        steps = float((t[-1] - t[0]) * rate)
+    is_long = rate >= _SLOWEST_RATE and _SHORTEST * rate <= t.size
+    if not (is_long and _FEWEST_ROWS * steps <= t.size):
         return None
+    count = round(steps) + 1
     even = t[0] + np.arange(count) / rate  # a lost row is no shift of those behind it
     rows = (even, np.interp(even, t, v_t), np.interp(even, t, F_t))
     with np.errstate(all="ignore"):  # absurd numbers come to nothing by themselves
@@ -82,12 +84,13 @@ def _in_band(
     gram = basis @ basis.T
     if not (np.isfinite(gram).all() and np.linalg.cond(gram) < _SINGULAR):
         return ForceLag(0.0, 0.0)
+    inverse = np.linalg.inv(gram)
     shares = np.empty(2 * longest + 1)
     for k in range(shares.size):
         shifted = force[k : k + basis.shape[1]]
         products = basis @ shifted
         variance = float(shifted @ shifted)
-        explained = float(products @ np.linalg.solve(gram, products))
+        explained = float(products @ inverse @ products)
         shares[k] = explained / variance if 0.0 < variance < np.inf else 0.0
     best = int(shares.argmax())
     if not 0 < best < shares.size - 1:  # further off than was looked

@@ -154,8 +154,7 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
 def _is_swapped(trial: PreparedTrial) -> bool:
     """Return whether the foot, before it first moves, is loaded along the way.
 
-    It stands there with its weight, and nobody pushes it yet. A smaller difference
-    counts where the motion follows F_n and not F_t, too.
+    It stands there with its weight, and nobody pushes it yet.
     """
     smooth = trial.smooth
     moving = np.flatnonzero(np.abs(smooth.v_t) > 2.0 * SLOWEST)
@@ -163,8 +162,7 @@ def _is_swapped(trial: PreparedTrial) -> bool:
     if end < 2 or smooth.t[end] - smooth.t[0] < _REST:
         return False
     load, along = float(np.median(smooth.F_n[:end])), float(np.median(smooth.F_t[:end]))
-    times = 1.0 if trial.is_load_driven else 2.0
-    return along > max(PRESSED, times * abs(load))
+    return along > max(PRESSED, 2.0 * abs(load))
 
 
 def _normal(load: Array) -> Iterator[Doubt]:

@@ -15,6 +15,7 @@ from analysis.data.series import Array, Indices, TractionSeries
 
 MINIMUM_KEPT = 250  # kept samples that make a trial count
 MINIMUM_TRAVEL_SHARE = 0.9  # of the container
+_WIDEST = 501  # samples of smoothing: a second
 _LITTLE = 1e-3
 _LONGEST_GAP = 3  # missing samples that a difference may span
 
@@ -32,7 +33,7 @@ class PrepareOptions:
             does not decide whether a trial counts.
 
     Raises:
-        SettingsError: a width below one or even, or an empty window.
+        SettingsError: a width below one, above 501 or even, or an empty window.
     """
 
     smoothing: int = 11
@@ -46,6 +47,12 @@ class PrepareOptions:
             raise SettingsError(
                 f"A smoothing width of {self.smoothing} samples has no centre.",
                 hint="Give an odd number, e.g. 11.",
+            )
+        if self.smoothing > _WIDEST:
+            raise SettingsError(
+                f"A smoothing width of {self.smoothing} samples leaves nothing of a "
+                "slip.",
+                hint=f"Give at most {_WIDEST}: a second.",
             )
         if self.downsample < 1:
             raise SettingsError(
@@ -67,10 +74,13 @@ class PrepareOptions:
         """
         if series.is_prepared:
             return 1, 1
-        scale = series.rate / RATE_HZ
+        # A time in a wrong unit makes any rate; nothing is wider than the trial.
+        most = float(series.t.size)
+        scale = min(series.rate, most * RATE_HZ) / RATE_HZ
         # Half a sample counts down: a rate is known to a few digits only.
-        half = round((self.smoothing * scale - 1.0) / 2.0 - _LITTLE)
-        return 2 * max(half, 0) + 1, max(round(self.downsample * scale), 1)
+        half = round(min((self.smoothing * scale - 1.0) / 2.0 - _LITTLE, most))
+        every = round(min(self.downsample * scale, most))
+        return 2 * max(half, 0) + 1, max(every, 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +142,6 @@ class PreparedTrial:
         repeated_rows: rows of the record that were there twice.
         lag: how much later than the motion the forces are; None where the trial does
             not show it.
-        is_load_driven: the motion explains F_n as it should explain F_t, and not F_t.
         stamped_lag: the same by the record's time stamps [s].
         widths: samples that were averaged, and one of how many was kept.
         is_prepared: the record's rows had been prepared before.
@@ -151,7 +160,6 @@ class PreparedTrial:
     dropped_rows: int
     repeated_rows: int
     lag: ForceLag | None
-    is_load_driven: bool
     stamped_lag: float
     widths: tuple[int, int]
     is_prepared: bool
@@ -207,7 +215,6 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
     widths = options.widths(series)
     smooth = _smooth(series, widths[0])
     lag = None if series.is_prepared else force_lag(series.t, series.v_t, series.F_t)
-    load_lag = force_lag(series.t, series.v_t, series.F_n) if lag is None else None
     thinned = np.arange(0, smooth.t.size, widths[1])
     v = smooth.v_t[thinned]
     is_kept = (v >= options.slowest) & (v <= options.fastest)
@@ -227,7 +234,6 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
         dropped_rows=series.dropped_rows,
         repeated_rows=series.repeated_rows,
         lag=lag,
-        is_load_driven=load_lag is not None and not series.is_prepared,
         stamped_lag=series.stamped_lag,
         widths=widths,
         is_prepared=series.is_prepared,

@@ -83,8 +83,9 @@ class TractionSeries:
 
     @property
     def rate(self) -> float:
-        """Sampling rate [Hz], from the median step of time."""
-        return float(1.0 / np.median(np.diff(self.t)))
+        """Sampling rate [Hz], from the median step of time; may be infinite."""
+        with np.errstate(over="ignore"):
+            return float(1.0 / np.median(np.diff(self.t)))
 
     def with_forces_from(self, lag: float) -> "TractionSeries":
         """Return the trial with the forces of `lag` [s] later at every time.
@@ -92,12 +93,25 @@ class TractionSeries:
         Rows whose forces are not recorded are left out.
 
         Raises:
-            SettingsError: fewer than three rows are left.
+            SettingsError: fewer than three rows are left, or the rows were prepared:
+                what lay between them is gone.
         """
+        if self.is_prepared:
+            raise SettingsError(
+                f"{self.name}: forces of kept samples cannot be taken later.",
+                hint="Give the table of the whole trial.",
+            )
         at = self.t + lag
         inside = (at >= self.t[0]) & (at <= self.t[-1])
         F_n, F_t = (np.interp(at, self.t, F)[inside] for F in (self.F_n, self.F_t))
-        return replace(self, t=self.t[inside], v_t=self.v_t[inside], F_n=F_n, F_t=F_t)
+        return replace(
+            self,
+            t=self.t[inside],
+            v_t=self.v_t[inside],
+            F_n=F_n,
+            F_t=F_t,
+            stamped_lag=self.stamped_lag - lag,
+        )
 
 
 def _check_name(terrain: str, name: str) -> None:

@@ -126,6 +126,8 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
         raise refusal(path, "the file is empty", "Check that it was copied whole.")
     _check_size(path, size)
     if start[:2] == b"PK":
+        if form.rate is not None:
+            raise refusal(path, "has a time of its own", "Leave --rate out.")
         return _load_npz(path, form)
     table = load_csv(path, form.columns, form.rate)
     return [form.series(form.terrain, path.name, table)]

@@ -35,7 +35,6 @@ VALUES = {
     "static_friction": "proportional (F_s = f_s F_n) or constant",
 }
 _LATEST_MS = 50.0
-_WIDEST = 501  # samples of smoothing: a second
 _MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
 
@@ -198,8 +197,6 @@ def _listed() -> str:
 
 def _smoothing(value: str) -> StudyVariant:
     width = int(value)
-    if not 1 <= width <= _WIDEST:
-        raise ValueError(value)
     return _of_samples("smoothing", value, lambda p: replace(p, smoothing=width))
 
 

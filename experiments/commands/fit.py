@@ -1,17 +1,9 @@
 """traction fit: the analysis and the report for tables from elsewhere."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from experiments.arguments import add_analysis, add_seed
-
-if TYPE_CHECKING:
-    from analysis.data import TractionSeries
-    from analysis.report import StudyVariant
-    from analysis.study import Study
+from experiments.arguments import add_analysis, add_seed, number_within
 
 EXAMPLES = """\
   traction fit trials.npz --out fit
@@ -34,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--rate",
-        type=_rate,
+        type=number_within(1, 100_000, "a rate in Hz, e.g. 500"),
         metavar="HZ",
         help="rows of a CSV per second, where it has no time",
     )
@@ -48,21 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_analysis(parser)
 
 
-def _rate(text: str) -> float:
-    """Return rows per second.
-
-    Raises:
-        ArgumentTypeError: it is no number of 1 to 100000.
-    """
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if not 1.0 <= rate <= 100_000.0:
-        raise argparse.ArgumentTypeError(f"{text!r} - expected a rate in Hz, e.g. 500")
-    return rate
-
-
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition import SystemClock
@@ -70,7 +47,13 @@ def run(args: argparse.Namespace) -> int:
     from analysis.report import ReportContext, plain_choice, side_by_side, write_report
     from analysis.study import FitOptions, StudyOptions, run_study
     from experiments.operator import Console
-    from experiments.report import REPORTED, analysis_choices, fitting
+    from experiments.report import (
+        REPORTED,
+        analysis_choices,
+        fitting,
+        repeat_study,
+        require_samples,
+    )
     from experiments.session import iso_utc
 
     console = Console(color=not args.no_color)
@@ -79,20 +62,16 @@ def run(args: argparse.Namespace) -> int:
     stones = parse_stones(args.stones) if args.stones else None
     units = parse_units(args.unit) if args.unit else None
     trials = load_tables(args.files, columns, args.terrain, stones, units, args.rate)
-    varied = [_under(choice, trials) for choice in choices.variants]
+    for choice in choices.variants:  # refused before anything is fitted
+        choice.series(next(iter(trials.values()))[0])
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=REPORTED)
     options = StudyOptions(prepare=choices.prepare, fit=fit)
     with fitting(console) as progress:
         study = run_study(trials, options, simulated=False, progress=progress)
-    _require_samples(study)
-    others: list[tuple[StudyVariant, Study]] = []
-    for choice, series in zip(choices.variants, varied, strict=True):
-        console.say(f"What if {choice.text}: fitting ...")
-        with fitting(console) as progress:
-            other = run_study(series, choice.options(options), False, progress)
-        others.append((choice, other))
+    require_samples(study)
+    others = repeat_study(study, trials, choices.variants, console)
     context = ReportContext(
         title="Traction of foreign tables",
         subtitle=f"{count} trials from {len(args.files)} files",
@@ -109,28 +88,3 @@ def run(args: argparse.Namespace) -> int:
         console.say(f"▲ {warning}")
     console.say(str(page))
     return 0
-
-
-def _under(
-    choice: StudyVariant, trials: dict[str, list[TractionSeries]]
-) -> dict[str, list[TractionSeries]]:
-    """Return tables under a choice."""
-    return {name: [choice.series(t) for t in group] for name, group in trials.items()}
-
-
-def _require_samples(study: Study) -> None:
-    """Refuse tables of which nothing is left to fit.
-
-    Raises:
-        SettingsError: no terrain has a sample inside the window.
-    """
-    from acquisition import SettingsError
-
-    if any(result.kept for result in study.terrains.values()):
-        return
-    prepare = study.options.prepare
-    raise SettingsError(
-        "No sample is left to fit: none moves forward at "
-        f"{prepare.slowest:g} to {prepare.fastest:g} m/s.",
-        hint=" ".join(study.warnings) or "Check the columns and their units.",
-    )

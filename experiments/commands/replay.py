@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing
+from experiments.arguments import add_allow_missing, number_within
 
 if TYPE_CHECKING:
     from experiments.operator import Console
@@ -26,7 +26,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "trial", nargs="?", metavar="TRIAL", help="T04, or T04a of rejected/"
     )
     parser.add_argument(
-        "--speed", type=_speed, default=1.0, metavar="N", help="times as fast (1)"
+        "--speed",
+        type=number_within(0.01, 10_000, "a number > 0, e.g. 2"),
+        default=1.0,
+        metavar="N",
+        help="times as fast (1)",
     )
     parser.add_argument(
         "--can",
@@ -36,21 +40,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_allow_missing(parser)
     parser.add_argument("--summary", action="store_true", help="only the sums")
-
-
-def _speed(text: str) -> float:
-    """Return how many times as fast.
-
-    Raises:
-        ArgumentTypeError: it is no number of 0.01 to 10000.
-    """
-    try:
-        speed = float(text)
-    except ValueError:
-        speed = 0.0
-    if not 0.01 <= speed <= 10_000:
-        raise argparse.ArgumentTypeError(f"{text!r} - expected a number > 0, e.g. 2")
-    return speed
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-from .choices import AnalysisChoices, analysis_choices
+from .choices import AnalysisChoices, analysis_choices, repeat_study
 from .export import export_sessions
 from .playback import play
 from .progress import fitting
@@ -8,6 +8,7 @@ from .sessions import (
     choose_sessions,
     export_terrains,
     report_sessions,
+    require_samples,
     tell_missing,
 )
 from .truth_errors import compare_with_truth, z_scores
@@ -23,7 +24,9 @@ __all__ = [
     "export_terrains",
     "fitting",
     "play",
+    "repeat_study",
     "report_sessions",
+    "require_samples",
     "tell_missing",
     "z_scores",
 ]

@@ -1,13 +1,16 @@
 """Choices of an analysis, from the command line."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from acquisition import SettingsError
-from analysis.data import PrepareOptions
+from analysis.data import PrepareOptions, RecordedTrial, TractionSeries
 from analysis.report import StudyVariant, parse_choice, parse_window
+from analysis.study import ResultStore, Study, run_study
 from analysis.tustin import TustinBounds
+from experiments.operator import Console
+from experiments.report.progress import fitting
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,3 +69,22 @@ def _parse_bounds(text: str) -> Mapping[str, tuple[float, float]]:
                 hint=f"Write e.g. --bounds b=-50:50; the names are {', '.join(names)}.",
             ) from error
     return bounds
+
+
+def repeat_study(
+    study: Study,
+    trials: Mapping[str, Sequence[RecordedTrial | TractionSeries]],
+    choices: Sequence[StudyVariant],
+    console: Console,
+    store: ResultStore | None = None,
+) -> list[tuple[StudyVariant, Study]]:
+    """Return a study of the same trials under each choice."""
+    others: list[tuple[StudyVariant, Study]] = []
+    for choice in choices:
+        console.say(f"What if {choice.text}: fitting ...")
+        series = {name: [choice.series(t) for t in ts] for name, ts in trials.items()}
+        options = choice.options(study.options)
+        with fitting(console) as progress:
+            other = run_study(series, options, study.simulated, progress, store)
+        others.append((choice, other))
+    return others

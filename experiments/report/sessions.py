@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from acquisition import SessionError, SystemClock, TrialFileError
+from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from analysis.data import (
     RecordedTrial,
     doubts_of_record,
@@ -14,7 +14,6 @@ from analysis.data import (
 from analysis.findings import summarise_rig
 from analysis.report import (
     ReportContext,
-    StudyVariant,
     plain_choice,
     side_by_side,
     write_report,
@@ -32,7 +31,7 @@ from analysis.study import (
 from analysis.terrains import database_of, identify_study
 from experiments.messages import CATALOGUE
 from experiments.operator import WARNING, Console
-from experiments.report.choices import AnalysisChoices
+from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables
 from experiments.report.truth_errors import truth_tables
@@ -201,24 +200,20 @@ def study_sessions(
     return StudySession(study, trials, problems)
 
 
-def repeated(
-    analysed: StudySession, choice: StudyVariant, data: Path, console: Console
-) -> Study:
-    """Return the study once more under a choice."""
-    console.say(f"What if {choice.text}: fitting ...")
-    series = {
-        name: [choice.series(t) for t in group]
-        for name, group in analysed.trials.items()
-    }
-    options = choice.options(analysed.study.options)
-    with fitting(console) as progress:
-        return run_study(
-            series,
-            options,
-            analysed.study.simulated,
-            progress,
-            ResultStore(data / FOLDS),
-        )
+def require_samples(study: Study) -> None:
+    """Refuse a study of which nothing is left to fit.
+
+    Raises:
+        SettingsError: no terrain has a sample inside the window.
+    """
+    if any(result.kept for result in study.terrains.values()):
+        return
+    prepare = study.options.prepare
+    raise SettingsError(
+        "No sample is left to fit: none moves forward at "
+        f"{prepare.slowest:g} to {prepare.fastest:g} m/s.",
+        hint=" ".join(study.warnings) or "Check the columns and their units.",
+    )
 
 
 def export_terrains(
@@ -265,7 +260,8 @@ def report_sessions(
     fit = FitOptions(bounds=bounds, seed=order.seed, models=REPORTED)
     analysed = study_sessions(sessions, data, order, console, fit)
     study, trials = analysed.study, analysed.trials
-    others = [(c, repeated(analysed, c, data, console)) for c in order.choices.variants]
+    store = ResultStore(data / FOLDS)
+    others = repeat_study(study, trials, order.choices.variants, console, store)
     count = sum(len(group) for group in trials.values())
     out = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(

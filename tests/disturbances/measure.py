@@ -12,12 +12,13 @@ import numpy as np
 from acquisition.errors import TractionError
 from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
-from analysis.data.plausibility import doubts_of
-from analysis.data.prepare import PrepareOptions, prepare_trial
+from analysis.data.prepare import prepare_trial
 from analysis.data.quality import quick_ratio
 from analysis.data.series import Array
 from analysis.data.tables import load_tables
+from analysis.study import FitOptions, StudyOptions, run_study
 from experiments.operator.console import GOOD
+from experiments.report import require_samples
 from experiments.trial.quality import review_trial
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from tests.disturbances.rewriting import rewrite
@@ -71,15 +72,11 @@ def _fitted(folder: Path, table: Array, row: TableRow | None) -> tuple[str, floa
         path = folder / "table.npz"
         np.savez(path, **{"S0/00": table})
     (series,) = next(iter(load_tables([path]).values()))
-    trial = prepare_trial(series, PrepareOptions())
-    doubts = [f"{doubt.name}: {doubt.text}" for doubt in doubts_of(trial)]
-    if trial.dropped_rows:
-        doubts.append("rows were not finite")
-    if trial.repeated_rows:
-        doubts.append("rows were there twice")
-    if not trial.kept and not doubts:
-        raise TractionError("No sample is left to fit.")
-    return "; ".join(doubts), quick_ratio(trial)
+    options = StudyOptions(fit=FitOptions(models=(), draws=0), n_jobs=1)
+    study = run_study({series.terrain: [series]}, options, simulated=False)
+    require_samples(study)
+    trial = prepare_trial(series, options.prepare)
+    return " ".join(study.warnings), quick_ratio(trial)
 
 
 @contextmanager

@@ -110,14 +110,16 @@ def spoilt(table: Array) -> Array:
 REFUSED, FLAGGED, HARMLESS = Outcome
 TABLES = (
     TableRow("nothing", lambda table: table, HARMLESS, 0.0),
-    TableRow("F_t with the other sign", times(F, -1.0), FLAGGED, "ratio"),
-    TableRow("F_n with the other sign", times(N, -1.0), FLAGGED, "normal"),
-    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "direction"),
-    TableRow("v_t in mm/s", times(V, 1e3), FLAGGED, "--unit v_t=mm/s"),
+    TableRow("F_t with the other sign", times(F, -1.0), FLAGGED, "drives the foot"),
+    TableRow(
+        "F_n with the other sign", times(N, -1.0), FLAGGED, "pulls at the moving foot"
+    ),
+    TableRow("heading by 180 degrees", times(V, -1.0), FLAGGED, "goes backward"),
+    TableRow("v_t in mm/s", times(V, 1e3), REFUSED, "--unit v_t=mm/s"),
     TableRow("time in ms", times(T, 1e3), FLAGGED, "--unit t=ms"),
     TableRow("F_n in mN", times(N, 1e3), FLAGGED, "--unit F_n=mN"),
     TableRow("F_n in kN", times(N, 1e-3), FLAGGED, "--unit F_n=kN"),
-    TableRow("F_t in mN, F_n in N", times(F, 1e3), FLAGGED, "friction"),
+    TableRow("F_t in mN, F_n in N", times(F, 1e3), FLAGGED, "outside 0.15 to 5"),
     TableRow("F_n and F_t swapped", swapped, FLAGGED, "swapped"),
     TableRow("F_n and F_t swapped, plate", swapped, FLAGGED, "swapped", "TF"),
     TableRow("force 20 ms late", late(10), FLAGGED, "--what-if lag=2"),

@@ -155,3 +155,26 @@ def test_samples_that_were_prepared_are_not_prepared_again(make_series, moving):
     twice = prepare_trial(again, PrepareOptions())
     np.testing.assert_array_equal(twice.v_t, once.v_t)
     np.testing.assert_array_equal(twice.F_t, once.F_t)
+
+
+@pytest.mark.parametrize("step", [5e-324, 1e-300, 1e-12, 1e-9, 1e-6, 1e3, 1e300])
+@pytest.mark.parametrize("last", [None, 1e301, 1e308])
+def test_a_time_in_any_unit_takes_no_more_than_the_trial(step, last):
+    t = np.arange(2000) * step
+    if last is not None:
+        t = np.concatenate([t[t < last / 2][:1999], [last]])
+    if t.size < 3:
+        return
+    wave = np.sin(np.arange(t.size))
+    series = TractionSeries("S0", "T01", t, 0.1 + 0.01 * wave, 5 + wave, 4 + wave)
+    with np.errstate(over="ignore", invalid="ignore"):
+        trial = prepare_trial(series, PrepareOptions())
+    width, every = trial.widths
+    assert 1 <= width <= 2 * t.size + 1
+    assert 1 <= every <= t.size
+    assert trial.lag is None
+
+
+def test_a_smoothing_wider_than_a_second_is_refused():
+    with pytest.raises(SettingsError, match="nothing of a slip"):
+        PrepareOptions(smoothing=999_999_999)

@@ -261,6 +261,11 @@ def test_a_rate_beside_a_time_is_refused(tmp_path):
         load_tables([write(tmp_path, GOOD)], rate=200.0)
 
 
+def test_a_rate_beside_an_npz_is_refused(slice_path):
+    with pytest.raises(SettingsError, match="a time of its own"):
+        load_tables([slice_path], rate=200.0)
+
+
 def test_a_table_of_kept_samples_is_known_by_its_column(tmp_path):
     header, rest = GOOD.split("\n", 1)
     rows = [f"{row},{k}" for k, row in enumerate(rest.strip().split("\n"))]
