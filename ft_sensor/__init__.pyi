@@ -2,7 +2,7 @@ from . import calibration, serial_line, vendors
 from .payload import LiveFoot, Payload, TerrainFrame, payload_of, traction
 from .reading import ALL_AXES, Wrench, axis_names, largest_traction
 from .section import SensorSection
-from .tare import TareError, TareResult, take_mean
+from .tare import TareError, TareResult, WeightChange, take_mean, weight_change
 
 __all__ = [
     "ALL_AXES",
@@ -12,6 +12,7 @@ __all__ = [
     "TareError",
     "TareResult",
     "TerrainFrame",
+    "WeightChange",
     "Wrench",
     "axis_names",
     "calibration",
@@ -21,4 +22,5 @@ __all__ = [
     "take_mean",
     "traction",
     "vendors",
+    "weight_change",
 ]

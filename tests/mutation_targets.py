@@ -7,7 +7,7 @@ _DRIVER, _DRIVER_TESTS = "wam/driver", "tests/wam/driver"
 _RUN, _RUN_TESTS = "experiments/run", "tests/experiments/run"
 _POSES = (
     "tests/wam/calibration/test_gravity_poses.py",
-    "tests/experiments/calibrating/test_surroundings.py",
+    "tests/experiments/run/test_surroundings.py",
 )
 _SALVAGED = (
     f"{_FILE_TESTS}/test_recover.py",

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experiments.calibrating.pose_walk import PoseWalk
-from experiments.run import ConsoleLoop
+from experiments.run import ConsoleLoop, PoseWalk, activate
 from experiments.session import iso_utc
 from wam.calibration import (
     FreeSpace,
@@ -64,6 +63,7 @@ class GravityGuide:
             chosen = poses or choose_poses(model, count, space)
             return plan_halts(model, start, chosen, space)
 
+        activate(self._walk.console_loop)
         rests = self._measure(self._walk.begin(plan, 2 * AVERAGE))
         self._walk.end()
         return self._fit(rests, is_forced=is_forced)

@@ -6,8 +6,7 @@ import numpy as np
 
 from acquisition import PreflightError, Record
 from acquisition.ipc import WRENCH_SLOTS
-from experiments.calibrating.pose_walk import PoseWalk
-from experiments.run import ConsoleLoop
+from experiments.run import ConsoleLoop, PoseWalk, activate
 from experiments.session import iso_utc
 from ft_sensor.calibration import (
     SensorCalibration,
@@ -65,6 +64,7 @@ class SensorGuide:
             chosen.append(chosen[0])
             return plan_halts(model, start, chosen, space, is_two_sided=False)
 
+        activate(self._walk.console_loop)
         measured = self._measure(self._walk.begin(plan, AVERAGE))
         self._walk.end()
         rotations = np.array([rotation for rotation, _ in measured])

@@ -57,11 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Lead through one calibration and write its file; return the exit code."""
-    from experiments.calibrating import guided
     from experiments.operator import Console, choose_operator, keyboard
     from experiments.preflight import connect_rig, run_preflight
     from experiments.rig import FakeOptions, SimulatedHand, logging_bus
-    from experiments.run import ConsoleLoop, StopFlag, handle_signals
+    from experiments.run import ConsoleLoop, StopFlag, guided, handle_signals
     from experiments.settings import load_settings
 
     _check_arguments(args)
@@ -191,7 +190,7 @@ def _chosen_poses(
     """Return the poses of a person, checked before anything is started; [] = none."""
     if args.pose_file is None:
         return []
-    from experiments.calibrating import read_poses
+    from experiments.run import read_poses
 
     fewest = _FEWEST.get(args.what)
     counts = range(0) if fewest is None else range(fewest, _MOST + 1)

@@ -1,7 +1,8 @@
 """The flow of a session: open, activate, tare, record, review, resume.
 
 `session` opens and closes, `runner` goes from trial to trial on one `context`,
-`console_loop` lets time pass, `resume` continues. Begin with `runner`.
+`console_loop` lets time pass, `resume` continues, `pose_walk` moves the arm by itself.
+Begin with `runner`.
 """
 
 import lazy_loader

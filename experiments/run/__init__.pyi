@@ -1,4 +1,5 @@
 from .console_loop import TICK, ConsoleLoop
+from .pose_walk import PoseWalk, guided
 from .ready import activate
 from .resume import (
     ResumeChoice,
@@ -11,12 +12,14 @@ from .resume import (
 )
 from .session import OpenMode, SessionRequest, run_session
 from .stop import ArmFaultError, StopFlag, StopRequestedError, handle_signals
+from .surroundings import read_poses
 
 __all__ = [
     "TICK",
     "ArmFaultError",
     "ConsoleLoop",
     "OpenMode",
+    "PoseWalk",
     "ResumeChoice",
     "ResumeRequest",
     "SessionRequest",
@@ -25,7 +28,9 @@ __all__ = [
     "activate",
     "choose_resume",
     "close",
+    "guided",
     "handle_signals",
+    "read_poses",
     "redo",
     "resume_request",
     "resume_session",

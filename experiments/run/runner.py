@@ -21,7 +21,7 @@ from experiments.run.context import RunContext, open_context
 from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.run.tare import take_end_tare, take_tare
+from experiments.run.tare import prove_mounting, take_end_tare, take_tare
 from experiments.session import Event, Journal, TrialName, TrialOutcome, write_text
 from experiments.trial import SessionMetadata
 
@@ -83,6 +83,7 @@ class SessionRunner:
         context = self._context
         activate(context.console_loop)
         context.append(Event.ACTIVATED)
+        prove_mounting(context)
         while not context.journal.state.is_over:
             self._try_trial()
             context.update_estimate()

@@ -1,22 +1,28 @@
-"""The tare: the foot is lifted and still, and the sensor shows what it should."""
+"""The tare: the foot is lifted and still, and the sensor shows what it should.
 
-from collections.abc import Mapping
+Before the first one the arm turns the foot and proves that a calibrated sensor is
+mounted as it was: the weight of the foot must turn in it as the joints say.
+"""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from acquisition import PreflightError, TractionError
+from acquisition import PreflightError, TractionError, WrenchSample
 from acquisition.control_loop import ArmState
 from acquisition.ipc import unpack_wrenches
 from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, preflight_error
-from experiments.operator import Prompt
+from experiments.operator import GOOD, Prompt
 from experiments.rig import Rig
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
+from experiments.run.pose_walk import PoseWalk
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import Event, TrialName, write_next_tare
-from ft_sensor import Payload, TareError, TareResult, take_mean
-from ft_sensor.calibration import sensor_from_toml
+from ft_sensor import Payload, TareError, TareResult, take_mean, weight_change
+from ft_sensor.calibration import SensorCalibration, sensor_from_toml
+from wam.calibration import FreeSpace, MeasurementPose, plan_halts, tilted_pair
 from wam.model import Array
 
 TARE_SECONDS = 1.0
@@ -66,6 +72,48 @@ def take_end_tare(context: RunContext) -> None:
     context.say(f"▲ {CATALOGUE['no-end-tare'].text({'detail': detail})}")
 
 
+def prove_mounting(context: RunContext) -> None:
+    """Turn the activated arm's wrist once, if the sensor is a calibrated one.
+
+    Raises:
+        PreflightError: the weight does not turn in the sensor as it should, a joint is
+            not where it was sent, or the arm was touched.
+        SettingsError: the arm cannot rise or turn its wrist.
+        ArmFaultError, StopRequestedError: as `ConsoleLoop.tick`.
+    """
+    rig = context.rig
+    if _calibration_of(rig.settings.calibrations, rig.row.foot) is None:
+        return
+    walk = PoseWalk(context.console_loop)
+
+    def plan(start: Array, space: FreeSpace) -> list[MeasurementPose]:
+        pair = tilted_pair(rig.model, space)
+        return plan_halts(rig.model, start, pair, space, is_two_sided=False)
+
+    rotations: list[Array] = []
+    readings: list[Array] = []
+    for halt in walk.begin(plan, TARE_SECONDS):
+        walk.go_to(halt)
+        if halt.pose is None:
+            continue
+        reader = context.loop_client.wrenches()
+        q, _ = walk.rest(TARE_SECONDS)
+        mean = _mean(
+            unpack_wrenches(reader.read()), rig.settings.rig.limits.tare_spread
+        )
+        rotations.append(rig.model.plate_pose(q)[1])
+        readings.append(np.array(mean.wrench))
+    change = weight_change(rig.payload, rotations, readings)
+    limit = rig.settings.rig.limits.residual
+    if change.error > limit:
+        turned = float(np.degrees(change.turned))
+        raise preflight_error(
+            "mounting", error=change.error, limit=limit, turned=turned
+        )
+    context.say(f"{GOOD} mounting proven: {change.error:.1f} N off (limit {limit:.1f})")
+    walk.ask("Take the arm again. [space]", Prompt.SUPPORT)
+
+
 def residual_force(payload: Payload, known: Array) -> float:
     """Return how far a tared `payload` is from the `known` bias of the sensor [N].
 
@@ -83,13 +131,23 @@ def known_bias(
     It is in a calibration with this foot; a simulated sensor without calibration
     has none by construction. None where it is unknown.
     """
+    stored = _calibration_of(calibrations, foot)
+    if stored is not None:
+        return stored.fit.bias
+    return np.zeros(6) if is_simulated else None
+
+
+def _calibration_of(
+    calibrations: Mapping[str, str], foot: str
+) -> SensorCalibration | None:
+    """Return the sensor's calibration with this foot, None where there is none."""
     for name, text in calibrations.items():
         if not name.startswith(_CALIBRATION) or "readings" not in text:
             continue  # of a container
         stored = sensor_from_toml(text, name.removeprefix(_CALIBRATION))
         if stored.foot == foot:
-            return stored.fit.bias
-    return np.zeros(6) if is_simulated else None
+            return stored
+    return None
 
 
 def _measure(context: RunContext, name: TrialName) -> TareResult:
@@ -106,9 +164,17 @@ def _measure(context: RunContext, name: TrialName) -> TareResult:
     for tick in range(round(TARE_SECONDS / TICK) + 1):
         console_loop.tick(Prompt.LIFT, name)
         console_loop.inject_faults(FaultTrigger.TARE, name.number, tick * TICK)
-    limit = rig.settings.rig.limits.tare_spread
+    return _mean(unpack_wrenches(reader.read()), rig.settings.rig.limits.tare_spread)
+
+
+def _mean(samples: Sequence[WrenchSample], limit: float) -> TareResult:
+    """Return the mean of one second.
+
+    Raises:
+        PreflightError: the force varied, or samples were lost or flagged.
+    """
     try:
-        return take_mean(unpack_wrenches(reader.read()), limit)
+        return take_mean(samples, limit)
     except TareError as error:
         if error.spread is None:
             raise preflight_error("tare-poor", detail=error.message) from error

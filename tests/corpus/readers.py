@@ -13,8 +13,8 @@ from acquisition.errors import TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
-from experiments.calibrating.surroundings import read_poses
 from experiments.operator.scripted import ScriptedOperator
+from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock

@@ -16,8 +16,9 @@ from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.trial_file.verify import verify_file
-from experiments.calibrating import gravity, pose_walk
+from experiments.calibrating import gravity
 from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.run import pose_walk
 from fakes.pucks.bank import PuckBank
 from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction

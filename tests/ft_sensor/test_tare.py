@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from acquisition.devices import WrenchSample
-from ft_sensor.tare import TareError, take_mean
+from ft_sensor.tare import TareError, take_mean, weight_change
+from tests.ft_sensor.test_payload import attitude, mounted
 
 PERIOD_NS = 1_250_000
 
@@ -137,3 +138,27 @@ def test_the_spread_is_that_of_the_force_and_not_of_the_moment():
         for k, sample in enumerate(samples([4.0] * 1600))
     ]
     assert measure(turned).spread == 0.0
+
+
+POSES = (attitude(0.1, 0.2, 0.3), attitude(0.1, -1.0, 0.3))
+
+
+def change_of(tool, seen_with):
+    """Compare what `seen_with` shows in two poses with what `tool` should show."""
+    readings = [seen_with.sign * seen_with.weight(R) + 7.0 for R in POSES]
+    return weight_change(mounted(tool), POSES, readings)
+
+
+def test_a_sensor_mounted_as_it_should_be_sees_the_weight_turn(example_tool):
+    assert change_of(example_tool, mounted(example_tool)).error < 1e-9
+
+
+@pytest.mark.parametrize("degrees", [-90.0, -20.0, 20.0, 90.0, 179.0])
+def test_a_turned_sensor_is_seen_with_its_angle(example_tool, degrees):
+    change = change_of(example_tool, mounted(example_tool, angle=np.radians(degrees)))
+    assert change.error > 1.0
+    assert np.degrees(change.turned) == pytest.approx(degrees)
+
+
+def test_the_other_sign_is_seen(example_tool):
+    assert change_of(example_tool, mounted(example_tool, sign=-1.0)).error > 5.0

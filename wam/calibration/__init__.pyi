@@ -11,6 +11,7 @@ from .poses import (
     choose_orientations,
     choose_poses,
     plan_halts,
+    tilted_pair,
     way_seconds,
 )
 
@@ -26,5 +27,6 @@ __all__ = [
     "gravity_from_toml",
     "gravity_to_toml",
     "plan_halts",
+    "tilted_pair",
     "way_seconds",
 ]

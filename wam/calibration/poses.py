@@ -21,6 +21,8 @@ from wam.model import ArmModel, Array, regressor, straight_way
 APPROACH_SPEED = 0.05  # rad/s, on the last bit
 POINT_SPEED = 0.3  # m/s of sole and elbow; the safety module warns at 0.5
 MARGIN = 0.2  # rad a pose stays away from the joint stops: no wall is near
+# Turns of the wrist from the upright pose (joint index, rad), the most telling first.
+_TILTS = ((5, -1.2), (4, 1.0), (4, -1.0), (5, -0.6))
 _CANDIDATES = 1000
 _SEED = 7
 # How far from the upright pose a candidate may be [rad]: no wild contortions. Gravity
@@ -72,6 +74,27 @@ def choose_orientations(model: ArmModel, count: int, space: FreeSpace) -> list[A
     down = [-model.plate_pose(q)[1][2] for q in reachable]
     blocks = [np.append(direction, 1.0)[None, :] for direction in down]
     return _in_short_order([reachable[i] for i in _most_telling(blocks, count)])
+
+
+def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:
+    """Return two poses that a short turn of the wrist leads between [rad], (7,) each.
+
+    Between them gravity turns far about an axis across z7, so that a sensor that is
+    turned about z7 shows it.
+
+    Raises:
+        SettingsError: no turn of the wrist is clear.
+    """
+    upright = np.array(UPRIGHT)
+    for joint, angle in _TILTS:
+        tilted = upright.copy()
+        tilted[joint] += angle
+        if space.holds(tilted) and space.is_clear(model, upright, tilted):
+            return [upright, tilted]
+    raise SettingsError(
+        "The wrist cannot be turned anywhere: something is in its way.",
+        hint="Is the terrain's frame in matrix.toml right? traction calibrate terrain",
+    )
 
 
 def _most_telling(blocks: Sequence[Array], count: int) -> list[int]:

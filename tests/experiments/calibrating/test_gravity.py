@@ -10,8 +10,8 @@ import pytest
 import fakes.world
 from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
-from experiments.calibrating import pose_walk as walk
 from experiments.operator.prompts import AutoOperator, Prompt
+from experiments.run import pose_walk as walk
 from fakes.plant.plant import PlantOptions
 from tests.experiments.program import traction, write_config
 from wam.calibration import poses as calibration_poses

@@ -1,5 +1,6 @@
 """Calibrations of wrist sensor and container through the whole program."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,9 @@ import fakes.world
 import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
-from experiments.calibrating import pose_walk as walk
 from experiments.calibrating import sensor
 from experiments.operator import prompts as operator
+from experiments.run import pose_walk as walk
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import load_settings
 from fakes.plant import hand
@@ -45,10 +46,11 @@ class OtherRig(fakes.world.FakeRig):
     """
 
     is_in_the_air = True
+    angle, sign = ANGLE, -1.0
 
     def __init__(self, scene, constants, tool, clock, options=None, network=None):
         foot = Body(MASS, COM, tool.foot.inertia)
-        other = replace(tool, foot=foot, sensor_angle=ANGLE, sensor_sign=-1.0)
+        other = replace(tool, foot=foot, sensor_angle=self.angle, sensor_sign=self.sign)
         # Nothing touches the ground, so one step per cycle is fine enough.
         options = options or PlantOptions(substeps=1 if self.is_in_the_air else 4)
         super().__init__(scene, constants, other, clock, options, network)
@@ -176,15 +178,45 @@ def test_drift_is_told_and_refused_unless_forced(tmp_path):
     assert out.exists()
 
 
-def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated):
-    (tmp_path / "ft_sensor.toml").write_text(calibrated[1].read_text())
+def record_with(folder, calibrated, angle=ANGLE, sign=-1.0):
+    """Record a trial with the calibration on a sensor that is mounted like this."""
+    (folder / "ft_sensor.toml").write_text(calibrated[1].read_text())
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
-    config = write_config(tmp_path, rig=change)
+    config = write_config(folder, rig=change)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(fakes.world, "FakeRig", OtherRig)
         patch.setattr(OtherRig, "is_in_the_air", False)
-        done = run_short(config, tmp_path / "data")
+        patch.setattr(OtherRig, "angle", angle)
+        patch.setattr(OtherRig, "sign", sign)
+        patch.setattr(walk, "SETTLE", 0.2)
+        return run_short(config, folder / "data")
+
+
+@pytest.mark.parametrize("off", [90.0, -90.0, 180.0])
+def test_a_sensor_that_was_turned_since_its_calibration_is_refused(
+    tmp_path, calibrated, off
+):
+    done = record_with(tmp_path, calibrated, ANGLE + np.radians(off))
+    assert done.code == 3
+    turned = re.search(r"as if the sensor were turned by (-?\d+) degrees", done.err)
+    assert turned is not None
+    away = (float(turned[1]) - off + 180.0) % 360.0 - 180.0
+    assert abs(away) < 10.0
+    assert "traction calibrate sensor" in done.err
+    assert "ARM: idle, braked." in done.out
+    assert not list((tmp_path / "data").rglob("*.mcap"))
+
+
+def test_a_sensor_whose_sign_was_changed_since_is_refused(tmp_path, calibrated):
+    done = record_with(tmp_path, calibrated, sign=1.0)
+    assert done.code == 3
+    assert "traction calibrate sensor" in done.err
+
+
+def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated):
+    done = record_with(tmp_path, calibrated)
     assert done.code == 0, done.err
+    assert "mounting proven" in done.out
     path = only_session(tmp_path / "data") / "trials" / "T01.mcap"
     # A wrong sign or angle makes it several newtons; drift and bias 0.3-0.5.
     assert force_error(path) < 1.0

@@ -22,6 +22,7 @@ from wam.calibration.poses import (
     choose_poses,
     leg_speed,
     plan_halts,
+    tilted_pair,
     way_seconds,
 )
 from wam.control.position_control import JointMove
@@ -244,3 +245,27 @@ def test_a_pose_is_chosen_only_if_it_is_free_on_both_sides_of_it(model):
         for side in (-OFFSET, 0.0, OFFSET):
             assert tuple(np.round(pose + side, 6)) in Asked.asked
             assert lowest(model, (pose + side)[None])[0] > FLOOR
+
+
+class ClosedTo(FreeSpace):
+    """A space in which joint 6 may not be turned far."""
+
+    def is_clear(self, model, start, goal):
+        return abs(goal[5] - start[5]) < 0.5 and super().is_clear(model, start, goal)
+
+
+@pytest.mark.parametrize("space", [SPACE, ClosedTo(FLOOR)])
+def test_a_turn_of_the_wrist_turns_gravity_across_the_sensor(model, space):
+    upright, tilted = tilted_pair(model, space)
+    assert space.is_clear(model, upright, tilted)
+    first, second = (model.plate_pose(q)[1][2] for q in (upright, tilted))
+    assert np.hypot(*(second - first)[:2]) > 0.6
+
+
+def test_a_wrist_that_cannot_turn_anywhere_is_refused(model):
+    class Closed(FreeSpace):
+        def holds(self, q):
+            return False
+
+    with pytest.raises(SettingsError, match="wrist"):
+        tilted_pair(model, Closed(FLOOR))

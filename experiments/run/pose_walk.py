@@ -5,16 +5,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition import PreflightError, TractionError
-from experiments.calibrating.surroundings import free_space
 from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator import Prompt
-from experiments.run import (
-    TICK,
-    ArmFaultError,
-    ConsoleLoop,
-    StopRequestedError,
-    activate,
-)
+from experiments.run.console_loop import TICK, ConsoleLoop
+from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.surroundings import free_space
 from wam.calibration import (
     APPROACH_SPEED,
     FreeSpace,
@@ -92,7 +87,7 @@ class PoseWalk:
     def begin(
         self, plan: AcceptancePlan, seconds_per_pose: float
     ) -> Sequence[MeasurementPose]:
-        """Activate the arm, plan the way and ask for free space; return the halts.
+        """Plan the way of an activated arm and ask for free space; return the halts.
 
         Args:
             plan: returns the halts, from where the arm is (7,) [rad] and where it may
@@ -101,10 +96,8 @@ class PoseWalk:
 
         Raises:
             SettingsError: no safe way.
-            PreflightError: not activated.
             StopRequestedError, ArmFaultError: as `ConsoleLoop.tick`.
         """
-        activate(self.console_loop)
         start = self._rig.backend.loop_client.latest()["position"][0].copy()
         space = free_space(self._rig.settings, self._rig.row)
         halts = self.console_loop.run_aside(lambda: plan(start, space))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.calibrating.surroundings import container_box, free_space, read_poses
 from experiments.rig.build import build_tool, terrain_frame
+from experiments.run.surroundings import container_box, free_space, read_poses
 from experiments.settings.load import load_settings
 from tests.experiments.program import traction, write_config
 from wam.calibration.free_space import UPRIGHT, FreeSpace, check_poses
