@@ -677,13 +677,14 @@ ROWS: dict[str, dict[str, Fields]] = {
             ),
         ),
         "implausible": (
-            "torques of a foot that is none",
-            "a wrong calibration",
-            "residual of the fit; a calibration of another foot or of a simulation",
+            "torques of a foot that is none, forces of another direction",
+            "a wrong calibration, a sensor turned since",
+            "residual of the fit; a calibration of another foot or of a simulation; the weight must turn in the sensor as the joints say, in two poses before the first tare",
             "refused",
             (),
-            "before the first torque",
+            "before the first torque; 1 N between the poses, 20 degrees about z",
             (
+                "tests/experiments/calibrating/test_sensor.py::test_a_sensor_that_was_turned_since_its_calibration_is_refused",
                 "tests/experiments/calibrating/test_sensor.py::test_a_foot_calibrated_with_another_foot_is_refused",
             ),
         ),
