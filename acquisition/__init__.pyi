@@ -10,6 +10,7 @@ from .clock import (
 )
 from .devices import (
     ArmReading,
+    BusCondition,
     PositionJump,
     SafetyMode,
     Vector,
@@ -19,6 +20,7 @@ from .devices import (
 from .errors import (
     DeviceFaultError,
     LinkError,
+    LinkFullError,
     LinkTimeoutError,
     PreflightError,
     SessionError,
@@ -51,12 +53,14 @@ __all__ = [
     "RATE_HZ",
     "TRUTH",
     "ArmReading",
+    "BusCondition",
     "Clock",
     "DeviceFaultError",
     "DeviceServer",
     "File",
     "Flag",
     "LinkError",
+    "LinkFullError",
     "LinkTimeoutError",
     "Mass",
     "Near",

@@ -19,6 +19,16 @@ class SafetyMode(IntEnum):
     UNKNOWN = 7
 
 
+class BusCondition(IntEnum):
+    """What is known of the bus between host and arm."""
+
+    SOUND = 0
+    DOWN = 1  # the interface refuses to send and receive
+    FULL = 2  # the interface's queue is full: nothing leaves
+    OFF = 3  # the controller has left the bus; what is sent vanishes
+    UNHEARD = 4  # nobody acknowledges what is sent
+
+
 @dataclass(frozen=True, slots=True)
 class PositionJump:
     """A position that no motion explains, and which is therefore not believed.
@@ -50,6 +60,7 @@ class ArmReading:
         missing_cycles: incomplete cycles in a row, 0 = this one is complete.
         jump: a position that was not believed in this cycle; None = all were.
         foreign_id: identifier of a frame that another master sent; None = none ever.
+        has_bus_error: the bus's controller reported an error since the last reading.
     """
 
     host_ns: int
@@ -63,6 +74,7 @@ class ArmReading:
     missing_cycles: int
     jump: PositionJump | None = None
     foreign_id: int | None = None
+    has_bus_error: bool = False
 
 
 @dataclass(slots=True)
@@ -95,8 +107,8 @@ class Arm(Protocol):
         ...
 
     @property
-    def is_bus_down(self) -> bool:
-        """Return whether the bus refused the last question."""
+    def bus_condition(self) -> BusCondition:
+        """Return what became of the bus at the last question."""
         ...
 
     def read(self, now_ns: int) -> ArmReading:

@@ -50,6 +50,10 @@ class LinkError(TractionError):
     exit_code = 4
 
 
+class LinkFullError(LinkError):
+    """A bus takes nothing more: what was sent before has not left."""
+
+
 class LinkTimeoutError(LinkError):
     """A device did not answer in time."""
 

@@ -26,6 +26,8 @@ class Flag(IntFlag):
     JOINT7_LOCKED = 1 << 11
     CONTACT = 1 << 12
     SIMULATED = 1 << 13
+    # 1 << 14 to 1 << 20: the reply of motor 1..7 is fresh
+    BUS_ERROR = 1 << 21  # the bus's controller reported an error in this cycle
 
 
 SAFETY_MODE_MASK = 0b111
@@ -157,6 +159,7 @@ _FT_SATURATED = int(Flag.FT_SATURATED)
 _SAFETY_WARNING = int(Flag.SAFETY_WARNING)
 _SAFETY_FAULT = int(Flag.SAFETY_FAULT)
 _DEADLINE_MISSED = int(Flag.DEADLINE_MISSED)
+_BUS_ERROR = int(Flag.BUS_ERROR)
 _ROUNDING = 0.05  # what is sent may differ from what was wanted by this [N m]
 
 
@@ -167,6 +170,8 @@ def reading_bits(reading: ArmReading, *, is_late: bool) -> int:
         flags |= _ARM_FRESH
     if is_late:
         flags |= _DEADLINE_MISSED
+    if reading.has_bus_error:
+        flags |= _BUS_ERROR
     return flags
 
 

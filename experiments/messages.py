@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from importlib import resources
 from string import Formatter
 
-from acquisition import PreflightError, SafetyMode
+from acquisition import BusCondition, PreflightError, SafetyMode
 from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
 
 
@@ -85,6 +85,18 @@ def catalogue_table(names: Sequence[str] = ()) -> list[str]:
 
 # Names of the messages for a fault whose cause is known; else the fault's own.
 _BY_MONITOR = {Fault.PENDANT_IDLE: "safety-idle", Fault.E_STOP: "safety-stop"}
+_BY_CONDITION = {
+    BusCondition.DOWN: "interface-down",
+    BusCondition.FULL: "unacknowledged",
+    BusCondition.OFF: "bus-off",
+    BusCondition.UNHEARD: "unacknowledged",
+}
+BUS_WORDS = {  # of a bus on which nothing can be asked
+    BusCondition.DOWN: "The CAN interface refuses to send and receive.",
+    BusCondition.FULL: "Nobody on the CAN bus acknowledges: its queue is full.",
+    BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
+    BusCondition.UNHEARD: "Nobody on the CAN bus acknowledges.",
+}
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows
 _PUCKS = 7
 
@@ -96,12 +108,12 @@ class FaultContext:
     Attributes:
         trial: name of the trial, or "The session".
         seconds: since the start of the recording [s], None outside of one.
-        is_bus_down: the CAN interface refuses to work.
+        bus: what is known of the CAN bus.
     """
 
     trial: str = "The session"
     seconds: float | None = None
-    is_bus_down: bool = False
+    bus: BusCondition = BusCondition.SOUND
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -120,8 +132,8 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
             name = _BY_MONITOR[verdict.fault]
     elif isinstance(detail, ReplySilence):
         silent = _nodes(detail.silent)
-        if context.is_bus_down:
-            name = "bus-off"
+        if context.bus is not BusCondition.SOUND:
+            name = _BY_CONDITION[context.bus]
         elif len(silent) < _PUCKS:
             name = "puck-silent"
     values: dict[str, object] = {

@@ -61,6 +61,8 @@ FAULTS = (
     "puck-hot",
     "can-silence",
     "bus-off",
+    "interface-down",
+    "unacknowledged",
     "bus-flooded",
     "safety-speed",
     "safety-torque",

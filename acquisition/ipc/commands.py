@@ -13,11 +13,11 @@ from acquisition.control_loop import (
     from_plain,
     to_plain,
 )
-from acquisition.devices import SafetyMode
+from acquisition.devices import BusCondition, SafetyMode
 from acquisition.ipc.rings import Ring, Slot
 
 _COMMAND: Final = struct.Struct("<QIi12d")
-_STATUS: Final = struct.Struct("<QBB??4xqQQQQ")
+_STATUS: Final = struct.Struct("<QBB?B4xqQQQQ")
 _VALUES = 12
 _NOTHING = (0.0,) * _VALUES
 
@@ -85,7 +85,7 @@ class LoopStatus:
     Attributes:
         obeyed: number of the last command that was obeyed.
         is_running: the loop goes on.
-        is_bus_down: the arm's bus refused the last question.
+        bus_condition: what became of the arm's bus at the last question.
         cycles: cycles run.
         skipped: cycles that were skipped because one took too long.
         late: cycles that began late.
@@ -95,7 +95,7 @@ class LoopStatus:
 
     obeyed: int = 0
     is_running: bool = False
-    is_bus_down: bool = False
+    bus_condition: BusCondition = BusCondition.SOUND
     cycles: int = 0
     skipped: int = 0
     late: int = 0
@@ -122,7 +122,7 @@ class StatusSlot:
             control.state,
             control.safety,
             status.is_running,
-            status.is_bus_down,
+            status.bus_condition,
             control.ft_age_ns,
             status.cycles,
             status.skipped,
@@ -136,13 +136,14 @@ class StatusSlot:
         raw = self._slot.read()
         if len(raw) < _STATUS.size:
             return LoopStatus()
-        obeyed, state, safety, running, is_down, age, cycles, skipped, late, worst = (
+        obeyed, state, safety, running, bus, age, cycles, skipped, late, worst = (
             _STATUS.unpack_from(raw)
         )
         verdict = _verdict_of(raw[_STATUS.size :])
         control = ControlStatus(ArmState(state), SafetyMode(safety), verdict, age)
         return LoopStatus(
-            obeyed, running, is_down, cycles, skipped, late, worst, control
+            *(obeyed, running, BusCondition(bus)),
+            *(cycles, skipped, late, worst, control),
         )
 
 

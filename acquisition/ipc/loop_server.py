@@ -149,7 +149,7 @@ class LoopServer:
     def _publish(self, tick: Tick) -> None:
         status, stats = self._status, self.stats
         status.control = self._cycle.status
-        status.is_bus_down = self._arm.is_bus_down
+        status.bus_condition = self._arm.bus_condition
         status.cycles = self._cycles
         status.skipped, status.late = stats.skipped, stats.late
         status.worst_late_ns = stats.worst_late_ns

@@ -117,6 +117,9 @@ def _sum_up(tally: BusSummary, console: Console) -> None:
         f"answers asked for: {tally.answers} came, {tally.late} of them after more "
         f"than 1 ms, {silent} never came; {tally.unasked} came unasked."
     )
+    if tally.errors:
+        told = ", ".join(f"{name} {n}" for name, n in sorted(tally.errors.items()))
+        console.say(f"Error frames of the controller: {told}.")
     if tally.answers:
         console.say(f"Slowest answer: {tally.slowest_ns // 1000} us.")
     for what, count in tally.silent.most_common():

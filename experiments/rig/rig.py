@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from dataclasses import dataclass
 from typing import Any
 
@@ -147,6 +146,14 @@ def _start_processes(
         raise
 
 
+def _terminal() -> str:
+    """Return the path of the console's terminal, "" where it has none."""
+    try:
+        return os.ttyname(2)
+    except OSError:  # none, or one without a name: a serial console, another mount
+        return ""
+
+
 def _jobs(
     settings: Settings,
     row: TerrainRow,
@@ -164,7 +171,7 @@ def _jobs(
         "row": row.model_dump(mode="json"),
         "gravity": gravity_text,
         "can": rig.can.model_dump(mode="json"),
-        "terminal": os.ttyname(2) if sys.stderr.isatty() else "",
+        "terminal": _terminal(),
     }
     sensor = rig.ft_sensor
     reader = None if sensor.is_on_bus else {**common, "port": sensor.port}

@@ -103,8 +103,8 @@ class RunContext:
 
     def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""
-        is_bus_down = self.loop_client.loop.is_bus_down
-        context = replace(self.fault_context, is_bus_down=is_bus_down)
+        bus = self.loop_client.loop.bus_condition
+        context = replace(self.fault_context, bus=bus)
         return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:

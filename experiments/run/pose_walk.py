@@ -45,7 +45,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
         return INTERRUPTED
     except ArmFaultError as fault:
         place = FaultContext(
-            "The calibration", is_bus_down=console_loop.loop_client.loop.is_bus_down
+            "The calibration", bus=console_loop.loop_client.loop.bus_condition
         )
         was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition import MOTOR_FRESH_SHIFT, SafetyMode, SessionError
+from acquisition import MOTOR_FRESH_SHIFT, BusCondition, SafetyMode, SessionError
 from acquisition.control_loop import ArmState
 from acquisition.trial_file import list_folder
-from experiments.messages import preflight_error, pucks_have
+from experiments.messages import BUS_WORDS, preflight_error, pucks_have
 from experiments.operator import (
     NOTE_KEYS,
     KeyAction,
@@ -64,8 +64,8 @@ def _require_torques(console_loop: ConsoleLoop) -> None:
         raise preflight_error("no-power")
     silent = ~int(control.latest()["flags"][0]) >> MOTOR_FRESH_SHIFT & 0x7F
     detail = f"{pucks_have(silent)} not answered for {_READY_SECONDS * 1e3:.0f} ms."
-    if loop.is_bus_down:
-        detail = "The CAN interface refuses to send and receive."
+    if loop.bus_condition is not BusCondition.SOUND:
+        detail = BUS_WORDS[loop.bus_condition]
     raise preflight_error("not-ready", detail=detail)
 
 

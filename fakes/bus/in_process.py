@@ -10,13 +10,15 @@ from acquisition import NS_PER_S, Clock
 from fakes.pucks import PuckNetwork, WiredNetwork
 
 _PATIENCE_NS = NS_PER_S
+_QUEUE = 11  # frames: txqueuelen 10, and one in the driver
 
 
 class FakeCanBus(can.BusABC):
     """A bus with one host and a `PuckNetwork`; time comes from the clock alone.
 
-    Frames have the clock's monotonic time as their stamp [s]. A controller that has
-    left the bus (`network.faults.is_off`) refuses to send and to receive.
+    Frames have the clock's monotonic time as their stamp [s]. An interface that is down
+    (`network.faults.is_down`) refuses to send and to receive. What is sent through a
+    controller that has left the bus (`is_off`) vanishes without a word, as in Linux.
     """
 
     def __init__(self, network: PuckNetwork, clock: Clock) -> None:
@@ -25,6 +27,7 @@ class FakeCanBus(can.BusABC):
         self._faults = network.faults
         self._clock = clock
         self._inbox: deque[can.Message] = deque()
+        self._stuck: deque[can.Message] = deque()
         self._wired = WiredNetwork(network)
         self._t_ns = -1  # how far it has gone on
         super().__init__(channel="fake")
@@ -37,12 +40,29 @@ class FakeCanBus(can.BusABC):
         """
         if self._is_shutdown:
             raise can.CanOperationError("the bus was shut down")
-        if self._faults.is_off:
+        faults = self._faults
+        if faults.is_down:
             self._refuse()
+        if faults.is_off:
+            self._wired.drop_waiting()
+            return
+        if faults.is_unheard:
+            if len(self._stuck) == _QUEUE:
+                raise can.CanOperationError("No buffer space available", errno.ENOBUFS)
+            self._stuck.append(msg)
+            return
         now_ns = self._clock.now_ns()
         self.advance(now_ns)  # what was sent before takes the wire first
+        if self._stuck:
+            self._release(now_ns)
         if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
             self._wired.send(now_ns, msg.arbitration_id, bytes(msg.data))
+
+    def _release(self, now_ns: int) -> None:
+        """Let the frames leave that waited while nobody acknowledged."""
+        while self._stuck:
+            old = self._stuck.popleft()
+            self._wired.send(now_ns, old.arbitration_id, bytes(old.data))
 
     def fileno(self) -> int:
         """There is no descriptor to wait on."""
@@ -74,8 +94,12 @@ class FakeCanBus(can.BusABC):
         Raises:
             can.CanOperationError: the bus is off.
         """
-        if self._faults.is_off:
+        faults = self._faults
+        if faults.is_down:
             self._refuse()
+        if faults.error_frames:
+            classes, detail = faults.error_frames.pop(0)
+            return can.Message(arbitration_id=classes, is_error_frame=True, data=detail)
         clock = self._clock
         if self._filters is None:  # the way that nearly every question takes
             inbox = self._inbox
@@ -109,10 +133,10 @@ class FakeCanBus(can.BusABC):
         return self._clock.wait(_Inbox(self), self._clock.now_ns() + patience_ns)
 
     def _refuse(self) -> NoReturn:
-        """Lose what waits, and say so as an adapter does while it is off the bus."""
+        """Lose what waits, and say so as an interface does while it is down."""
         self._inbox.clear()
         self._wired.drop_waiting()
-        raise can.CanOperationError("the controller is bus-off", errno.ENETDOWN)
+        raise can.CanOperationError("Network is down", errno.ENETDOWN)
 
 
 class _Inbox:

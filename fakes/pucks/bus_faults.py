@@ -27,6 +27,9 @@ FOREIGN_IDS = (
     compose_id(11, 11, is_group=True),
 )
 _FOREIGN_DATA = bytes(range(8))
+# Classes and detail of error frames.
+_BUS_OFF, _RESTARTED, _PASSIVE = 0x040, 0x100, 0x204
+_TX_PASSIVE = bytes((0, 0x20, 0, 0, 0, 0, 130, 0))
 
 Effect = Callable[[bytes], list[tuple[int, bytes]]]  # data -> (delay [ns], data), ...
 
@@ -58,11 +61,18 @@ class BusFaults:
     `count` is how many frames a fault strikes, None = all until `clear_faults`.
 
     Attributes:
-        is_off: the host's controller has left the bus: nothing is sent or received.
+        is_down: the host's interface is down: it refuses to send and to receive.
+        is_off: the host's controller has left the bus, as Linux shows it: what is sent
+            vanishes, nothing arrives, and one error frame told it.
+        is_unheard: nobody acknowledges what the host sends: it waits in its queue.
+        error_frames: (classes, detail) that the host's controller has still to tell.
     """
 
     def __init__(self, schedule: EventQueue, seed: int = 0) -> None:
+        self.is_down = False
         self.is_off = False
+        self.is_unheard = False
+        self.error_frames: list[tuple[int, bytes]] = []
         self._schedule = schedule
         self._rng = np.random.default_rng(seed)
         self._rules: dict[int, list[_Rule]] = {}
@@ -113,11 +123,32 @@ class BusFaults:
     def go_off(self) -> None:
         """Let the host's controller leave the bus, as after too many errors."""
         self.is_off = True
+        self.error_frames.append((_BUS_OFF, bytes(8)))
         self._step_in()
+
+    def go_unheard(self) -> None:
+        """Leave the host alone on the bus, as behind a torn cable.
+
+        Its controller becomes passive and repeats its frame for ever; it never leaves.
+        """
+        self.is_unheard = True
+        self.error_frames.append((_PASSIVE, _TX_PASSIVE))
+        self._step_in()
+
+    def go_down(self) -> None:
+        """Set the host's interface down, as `ip link set can0 down` does."""
+        self.is_down = True
+        self._step_in()
+
+    def report_error(self, classes: int, detail: bytes = bytes(8)) -> None:
+        """Let the host's controller tell an error frame with `classes`."""
+        self.error_frames.append((classes, detail))
 
     def clear_faults(self) -> None:
         """End everything; frames that are late already still come."""
-        self.is_off = False
+        if self.is_off:
+            self.error_frames.append((_RESTARTED, bytes(8)))
+        self.is_off = self.is_down = self.is_unheard = False
         self._flood += 1
         self._rules.clear()
 
@@ -167,7 +198,7 @@ class BusFaults:
         self._schedule.after(at_ns - now_ns, lambda: self._put(can_id, data))
 
     def _put(self, can_id: int, data: bytes) -> None:
-        if not self.is_off:
+        if not (self.is_off or self.is_down or self.is_unheard):
             self._schedule.put(can_id, data)
 
     def _say_foreign(self, flood: int, gap_ns: float, ids: Sequence[int]) -> None:

@@ -260,11 +260,25 @@ TABLE: dict[str, Row] = {
         idle=_not_ready("Pucks 1,2,3,4,5,6,7 have not answered for 100 ms."),
     ),
     "bus-off": _ending(
+        "The CAN controller has left the bus after too many errors (bus-off); no reply",
+        _UNKNOWN,
+        "can-silence",
+        preflight=_refused("The CAN controller has left the bus"),
+        idle=_not_ready("The CAN controller has left the bus (bus-off)."),
+    ),
+    "interface-down": _ending(
         "The CAN interface refuses to send and receive; no reply",
         _UNKNOWN,
         "can-silence",
         preflight=_refused("CAN fake bus broke"),
         idle=_not_ready("The CAN interface refuses to send and receive."),
+    ),
+    "unacknowledged": _ending(
+        "Nobody on the CAN bus acknowledges; no reply",
+        _UNKNOWN,
+        "can-silence",
+        preflight=_refused("CAN fake bus: the send queue is full"),
+        idle=_not_ready("Nobody on the CAN bus acknowledges"),
     ),
     "bus-flooded": _row(OK),
     "bus-shared": _ending(

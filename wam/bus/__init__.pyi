@@ -1,4 +1,5 @@
-from .decoder import BusReader, BusSummary, DecodedLine
+from .decoder import BusReader
+from .error_frames import BusErrors, error_names
 from .frames import (
     GROUP_BIT,
     MOTOR_NODES,
@@ -31,7 +32,7 @@ from .frames import (
     wrap_position,
 )
 from .link import CanBus, CanLink, FrameTap, Link, open_bus
-from .log import LONGEST_LINE, CanLog, parse_log
+from .log import LONGEST_LINE, BusSummary, CanLog, DecodedLine, parse_log
 from .properties import (
     MAGNETIC_ENCODER,
     MODERN,
@@ -61,6 +62,7 @@ __all__ = [
     "SAFETY_NODE",
     "SENDER_MASK",
     "SENSOR_NODE",
+    "BusErrors",
     "BusReader",
     "BusSummary",
     "CanBus",
@@ -95,6 +97,7 @@ __all__ = [
     "encode_set",
     "encode_torque",
     "encode_torques",
+    "error_names",
     "group_id",
     "is_wide",
     "names",

@@ -5,11 +5,10 @@ has no sequence numbers: an answer belongs to the oldest open question of its ki
 a question asked again after the answer's time limit replaces the one before.
 """
 
-from collections import Counter
-from dataclasses import dataclass, field
 from enum import Enum
 
 from acquisition import SafetyMode
+from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, error_names
 from wam.bus.frames import (
     HOST,
     MOTOR_NODES,
@@ -28,7 +27,7 @@ from wam.bus.frames import (
     decode_torques,
     split_id,
 )
-from wam.bus.log import LoggedFrame
+from wam.bus.log import BusSummary, DecodedLine, LoggedFrame
 from wam.bus.properties import FIRST_RELEASED, Device, PuckMode, PuckStatus, names
 
 LIMIT_NS = 1_000_000  # an answer is late after this
@@ -69,39 +68,6 @@ _SPECIAL = {
 _Key = tuple[int, ReplyKind | int]  # node, and what it is to say: a property by number
 
 
-@dataclass(frozen=True, slots=True)
-class DecodedLine:
-    """A line of text and its time: UTC [ns]."""
-
-    utc_ns: int
-    text: str
-
-
-@dataclass(slots=True)
-class BusSummary:
-    """What a log adds up to.
-
-    Attributes:
-        frames: all of them.
-        foreign: frames no WAM uses: extended, remote.
-        questions: answers asked for; a group is asked once per member.
-        answers: those that came.
-        late: those that came after more than 1 ms.
-        slowest_ns: the longest wait for an answer.
-        unasked: answers without a question.
-        silent: questions without an answer, by device and property.
-    """
-
-    frames: int = 0
-    foreign: int = 0
-    questions: int = 0
-    answers: int = 0
-    late: int = 0
-    slowest_ns: int = 0
-    unasked: int = 0
-    silent: Counter[str] = field(default_factory=Counter[str])
-
-
 def node_name(node: int) -> str:
     """Return what a person calls a node of the bus."""
     known = {HOST: "host", SENSOR_NODE: "F/T sensor", SAFETY_NODE: "safety module"}
@@ -128,8 +94,7 @@ class BusReader:
         self.tally.frames += 1
         spoken = self._give_up(frame.utc_ns - _GIVE_UP_NS)
         if not frame.is_of_wam:
-            self.tally.foreign += 1
-            text = f"a frame no WAM uses: {frame.can_id:x}"
+            text = self._say_foreign(frame)
             return [*spoken, DecodedLine(frame.utc_ns, text)]
         address = split_id(frame.can_id)
         try:
@@ -158,6 +123,14 @@ class BusReader:
         if address.is_group and address.to == Group.BUS:
             return f"{who} tells every puck: {frame.data.hex(' ')}"
         return f"{who} sends {frame.can_id:03x} {frame.data.hex(' ')}"
+
+    def _say_foreign(self, frame: LoggedFrame) -> str:
+        if frame.can_id & ERROR_FLAG and frame.can_id < EXTENDED_FLAG:
+            names = error_names(frame.can_id, frame.data)
+            self.tally.errors.update(names)
+            return f"the controller reports: {', '.join(sorted(names))}"
+        self.tally.foreign += 1
+        return f"a frame no WAM uses: {frame.can_id:x}"
 
     def _hear_host(
         self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]

@@ -24,6 +24,7 @@ SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
 _POSITION_SIZES = frozenset({3, 6})  # without and with a joint encoder's
 _POSITION_MODULUS = 1 << 22
+_POSITION_MASK = _POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
 _TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
 _FORCE_PER_N = 256.0
@@ -174,11 +175,12 @@ def decode_position(data: Payload) -> int:
     `decode_joint_encoder`.
 
     Raises:
-        FrameError: not 3 or 6 bytes, or the two spare bits are set.
+        FrameError: not 3 or 6 bytes.
     """
-    counts = int.from_bytes(data[:3], "big")
-    if len(data) not in _POSITION_SIZES or counts >= _POSITION_MODULUS:
+    if len(data) not in _POSITION_SIZES:
         raise FrameError("Not a position reply", data)
+    # The two bits above the 22 have no meaning, as for the vendor's library.
+    counts = int.from_bytes(data[:3], "big") & _POSITION_MASK
     return counts - _POSITION_MODULUS if counts & _POSITION_SIGN else counts
 
 
@@ -240,10 +242,14 @@ def encode_force(force: Triple) -> bytes:
 
 
 def decode_force(data: Payload) -> Triple:
-    """Return the force [N] of a frame; raises FrameError unless it has 6 bytes."""
-    if len(data) != 6:
+    """Return the force [N] of a frame of 6 bytes; a seventh is left alone.
+
+    Raises:
+        FrameError: neither 6 nor 7 bytes.
+    """
+    if len(data) not in (6, 7):
         raise FrameError("Not a force frame", data)
-    return _decode_triple(data, _FORCE_PER_N)
+    return _decode_triple(data[:6], _FORCE_PER_N)
 
 
 def encode_torque(torque: Triple, status: int | None = None) -> bytes:

@@ -6,11 +6,13 @@ from typing import NamedTuple, Protocol
 
 import can
 
-from acquisition import NS_PER_S, Clock, LinkError, utc_offset_ns
+from acquisition import NS_PER_S, Clock, LinkError, LinkFullError, utc_offset_ns
 from acquisition.ipc import FrameTape
+from wam.bus.error_frames import BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
+_FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
 _DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
 
 
@@ -37,6 +39,11 @@ class Link(Protocol):
     @property
     def mode_hints(self) -> int:
         """Number of changes of mode that the safety module has announced."""
+        ...
+
+    @property
+    def errors(self) -> BusErrors:
+        """What error frames of the controller reported."""
         ...
 
     @property
@@ -100,7 +107,7 @@ class CanLink:
 
     Attributes:
         mode_hints: broadcasts of the safety module so far.
-        error_frames: error frames of the controller so far.
+        errors: what error frames of the controller reported.
         foreign_ids: identifiers of hosts' frames that have arrived so far.
         foreign_id: the first of them; None = none has.
     """
@@ -115,7 +122,7 @@ class CanLink:
         """
         self._tap = tap
         self.mode_hints = 0
-        self.error_frames = 0
+        self.errors = BusErrors()
         self.foreign_ids: set[int] = set()
         self.foreign_id: int | None = None
         self._bus = bus
@@ -183,7 +190,7 @@ class CanLink:
                 if message is None:
                     break
                 if message.is_error_frame:
-                    self.error_frames += 1
+                    self.errors.add(message.arbitration_id, message.data)
                 elif not (message.is_extended_id or message.is_remote_frame):
                     data, stamp = bytes(message.data), message.timestamp
                     frames.append(Frame(message.arbitration_id, data, stamp))
@@ -226,9 +233,11 @@ def _cannot_open(
 
 
 def _broken(channel: str, error: Exception) -> LinkError:
-    if _number_of(error) in (errno.ENOBUFS, None) and "full" in str(error).lower():
-        return LinkError(
-            f"CAN {channel}: the send buffer is full.",
+    number = _number_of(error)
+    is_full = number in _FULL or (number is None and "full" in str(error).lower())
+    if is_full:
+        return LinkFullError(
+            f"CAN {channel}: the send queue is full.",
             hint="Nobody acknowledges: is the arm powered, is the bus terminated?",
         )
     return LinkError(

@@ -1,8 +1,9 @@
 """A bus log in the text format of candump: `(1699999999.123456) can0 404#30`."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappushpop
 
 from acquisition import NS_PER_S, Clock, TractionError, utc_offset_ns
@@ -10,7 +11,7 @@ from acquisition import NS_PER_S, Clock, TractionError, utc_offset_ns
 LONGEST_LINE = 120  # characters
 _LINE = re.compile(
     r"\((\d{1,10})\.(\d{6})\) ([!-~]{1,32}) "
-    r"([0-7][0-9A-F]{2}|[01][0-9A-F]{7})#((?:[0-9A-F]{2}){0,8}|R[0-8]?)(?: [RT])?",
+    r"([0-7][0-9A-F]{2}|[0-3][0-9A-F]{7})#((?:[0-9A-F]{2}){0,8}|R[0-8]?)(?: [RT])?",
     re.ASCII | re.IGNORECASE,
 )
 _WRITE_AT = 4096  # frames kept back at most
@@ -42,6 +43,41 @@ class LoggedFrame:
     can_id: int
     data: bytes
     is_of_wam: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class DecodedLine:
+    """A line of text and its time: UTC [ns]."""
+
+    utc_ns: int
+    text: str
+
+
+@dataclass(slots=True)
+class BusSummary:
+    """What a log adds up to.
+
+    Attributes:
+        frames: all of them.
+        foreign: frames no WAM uses: extended, remote.
+        questions: answers asked for; a group is asked once per member.
+        answers: those that came.
+        late: those that came after more than 1 ms.
+        slowest_ns: the longest wait for an answer.
+        unasked: answers without a question.
+        errors: what error frames of the controller reported, by name.
+        silent: questions without an answer, by device and property.
+    """
+
+    frames: int = 0
+    foreign: int = 0
+    questions: int = 0
+    answers: int = 0
+    late: int = 0
+    slowest_ns: int = 0
+    unasked: int = 0
+    errors: Counter[str] = field(default_factory=Counter[str])
+    silent: Counter[str] = field(default_factory=Counter[str])
 
 
 def format_frame(utc_ns: int, channel: str, can_id: int, data: bytes) -> str:

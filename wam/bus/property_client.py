@@ -1,6 +1,6 @@
 """Properties of the devices on the bus, read and set outside the loop."""
 
-from acquisition import Clock, LinkTimeoutError
+from acquisition import BusCondition, Clock, LinkTimeoutError
 from wam.bus.frames import (
     HOST,
     FrameError,
@@ -30,6 +30,11 @@ class PropertyClient:
         self.late_replies = 0
         self._link = link
         self._clock = clock
+
+    @property
+    def bus_condition(self) -> BusCondition:
+        """What the bus's controller reported last."""
+        return self._link.errors.condition
 
     def get(self, node: int, number: int, within_ns: int = _ANSWER_NS) -> int | None:
         """Return the value of property `number` of `node`, None if it is silent.

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from acquisition import (
     ArmReading,
+    BusCondition,
     Clock,
     DeviceFaultError,
     LinkError,
@@ -105,10 +106,8 @@ class WamArm:
         )
         self._motion = JointEstimator(transmission, self._settings)
         self._begin_at_rest()
-        pucks = tuple(
-            replace(puck, health=dated)
-            for puck, dated in zip(info.pucks, self.health(), strict=True)
-        )
+        dated = zip(info.pucks, self.health(), strict=True)
+        pucks = tuple(replace(puck, health=health) for puck, health in dated)
         return replace(info, pucks=pucks, late_replies=self._properties.late_replies)
 
     def read(self, now_ns: int) -> ArmReading:
@@ -128,8 +127,8 @@ class WamArm:
     def _reading(self, now_ns: int) -> ArmReading:
         motion, traffic = self._started(), self._traffic
         fresh = motion.update(now_ns, traffic.received)
-        arrived = MOTORS - traffic.received.count(None)
-        self.counters.rejected += arrived - fresh.bit_count()
+        lost = traffic.received.count(None)
+        self.counters.rejected += MOTORS - lost - fresh.bit_count()
         is_complete = fresh == _ALL_FRESH
         self._missing_cycles = 0 if is_complete else self._missing_cycles + 1
         if not (is_complete and self._is_commanded):
@@ -148,6 +147,7 @@ class WamArm:
             missing_cycles=self._missing_cycles,
             jump=motion.jump,
             foreign_id=self._link.foreign_id,
+            has_bus_error=traffic.take_bus_error(),
         )
 
     def send(self, tau: Vector, tau_gravity: Vector) -> Vector:
@@ -184,9 +184,9 @@ class WamArm:
         return self._poller.faults
 
     @property
-    def is_bus_down(self) -> bool:
-        """Whether the bus refused the last question for positions."""
-        return self._traffic.is_down
+    def bus_condition(self) -> BusCondition:
+        """What became of the bus at the last question for positions."""
+        return self._traffic.condition
 
     def health(self) -> tuple[PuckHealth, ...]:
         """Return the newest reports of pucks 1 to 7 and their times; does not wait."""

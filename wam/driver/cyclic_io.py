@@ -6,10 +6,17 @@ Time-outs follow the measured budget of one 2 ms cycle on a 1 Mbit/s bus.
 from dataclasses import dataclass, field
 from typing import Final, Protocol
 
-from acquisition import Clock, DeviceFaultError, LinkError
+from acquisition import (
+    BusCondition,
+    Clock,
+    DeviceFaultError,
+    LinkError,
+    LinkFullError,
+)
 from wam.bus import (
     MODERN,
     MOTOR_NODES,
+    BusErrors,
     Device,
     Group,
     Link,
@@ -40,6 +47,7 @@ class LinkCounters:
         rejected: positions that jumped.
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
+        errors: what error frames of the bus's controller reported.
     """
 
     missing: list[int] = field(default_factory=lambda: [0] * MOTORS)
@@ -47,6 +55,7 @@ class LinkCounters:
     rejected: int = 0
     malformed: int = 0
     link_errors: int = 0
+    errors: BusErrors = field(default_factory=BusErrors)
 
     def text(self) -> str:
         """Return the counters in one line."""
@@ -60,6 +69,7 @@ class LinkCounters:
             "link:rejected_jumps": str(self.rejected),
             "link:malformed_frames": str(self.malformed),
             "link:bus_errors": str(self.link_errors),
+            "link:error_frames": self.errors.text() or "none",
         }
 
 
@@ -90,7 +100,7 @@ class CycleTraffic:
         poller: safety module and pucks, asked in the free bus time.
         bus_device: asked right after the positions, while the pucks latch theirs.
         counters: what was dropped so far.
-        is_down: the bus refused the last question for positions.
+        condition: what became of the bus at the last question for positions.
     """
 
     def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
@@ -100,8 +110,9 @@ class CycleTraffic:
         self.sent_ns = 0
         self.poller = StatusPoller(link, settings)
         self.bus_device: BusDevice | None = None
-        self.counters = LinkCounters()
-        self.is_down = False
+        self.counters = LinkCounters(errors=link.errors)
+        self.condition = BusCondition.SOUND
+        self._errors_seen = 0  # error frames
         self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
         self._link = link
         self._clock = clock
@@ -131,11 +142,17 @@ class CycleTraffic:
             self._link.send(_ARM_ID, self._get_p)
             self._ask_companion()
             self._await_replies(now_ns)
-            self.is_down = False
+            refused = BusCondition.SOUND
+        except LinkFullError:
+            refused = BusCondition.FULL
+            self.counters.link_errors += 1
         except LinkError:
-            self.is_down = True
+            refused = BusCondition.DOWN
             self.counters.link_errors += 1
         self._owed = self._missing()
+        if not self._owed:
+            self._link.errors.confirm()
+        self.condition = refused or self._link.errors.condition
         if self._owed:
             for i in range(MOTORS):
                 self.counters.missing[i] += self._owed >> i & 1
@@ -147,9 +164,16 @@ class CycleTraffic:
         try:
             self.counters.stale += self._collect()
         except LinkError:
-            self.is_down = True
+            self.condition = BusCondition.DOWN
             self.counters.link_errors += 1
         self.received = [None] * MOTORS
+
+    def take_bus_error(self) -> bool:
+        """Return whether the controller reported an error since the last time."""
+        frames = self._link.errors.frames
+        is_new = frames != self._errors_seen
+        self._errors_seen = frames
+        return is_new
 
     def transmit(self, units: list[int]) -> bool:
         """Send torques [puck units]; return False when the bus refused a frame."""

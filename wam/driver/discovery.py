@@ -2,7 +2,13 @@
 
 from collections.abc import Iterable, Sequence
 
-from acquisition import Clock, DeviceFaultError, PreflightError, SafetyMode
+from acquisition import (
+    BusCondition,
+    Clock,
+    DeviceFaultError,
+    PreflightError,
+    SafetyMode,
+)
 from wam.bus import MOTOR_NODES, SAFETY_NODE, PropertyClient, PuckStatus
 from wam.driver.safety_module import SafetyModule
 
@@ -38,6 +44,8 @@ def discover_pucks(
         properties.pause(boot_ns)
         stats.update(_ask(properties, silent, _SECOND_LOOK_NS))
         mode = _mode(properties, clock, stats)
+    if not stats:
+        _check_bus(properties.bus_condition)
     _check_present(stats, mode)
     return dict(sorted(stats.items()))
 
@@ -67,6 +75,25 @@ def _mode(
     if SAFETY_NODE not in stats:
         return SafetyMode.UNKNOWN
     return SafetyModule(properties, clock, vers=0).mode()
+
+
+def _check_bus(condition: BusCondition) -> None:
+    """Say why nobody answers where the bus's controller knows it.
+
+    Raises:
+        PreflightError: it has left the bus, or is alone on it.
+    """
+    if condition is BusCondition.OFF:
+        raise PreflightError(
+            "The CAN controller has left the bus after too many errors (bus-off).",
+            hint="Check cable and bit rate, then restart it: ip link set can0 type can "
+            "restart, or down and up.",
+        )
+    if condition is BusCondition.UNHEARD:
+        raise PreflightError(
+            "Nobody on the CAN bus acknowledges.",
+            hint="Is the arm powered, is the bus terminated, is the cable in?",
+        )
 
 
 def _check_present(stats: dict[int, int], mode: SafetyMode) -> None:

@@ -6,6 +6,7 @@ from acquisition.clock import PERIOD_NS
 from acquisition.control_loop.faults import Action
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import ArmState, ControlStatus
+from acquisition.devices import BusCondition
 from acquisition.ipc.commands import CommandKind, CommandQueue, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.loop_server import LoopHooks, LoopServer
@@ -44,7 +45,7 @@ class Cycle:
 
 class Arm:
     sent_ns = 5
-    is_bus_down = False
+    bus_condition = BusCondition.SOUND
 
 
 class Loop:

@@ -22,12 +22,17 @@ from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.preflight import preflight
 from experiments.rig import backend as inline_crew
+from experiments.rig.build import build_tool
 from experiments.run import ready
 from experiments.run import tare as taring
 from experiments.session.lock import session_lock
 from experiments.session.reducer import replay
 from experiments.session.store import list_sessions
+from experiments.settings.load import load_settings
 from ft_sensor import tare
+from ft_sensor.calibration.fit import SensorFit
+from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
+from ft_sensor.payload import payload_of
 from tests.experiments.built import Built, watch_builds
 from tests.experiments.commands.test_shared_arm import SHARED_ARM
 from tests.experiments.messages import pattern
@@ -383,6 +388,22 @@ def _other_foot(scene):
     return done
 
 
+def _turned_sensor(scene):
+    """Begin a session with a calibration from before the sensor was turned round."""
+    folder = scene.data.parent / "turned"
+    folder.mkdir()
+    change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
+    config = write_config(folder, rig=change)
+    payload = payload_of(build_tool(load_settings(scene.config).rig, "tread"))
+    fit = SensorFit(payload.mass, payload.com, np.zeros(6), np.pi, 1.0, 0.05, 0.001)
+    poses = np.stack([np.eye(3)] * 6)
+    old = SensorCalibration(fit, "tread", 0.1, "2026", True, poses, np.zeros((6, 6)))
+    (folder / "ft_sensor.toml").write_text(sensor_to_toml(old))
+    scene.watch()
+    options = ("--fake", "--fast", *AUTO, "--config", config)
+    return traction("run", "TF", *options, "--data", folder / "data")
+
+
 def _no_end_tare(scene):
     def press(asked, _):
         if asked.prompt is Prompt.REVIEW:
@@ -394,7 +415,7 @@ def _no_end_tare(scene):
 
 CASES = {
     # what a preflight finds
-    "can-down": fault("can-down", 3, words="broke: the controller is bus-off"),
+    "can-down": fault("can-down", 3, words="broke: Network is down"),
     "puck-missing": fault("puck-missing", 3, words="Puck 5 does not answer (1,2,3,4,6"),
     "not-zeroed": fault("not-zeroed", 3),
     "ft-silent": fault("ft-silent", 3, words="No F/T data for 100 ms (port open, 0"),
@@ -424,6 +445,7 @@ CASES = {
     "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
     "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
     "tare-poor": tared(_saturate, words="were flagged during tare"),
+    "mounting": Case(_turned_sensor, 3, words="by 180 degrees"),
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
     # what takes the arm away; in a trial: test_bus_faults
     "can-silence": struck("can-silence"),
@@ -432,6 +454,8 @@ CASES = {
     "bus-shared": struck("bus-shared", words="frame 4"),
     "puck-silent": struck("puck-silent", words="Puck 3 has not"),
     "bus-off": struck("bus-off"),
+    "interface-down": struck("interface-down"),
+    "unacknowledged": struck("unacknowledged"),
     "estop": fault("estop@T2+0.1s", 4, E_STOP, "Stop pressed at 0.1"),
     "pendant-idle": struck("pendant-idle"),
     "safety-idle": struck("safety-torque", words="torque fault"),

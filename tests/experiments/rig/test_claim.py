@@ -10,6 +10,7 @@ from fakes.bus.hub import SocketHub
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig, SteppedClock
 from tests.wam.bus.test_link import message
+from wam.bus.error_frames import BusErrors
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
 
@@ -91,6 +92,7 @@ def test_an_arm_at_rest_may_be_claimed(mode):
 def test_a_silent_safety_module_is_left_to_the_start_up():
     class Silent:
         mode_hints = 0
+        errors = BusErrors()
         foreign_id = None
 
         def send(self, can_id, data):

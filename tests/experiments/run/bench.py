@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from acquisition.control_loop.states import ControlStatus
-from acquisition.devices import SafetyMode
+from acquisition.devices import BusCondition, SafetyMode
 from experiments.operator.console import Console
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
@@ -30,7 +30,9 @@ class StubClient:
     requested: list = field(default_factory=list)
     on_advance: list = field(default_factory=list)
     loop: SimpleNamespace = field(
-        default_factory=lambda: SimpleNamespace(is_bus_down=False, is_running=True)
+        default_factory=lambda: SimpleNamespace(
+            bus_condition=BusCondition.SOUND, is_running=True
+        )
     )
 
     def advance(self, seconds):

@@ -4,7 +4,7 @@ import pytest
 
 from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from acquisition.control_loop.states import ArmState
-from acquisition.devices import SafetyMode
+from acquisition.devices import BusCondition, SafetyMode
 from acquisition.errors import PreflightError
 from acquisition.sample import MOTOR_FRESH_SHIFT, Sample
 from experiments.operator.prompts import Prompt
@@ -109,7 +109,7 @@ def test_without_torques_the_pendant_is_not_asked_for(silent, named):
 
 def test_a_bus_that_is_down_is_named_instead_of_the_pucks():
     loop = bench(fresh=0, state=ArmState.IDLE)
-    loop.loop_client.loop.is_bus_down = True
+    loop.loop_client.loop.bus_condition = BusCondition.DOWN
     with pytest.raises(PreflightError) as refused:
         activate(loop)
     assert "CAN interface" in refused.value.message

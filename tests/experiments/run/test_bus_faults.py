@@ -33,6 +33,18 @@ ENDINGS = {
     "puck-silent": ("Puck 3 has not answered for ", HELD, BRAKED, IDLE),
     "puck-reboot": ("Puck 3 has not answered for ", HELD, BRAKED, IDLE),
     "bus-off": (
+        "The CAN controller has left the bus after too many errors (bus-off); no reply",
+        "ARM: UNKNOWN - support it, press Shift-idle.",
+        UNKNOWN,
+        IDLE,
+    ),
+    "unacknowledged": (
+        "Nobody on the CAN bus acknowledges; no reply from the arm for ",
+        "ARM: UNKNOWN - support it, press Shift-idle.",
+        UNKNOWN,
+        IDLE,
+    ),
+    "interface-down": (
         "The CAN interface refuses to send and receive; no reply from the arm for ",
         "ARM: UNKNOWN - support it, press Shift-idle.",
         UNKNOWN,
@@ -61,7 +73,8 @@ ENDINGS = {
     ),
 }
 # Nobody says what puck 3 measures from these faults on.
-SILENT = {"puck-silent", "puck-reboot", "bus-off", "can-silence"}
+SILENT = {"puck-silent", "puck-reboot", "can-silence", "bus-off"}
+SILENT |= {"interface-down", "unacknowledged"}
 
 
 def hurry(asked):

@@ -1,5 +1,6 @@
 """What can go wrong on the simulated wire, one fault at a time."""
 
+import errno
 from itertools import pairwise
 
 import can
@@ -10,6 +11,7 @@ from fakes.pucks.bus_faults import FOREIGN_IDS
 from fakes.pucks.event_queue import FRAME_NS
 from fakes.world.faults import clear_network_faults, network_faults
 from tests.fakes.stepped import Rig
+from wam.bus.error_frames import error_names
 from wam.bus.frames import decode_position, position_reply_id
 from wam.driver.safety_module import SafetyLevel
 
@@ -116,17 +118,52 @@ def test_a_flood_delays_replies_as_far_as_its_identifiers_win(rig, faults):
     assert last_reply([first]) > alone + 2 * FRAME_NS[8]
 
 
-def test_a_controller_that_is_off_neither_sends_nor_receives(rig, faults):
+def test_an_interface_that_is_down_neither_sends_nor_receives(rig, faults):
     rig.link.send(0x404, b"\x30")
     rig.rest(MS)
-    faults.go_off()
-    with pytest.raises(can.CanOperationError, match="bus-off"):
+    faults.go_down()
+    with pytest.raises(can.CanOperationError, match="down"):
         rig.bus.send(can.Message(arbitration_id=1, is_extended_id=False, data=b"\5"))
-    with pytest.raises(can.CanOperationError, match="bus-off"):
+    with pytest.raises(can.CanOperationError, match="down"):
         rig.bus.recv(0)
     faults.clear_faults()
     assert rig.bus.recv(0) is None  # what waited is gone
     assert ids(ask(rig)) == ALL
+
+
+def send(rig, can_id=0x404, data=b"\x30"):
+    rig.bus.send(can.Message(arbitration_id=can_id, is_extended_id=False, data=data))
+
+
+def test_a_controller_that_is_off_takes_frames_and_tells_it_once(rig, faults):
+    faults.go_off()
+    send(rig)
+    told = rig.bus.recv(0)
+    assert told.is_error_frame
+    assert error_names(told.arbitration_id, told.data) == {"bus-off"}
+    rig.rest(2 * MS)
+    assert rig.bus.recv(0) is None
+    faults.clear_faults()
+    told = rig.bus.recv(0)
+    assert error_names(told.arbitration_id, told.data) == {"restarted"}
+    assert rig.bus.recv(0) is None  # what was sent meanwhile is gone
+    assert ids(ask(rig)) == ALL
+
+
+def test_frames_that_nobody_acknowledges_wait_until_the_queue_is_full(rig, faults):
+    faults.go_unheard()
+    for _ in range(11):
+        send(rig)
+    with pytest.raises(can.CanOperationError) as refused:
+        send(rig)
+    assert refused.value.error_code == errno.ENOBUFS
+    told = rig.bus.recv(0)
+    assert error_names(told.arbitration_id, told.data) == {"passive"}
+    faults.clear_faults()
+    send(rig)
+    rig.rest(20 * MS)
+    replies = [rig.bus.recv(0) for _ in range(12 * 7)]
+    assert None not in replies  # all that waited came out
 
 
 def test_mending_ends_every_fault_of_the_wire(rig, faults):

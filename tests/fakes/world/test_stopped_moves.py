@@ -77,6 +77,8 @@ BRAKED = (
     "puck-reboot",
     "can-silence",
     "bus-off",
+    "interface-down",
+    "unacknowledged",
     "pendant-idle",
     "safety-speed",
     "safety-torque",

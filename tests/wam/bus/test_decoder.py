@@ -150,3 +150,10 @@ def test_the_sensor_answers_a_question_with_two_frames(log):
 def test_frames_of_other_kinds_are_counted(log):
     assert "no WAM uses" in log(0, "1FFFFFFF", is_of_wam=False)
     assert log.reader.tally.foreign == 1
+
+
+def test_an_error_frame_of_the_controller_is_put_into_words(log):
+    said = log(0, "20000204 0020000000008200", is_of_wam=False)
+    assert "the controller reports: passive" in said
+    assert log.reader.tally.errors == {"passive": 1}
+    assert log.reader.tally.foreign == 0

@@ -170,6 +170,14 @@ def test_position_is_22_bits_big_endian(counts, data):
     assert frames.decode_position(bytes.fromhex(data)) == counts
 
 
+@pytest.mark.parametrize(
+    ("data", "counts"),
+    [("ff 90 00", -28672), ("40 00 00", 0), ("bf 90 00", -28672), ("c0 00 05", 5)],
+)
+def test_bits_above_the_22_of_a_position_have_no_meaning(data, counts):
+    assert frames.decode_position(bytes.fromhex(data)) == counts
+
+
 def test_position_with_joint_encoder_gives_both():
     data = bytes.fromhex("3f 70 88 02 80 00")
     assert frames.decode_position(data) == -36728
@@ -177,7 +185,7 @@ def test_position_with_joint_encoder_gives_both():
     assert frames.decode_joint_encoder(data[:3]) is None
 
 
-@pytest.mark.parametrize("data", ["", "00 00", "00 00 00 00", "40 00 00", "00" * 7])
+@pytest.mark.parametrize("data", ["", "00 00", "00 00 00 00", "00" * 7])
 def test_a_position_that_contradicts_the_layout_is_refused(data):
     with pytest.raises(FrameError):
         frames.decode_position(bytes.fromhex(data))
@@ -225,6 +233,14 @@ def test_force_frame_is_little_endian_without_header():
     assert frames.encode_force((1.0, -2.5, -9.81)) == data
     # Half a count is 2 mN.
     assert frames.decode_force(data) == pytest.approx((1.0, -2.5, -9.81), abs=0.002)
+
+
+def test_a_force_frame_may_have_a_seventh_byte():
+    data = frames.encode_force((1.0, -2.5, -9.75))
+    assert frames.decode_force(data + b"\x7f") == (1.0, -2.5, -9.75)
+    for size in (5, 8):
+        with pytest.raises(FrameError):
+            frames.decode_force(bytes(size))
 
 
 def test_force_beyond_the_frame_is_clipped():

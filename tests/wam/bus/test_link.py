@@ -4,7 +4,7 @@ import can
 import pytest
 
 from acquisition.clock import Readable
-from acquisition.errors import LinkError
+from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import Rig
 from wam.bus import link as can_link
 from wam.bus.link import CanLink, open_bus
@@ -104,7 +104,7 @@ def test_only_data_frames_of_devices_come_through():
     )
     link = CanLink(bus)
     assert [frame.can_id for frame in link.receive()] == [0x426, 0x546]
-    assert link.error_frames == 1
+    assert link.errors.frames == 1
     link.close()
 
 
@@ -140,10 +140,20 @@ def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
     link.close()
 
 
-def test_a_full_buffer_says_what_it_means():
-    link = CanLink(ScriptedBus(error=can.CanOperationError("Transmit buffer full")))
-    with pytest.raises(LinkError, match="send buffer is full"):
+@pytest.mark.parametrize(
+    "error",
+    [
+        can.CanOperationError("Transmit buffer full"),
+        can.CanOperationError("Failed to transmit", errno.ENOBUFS),
+        can.CanOperationError("Failed to transmit", errno.EAGAIN),
+        OSError(errno.ENOBUFS, "No buffer space available"),
+    ],
+)
+def test_a_full_queue_is_known_by_its_number(error):
+    link = CanLink(ScriptedBus(error=error))
+    with pytest.raises(LinkFullError, match="send queue is full") as refused:
         link.send(1, b"\x05")
+    assert "acknowledges" in str(refused.value)
     link.close()
 
 

@@ -324,7 +324,7 @@ def test_a_malformed_reply_is_a_missing_one(monkeypatch):
 
     def garble():
         return [
-            frame._replace(data=b"\xff\xff\xff") if frame.can_id == 0x463 else frame
+            frame._replace(data=b"\xff\xff") if frame.can_id == 0x463 else frame
             for frame in receive()
         ]
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from acquisition.devices import BusCondition
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.options import NetworkOptions
 from fakes.world.faults import network_faults
@@ -138,23 +139,23 @@ def test_a_bus_used_to_sixty_percent_by_others_costs_no_cycle(bench):
     assert 1_000_000 < latest < 1_500_000  # later than alone, and in time
 
 
-def test_a_bus_that_is_off_is_known_and_comes_back(bench):
+def test_an_interface_that_is_down_is_known_and_comes_back(bench):
     bench.cycle()
-    bench.faults.go_off()
+    bench.faults.go_down()
     assert bench.cycle().fresh == 0
-    assert bench.arm.is_bus_down
+    assert bench.arm.bus_condition is BusCondition.DOWN
     assert bench.arm.counters.link_errors > 0
     bench.faults.clear_faults()
     reading = bench.cycle()
     assert reading.is_complete
     assert bench.is_true(reading)
-    assert not bench.arm.is_bus_down
+    assert bench.arm.bus_condition is BusCondition.SOUND
 
 
 def test_idle_is_confirmed_when_the_bus_comes_back_in_time(bench):
     bench.rig.network.pendant("activate")
     bench.cycle()
-    bench.faults.go_off()
+    bench.faults.go_down()
     advance = bench.rig.bus.advance
     back_ns = bench.rig.clock.t_ns + 20_000_000
 
@@ -170,7 +171,7 @@ def test_idle_is_confirmed_when_the_bus_comes_back_in_time(bench):
 def test_idle_on_a_bus_that_stays_off_ends_in_unknown(bench):
     bench.rig.network.pendant("activate")
     bench.cycle()
-    bench.faults.go_off()
+    bench.faults.go_down()
     begin_ns = bench.rig.clock.t_ns
     assert not bench.arm.idle()
     # As long as the arm's own heartbeat allows, and no longer.
