@@ -335,6 +335,11 @@ def test_the_memory_of_late_cycles_does_not_grow():
     assert state.late == ()
 
 
+def test_a_cycle_that_brings_nothing_new_makes_no_new_state():
+    state, _ = late_cycles([0])
+    assert check(LIMITS, state, seen(host_ns=500 * MS))[0] is state
+
+
 def test_silence_tells_how_long_and_which_motors():
     assert judge(**missing(5)).detail == ReplySilence(10.0, 0b0100000)
     assert judge(**missing(25)).detail == ReplySilence(50.0, 0b0100000)
