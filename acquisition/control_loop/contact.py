@@ -6,15 +6,8 @@ from math import dist, hypot
 from typing import NamedTuple
 
 from acquisition.clock import NS_PER_MS
-from acquisition.control_loop.faults import (
-    OK,
-    ContactExcess,
-    Fault,
-    ForceGrowth,
-    GuardVerdict,
-    Saturation,
-    verdict_for,
-)
+from acquisition.control_loop.details import ContactExcess, ForceGrowth, Saturation
+from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import LinkError

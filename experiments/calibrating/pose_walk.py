@@ -21,7 +21,7 @@ from wam.calibration import (
     MeasurementPose,
     way_seconds,
 )
-from wam.control import JointMove
+from wam.control import JointMove, move_reference
 from wam.model import Array
 
 INTERRUPTED = 130
@@ -149,7 +149,7 @@ class PoseWalk:
         if loop_client.status.verdict is not None:
             return  # the guard has stopped the move; the next tick says why
         record = loop_client.latest()[0]
-        wanted, _ = move.at((int(record["host_ns"]) - sent_ns) * 1e-9)
+        wanted, _ = move_reference(move, (int(record["host_ns"]) - sent_ns) * 1e-9)
         apart = np.abs(record["position"] - wanted)
         joint = int((apart / ASTRAY).argmax())
         if apart[joint] <= ASTRAY[joint]:

@@ -72,7 +72,8 @@ Row = tuple[Cell, ...]
 OK = Cell(End.COMPLETE)
 NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
 UNSEEN = Cell(
-    End.COMPLETE, why="not detected: where the foot is and how fast is recorded wrongly"
+    End.COMPLETE,
+    why="not while the sole stands; motors 2 to 6 end a trial after 20 to 45 mm of it",
 )
 AT_REVIEW = ("session ended at the review",)
 

@@ -16,6 +16,11 @@ _UNLOCKED = Cell(
 _ASTRAY = Cell(
     End.UNMEASURED, why="seen where the arm was sent, not how fast it truly goes"
 )
+_IN_VAIN = Cell(
+    End.UNMEASURED,
+    " stands still although the arm is sent on.",
+    why="seen when the move turns the motor in vain, at the latest in the next move",
+)
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 
@@ -24,7 +29,9 @@ def _cell(fault: str) -> Cell:
     still = TABLE[fault][_TARE]
     if fault == "joint7-slip":
         return _UNLOCKED
-    if fault.startswith(("creep", "stuck")):
+    if fault.startswith("stuck"):
+        return _IN_VAIN
+    if fault.startswith("creep"):
         return _ASTRAY
     if fault.startswith("ft-"):
         return _WEIGHED

@@ -130,6 +130,7 @@ class Law:
         self.state = ArmState.IDLE
         self.entered = []
         self.offset = 0.0
+        self.stuck = 0
         self.torques = TORQUE
 
     def enter(self, state, reading):
@@ -142,6 +143,9 @@ class Law:
 
     def joint7_offset(self, reading):
         return self.offset
+
+    def stuck_motor(self):
+        return self.stuck
 
 
 class Observer:

@@ -22,6 +22,8 @@ RECORDED_NAMES = {
     "can-silence",
     "safety-silent",
     "position-jump",
+    "motor-stuck",
+    "motor-still",
     "bus-shared",
     "not-a-number",
     "joint-limit",

@@ -263,6 +263,16 @@ def _swing(scene):
     scene.rig.plant.qd[1] = 1.45
 
 
+def _pull_in_vain(scene):
+    scene.patch.setattr(FootController, "stuck_motor", lambda _: 2)
+
+
+def _stand_still(scene):
+    """Let any way of the sole be too far for motor 1, which leads no foot."""
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, still_ways=(1e-4, *[1.0] * 6))
+
+
 def _narrow(scene):
     """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
     cycle = scene.built.cycle
@@ -436,6 +446,8 @@ CASES = {
     "pendant-idle": struck("pendant-idle"),
     "safety-idle": struck("safety-torque", words="torque fault"),
     "safety-stop": struck("safety-voltage", E_STOP, "voltage fault"),
+    "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 stands still"),
+    "motor-still": acted(Prompt.RECORDING, _stand_still, 4, "(limit 0)"),
     "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
     "console-lost": acted(Prompt.READY, _orphan, since=0.0),
     "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),
