@@ -68,6 +68,7 @@ class Fault(StrEnum):
     CONTACT_FORCE = "contact-force"
     CONTACT_MOMENT = "contact-moment"
     CONTACT_GROWTH = "contact-growth"
+    CONTACT_MOVE = "contact-move"
     LOOP_LATE = "loop-late"
     MOVE_REFUSED = "move-refused"
     CONSOLE_SILENT = "console-silent"
@@ -123,6 +124,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.CONTACT_FORCE: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
     Fault.CONTACT_MOMENT: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
     Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth, needs_trial=True),
+    Fault.CONTACT_MOVE: FaultSpec(_HOLD, ContactExcess),
     Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
     Fault.MOVE_REFUSED: FaultSpec(_HOLD),
     Fault.CONSOLE_SILENT: FaultSpec(_HOLD),

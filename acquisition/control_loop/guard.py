@@ -78,6 +78,7 @@ class Observation(NamedTuple):
         contact: the load on the foot; None = it is not known.
         stuck_motor: the motor that a move turns in vain, 1-7; 0 = none.
         sole: centre of the sole in the base frame [m].
+        is_moving: the arm moves by itself, or keeps the goal of a move.
     """
 
     reading: ArmReading
@@ -93,6 +94,7 @@ class Observation(NamedTuple):
     contact: Contact | None = None
     stuck_motor: int = 0
     sole: Point = (0.0, 0.0, 0.0)
+    is_moving: bool = False
 
 
 def check(
@@ -112,7 +114,12 @@ def check(
     if not (state.may_drive or is_stopped):
         return state, OK
     contact, load = check_contact(
-        limits, state.contact, now, seen.contact, is_recording=seen.is_recording
+        limits,
+        state.contact,
+        now,
+        seen.contact,
+        is_recording=seen.is_recording,
+        is_moving=seen.is_moving,
     )
     if contact is not state.contact:
         state = replace(state, contact=contact)
@@ -222,12 +229,10 @@ def _check_move(stuck_motor: int) -> GuardVerdict:
 
 def _check_rests(limits: GuardLimits, state: GuardState, sole: Point) -> GuardVerdict:
     """End a trial in which the sole goes on and a motor does not."""
-    for motor, (rest, most) in enumerate(
-        zip(state.rests, limits.still_ways, strict=False), 1
-    ):
-        way = dist(rest.sole, sole)
+    for i, rest in enumerate(state.rests):
+        way, most = dist(rest.sole, sole), limits.still_ways[i]
         if way > most:
-            detail = StillMotor(motor, 1e3 * way, 1e3 * most)
+            detail = StillMotor(i + 1, 1e3 * way, 1e3 * most)
             return verdict_for(Fault.MOTOR_STILL, detail)
     return OK
 

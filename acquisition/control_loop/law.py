@@ -29,6 +29,10 @@ class ControlLaw(Protocol):
         """
         ...
 
+    def is_moving(self) -> bool:
+        """Return whether a move is made, or its goal is kept."""
+        ...
+
     def stuck_motor(self) -> int:
         """Return the motor that a move turns in vain, 1-7; 0 = none."""
         ...

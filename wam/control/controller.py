@@ -136,6 +136,10 @@ class FootController(ControlLaw):
             self._walls.apply(tau, reading)
         return tau, gravity
 
+    def is_moving(self) -> bool:
+        """Return whether a move is made, or its goal is kept."""
+        return self._move is not None
+
     def stuck_motor(self) -> int:
         """Return the motor that the move turns in vain, 1-7; 0 = none."""
         return self._stuck_motor

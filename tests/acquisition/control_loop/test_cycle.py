@@ -131,6 +131,7 @@ class Law:
         self.entered = []
         self.offset = 0.0
         self.stuck = 0
+        self.moves = False
         self.torques = TORQUE
 
     def enter(self, state, reading):
@@ -143,6 +144,9 @@ class Law:
 
     def joint7_offset(self, reading):
         return self.offset
+
+    def is_moving(self):
+        return self.moves
 
     def stuck_motor(self):
         return self.stuck

@@ -36,6 +36,7 @@ RECORDED_NAMES = {
     "contact-force",
     "contact-moment",
     "contact-growth",
+    "contact-move",
     "loop-late",
     "move-refused",
     "console-silent",

@@ -71,6 +71,7 @@ OBSERVED = {
     "is_late": False,
     "stuck_motor": 0,
     "sole": (0.0, 0.0, 0.0),
+    "is_moving": False,
 }
 QUIET = Observation(**OBSERVED)
 

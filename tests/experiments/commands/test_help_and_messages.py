@@ -263,6 +263,13 @@ def _swing(scene):
     scene.rig.plant.qd[1] = 1.45
 
 
+def _meet(scene):
+    """Let the arm seem to move by itself, and its foot to meet something."""
+    scene.patch.setattr(FootController, "is_moving", lambda _: True)
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, contact_force_move=0.01)
+
+
 def _pull_in_vain(scene):
     scene.patch.setattr(FootController, "stuck_motor", lambda _: 2)
 
@@ -420,6 +427,7 @@ CASES = {
     "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
     "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
     "contact-moment": acted(Prompt.RECORDING, _tender, words="N m on the foot (limit"),
+    "contact-move": acted(Prompt.READY, _meet, words="beyond its weight (limit 0)"),
     "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
