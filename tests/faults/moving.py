@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tests.faults.expected import HOLD, OK, TABLE, Arm, Cell, End
+from tests.faults.expected import HOLD, OK, OTHER_REFUSED, TABLE, Arm, Cell, End
 from tests.faults.phases import PHASES
 
 _TARE = PHASES.index("tare")
@@ -26,7 +26,11 @@ _MET = Cell(
     " N on the foot beyond its weight (limit 40)",
     arm=Arm(30, "driven", HOLD, "holding"),
 )
-_OWN = {"joint7-slip": _UNLOCKED, "contact-force": _MET}
+_OWN = {
+    "joint7-slip": _UNLOCKED,
+    "contact-force": _MET,
+    "second-command": OTHER_REFUSED,
+}
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 
