@@ -173,7 +173,10 @@ def zero_errors(
     free = max(len(left) - fit.rank - len(SEEN_ZEROS), 1)
     noise = max(float(left @ left) / free, _LEAST_NOISE**2)
     covariance = noise * np.linalg.pinv(slopes.T @ slopes)
-    return ZeroErrors(SEEN_ZEROS, errors, np.sqrt(np.diag(covariance)))
+    deviations = np.sqrt(np.diag(covariance))
+    return ZeroErrors(
+        SEEN_ZEROS, np.asarray(errors, np.float64), np.asarray(deviations, np.float64)
+    )
 
 
 def check_zeros(found: ZeroErrors) -> None:
