@@ -48,6 +48,7 @@ TESTS = {
     f"{_CONTROL}/position_control.py": (
         f"{_CONTROL_TESTS}/test_position_hold.py",
         f"{_CONTROL_TESTS}/test_joint_move.py",
+        f"{_CONTROL_TESTS}/test_motor_watch.py",
     ),
     f"{_CONTROL}/joint_lock.py": (
         f"{_CONTROL_TESTS}/test_joint_lock.py",
@@ -287,9 +288,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
 # What is no number makes any sum of it none, whatever the signs.
 _VERDICTS = (
     "verdicts = (_check_safety(limits, seen), _check_silence(limits, seen), "
-    "_check_master(seen.reading.foreign_id), _check_numbers({}, seen), "
+    "_check_master(seen.reading.foreign_id), _check_move(seen.stuck_motor), "
+    "_check_numbers({}, seen), "
     "_check_position(limits, state, q), _check_speed(limits, seen, qd), "
-    "_check_torque(limits, tau), _check_trial(limits, seen), load, "
+    "_check_torque(limits, tau), _check_rests(limits, state, seen.sole), "
+    "_check_trial(limits, seen), load, "
     "_check_cadence(limits, state, now))"
 )
 for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):
