@@ -79,7 +79,7 @@ class FootController(ControlLaw):
         """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
 
         No joint is faster than `speed` [rad/s] but joint 7, which is released for the
-        move and turns at 0.5 rad/s. Only in hold.
+        move and then turns at 0.5 rad/s. Only in hold.
 
         Raises:
             ValueError: the arm does not hold, `goal` is beyond a stop or not finite, or

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition import ArmReading
+from wam.control.joint_lock import RAMP
 from wam.model import ArmConstants, Array
 
 # Shares of the vendor's gains of joint PD, which are made to follow moves: softer, and
@@ -102,6 +103,8 @@ class PositionHold:
 
 TOP_SPEED = 0.5  # rad/s
 ACCELERATION = 0.5  # rad/s^2
+# Of joint 7: soon at its speed, and with little overshoot of its stiff, light axis.
+TURN_ACCELERATION = 6.0  # rad/s^2
 PD_TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD part only
 
 
@@ -130,7 +133,7 @@ class JointMove:
         """Return (positions [rad], velocities [rad/s]) `t` seconds after the start."""
         length, T, a = self._length, self.duration, self.acceleration
         if length == 0.0 or t >= T:
-            return self.goal.copy(), np.zeros(7)
+            return self.goal.copy(), np.zeros_like(self.goal)
         ramp = min(self.speed / a, T / 2.0)
         if t <= 0.0:
             s, v = 0.0, 0.0
@@ -152,17 +155,17 @@ class JointMove:
 def move_reference(move: JointMove, t: float) -> tuple[Array, Array]:
     """Return (positions [rad], velocities [rad/s]) that are wanted, shapes (7,).
 
-    Joint 7 goes ahead of the straight line at `TOP_SPEED`: light as it is, it would be
-    thrown by a torque that grows slowly while its encoder stands still. It turns the
-    foot about its own axis, so the way is as free as before.
+    Joint 7 turns at its own pace as soon as its lock has let go: light as it is, it
+    would be thrown by a torque that grows slowly while its encoder stands still. It
+    turns the foot about its own axis, so the way is as free as on a straight line.
 
     Args:
         move: of the joints.
         t: time since its start [s].
     """
     q, qd = move.at(t)
-    start, way = move.start[6], move.goal[6] - move.start[6]
-    q[6] = start + np.copysign(min(TOP_SPEED * max(t, 0.0), abs(way)), way)
+    turn = JointMove(move.start[6:], move.goal[6:], TOP_SPEED, TURN_ACCELERATION)
+    q[6:], qd[6:] = turn.at(t - RAMP)
     return q, qd
 
 
