@@ -48,6 +48,7 @@ TESTS = {
     f"{_CONTROL}/position_control.py": (
         f"{_CONTROL_TESTS}/test_position_hold.py",
         f"{_CONTROL_TESTS}/test_joint_move.py",
+        f"{_CONTROL_TESTS}/test_motor_watch.py",
     ),
     f"{_CONTROL}/joint_lock.py": (
         f"{_CONTROL_TESTS}/test_joint_lock.py",
@@ -75,6 +76,7 @@ TESTS = {
         f"{_DRIVER_TESTS}/test_safety_module.py",
         f"{_DRIVER_TESTS}/test_safety_limits.py",
         f"{_DRIVER_TESTS}/test_arm.py",
+        "tests/experiments/rig/test_build_limits.py",
     ),
     "wam/model/clearance.py": ("tests/wam/model/test_clearance.py",),
     "wam/calibration/free_space.py": _POSES,
@@ -101,6 +103,15 @@ TESTS = {
 _AT_REST = "at this very instant both ways give the same numbers"
 _BELOW = "nanoseconds, or a share of a millisecond, where milliseconds count"
 _TUNED = "a choice of many equally good ones: the poses it leads to are judged instead"
+_BODIES = (
+    "return [('the base', (0, *_capsule(0.12, -BASE_HEIGHT, -0.1))), "
+    "('the shoulder', ({}, coal.Sphere(0.15), _at(0.0, 0.0, 0.0))), "
+    "('the upper arm', (3, *_capsule(0.08, 0.08, upper))), "
+    "('the elbow', (4, coal.Sphere(0.09), _at(0.0, 0.0, 0.0))), "
+    "('the forearm', (5, *_capsule(0.065, 0.0, fore))), "
+    "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
+    "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
+)
 EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/position_control.py",
@@ -124,6 +135,10 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         f"{_CONTROL}/soft_walls.py",
         "if lower <= angle <= upper: -> if lower < angle <= upper:",
     ): _AT_REST,
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "if push > 0.0: -> if push >= 0.0:",
+    ): "a push of 0 leaves a torque as it is, whichever way it is bounded",
     (
         f"{_LOOP}/contact.py",
         "return 0 < since_ns <= now_ns - LASTING_NS -> "
@@ -167,6 +182,27 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "wam/model/clearance.py",
         "slab = coal.Box(6.0, 6.0, 1.0) -> slab = coal.Box(6.0, 7.0, 1.0)",
     ): "the floor reaches beyond the arm either way",
+    (
+        "wam/model/clearance.py",
+        "indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 0.0, floor - 0.5)) -> "
+        "indices[_FLOOR] = self._add(_FLOOR, 0, slab, _at(0.0, 1.0, floor - 0.5))",
+    ): "the floor reaches beyond the arm either way",
+    (
+        "wam/model/clearance.py",
+        f"{_BODIES.format(1)} -> {_BODIES.format(2)}",
+    ): "the axes of joints 1 and 2 meet in the middle of the ball",
+    (
+        "wam/calibration/free_space.py",
+        "return bool(heights.min() >= min(floor, heights[0], heights[-1]) - _SLACK) -> "
+        "return bool(heights.min() > min(floor, heights[0], heights[-1]) - _SLACK)",
+    ): _AT_REST,
+    (
+        "wam/calibration/poses.py",
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "q + side) for side in sides))] -> "
+        "reachable = [q for q in drawn[heights > space.floor] if all((space.holds("
+        "q - side) for side in sides))]",
+    ): "the sides are the same on both sides",
     (
         "wam/calibration/free_space.py",
         "return np.stack([x, y, reach * np.cos(q[:, 1]) - width], axis=-1) -> "
@@ -252,9 +288,11 @@ EQUIVALENT: dict[tuple[str, str], str] = {
 # What is no number makes any sum of it none, whatever the signs.
 _VERDICTS = (
     "verdicts = (_check_safety(limits, seen), _check_silence(limits, seen), "
-    "_check_master(seen.reading.foreign_id), _check_numbers({}, seen), "
+    "_check_master(seen.reading.foreign_id), _check_move(seen.stuck_motor), "
+    "_check_numbers({}, seen), "
     "_check_position(limits, state, q), _check_speed(limits, seen, qd), "
-    "_check_torque(limits, tau), _check_trial(limits, seen), load, "
+    "_check_torque(limits, tau), _check_rests(limits, state, seen.sole), "
+    "_check_trial(limits, seen), load, "
     "_check_cadence(limits, state, now))"
 )
 for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):

@@ -6,15 +6,8 @@ from math import dist, hypot
 from typing import NamedTuple
 
 from acquisition.clock import NS_PER_MS
-from acquisition.control_loop.faults import (
-    OK,
-    ContactExcess,
-    Fault,
-    ForceGrowth,
-    GuardVerdict,
-    Saturation,
-    verdict_for,
-)
+from acquisition.control_loop.details import ContactExcess, ForceGrowth, Saturation
+from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import WrenchSample, WrenchSensor
 from acquisition.errors import LinkError
@@ -98,11 +91,12 @@ class ContactState:
 
     Attributes:
         since_ns: since when force and moment are beyond the limits of a trial and
-            those of hold, and the sensor is saturated [ns]; 0 = it is not.
+            those of hold, the sensor is saturated, and the force is beyond the limit
+            of a move [ns]; 0 = it is not.
         points: of the last 0.5 s, oldest first.
     """
 
-    since_ns: tuple[int, int, int, int, int] = (0, 0, 0, 0, 0)
+    since_ns: tuple[int, int, int, int, int, int] = (0, 0, 0, 0, 0, 0)
     points: tuple[ForcePoint, ...] = ()
 
 
@@ -121,16 +115,20 @@ def check_contact(
     seen: Contact | None,
     *,
     is_recording: bool,
+    is_moving: bool = False,
 ) -> tuple[ContactState, GuardVerdict]:
     """Return the next state and the verdict on the load of this cycle.
 
-    What is beyond the limits of hold is judged whenever it is known, the rest in a
-    trial. Without a fresh force (None) nothing is known.
+    What is beyond the limits of hold is judged whenever it is known, what is beyond
+    that of a move while the arm moves by itself, the rest in a trial. Without a fresh
+    force (None) nothing is known.
     """
     if seen is None:
         return state, OK
     state = _remember(limits, state, now_ns, seen, is_recording=is_recording)
     verdict = _check_hold(limits, state, now_ns, seen)
+    if verdict is None and is_moving:
+        verdict = _check_move(limits, state, now_ns, seen)
     if verdict is None and is_recording:
         verdict = _check_trial(limits, state, now_ns, seen)
     return state, verdict or OK
@@ -140,7 +138,7 @@ def _check_hold(
     limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
 ) -> GuardVerdict | None:
     """Return the verdict of the limits that end in hold."""
-    _, _, force_ns, moment_ns, _ = state.since_ns
+    _, _, force_ns, moment_ns, _, _ = state.since_ns
     if _lasts(force_ns, now_ns):
         detail = ContactExcess(seen.force, limits.contact_force_hold)
         return verdict_for(Fault.CONTACT_FORCE, detail, is_lasting=True)
@@ -150,11 +148,21 @@ def _check_hold(
     return None
 
 
+def _check_move(
+    limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
+) -> GuardVerdict | None:
+    """Return the verdict of the limit of a move that the arm makes by itself."""
+    if not _lasts(state.since_ns[5], now_ns):
+        return None
+    detail = ContactExcess(seen.force, limits.contact_force_move)
+    return verdict_for(Fault.CONTACT_MOVE, detail)
+
+
 def _check_trial(
     limits: GuardLimits, state: ContactState, now_ns: int, seen: Contact
 ) -> GuardVerdict | None:
     """Return the verdict of the limits that end a trial."""
-    force_ns, moment_ns, _, _, saturated_ns = state.since_ns
+    force_ns, moment_ns, _, _, saturated_ns, _ = state.since_ns
     if _lasts(force_ns, now_ns):
         detail = ContactExcess(seen.force, limits.contact_force)
         return verdict_for(Fault.CONTACT_FORCE, detail)
@@ -185,13 +193,14 @@ def _remember(
     *,
     is_recording: bool,
 ) -> ContactState:
-    force, moment, force_hold, moment_hold, saturated = state.since_ns
+    force, moment, force_hold, moment_hold, saturated, move = state.since_ns
     since_ns = (
         _since(force, now_ns, is_beyond=seen.force > limits.contact_force),
         _since(moment, now_ns, is_beyond=seen.moment > limits.contact_moment),
         _since(force_hold, now_ns, is_beyond=seen.force > limits.contact_force_hold),
         _since(moment_hold, now_ns, is_beyond=seen.moment > limits.contact_moment_hold),
         _since(saturated, now_ns, is_beyond=seen.is_saturated),
+        _since(move, now_ns, is_beyond=seen.force > limits.contact_force_move),
     )
     points = state.points
     if not is_recording:

@@ -238,6 +238,9 @@ class Cycle:
             is_commanded=status.state not in _UNPOWERED,
             is_late=tick.is_late,
             contact=self._contact,
+            stuck_motor=self.law.stuck_motor(),
+            is_moving=self.law.is_moving(),
+            sole=tuple(self._sample.foot_position.tolist()),
         )
         self._guard, verdict = check(self.limits, self._guard, seen)
         reported, self._reported = self._reported, None

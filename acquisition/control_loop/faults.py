@@ -9,6 +9,24 @@ from dataclasses import asdict, dataclass
 from enum import Enum, StrEnum
 from typing import Any
 
+from acquisition.control_loop.details import (
+    CircuitCauses,
+    ContactExcess,
+    FaultDetail,
+    FootSpeedExcess,
+    ForceAge,
+    ForceGrowth,
+    ForeignFrame,
+    Joint7Slip,
+    JointExcess,
+    LateCycles,
+    NoDetail,
+    ReplySilence,
+    SafetySilence,
+    Saturation,
+    StillMotor,
+    StuckMotor,
+)
 from acquisition.devices import PositionJump
 
 
@@ -36,6 +54,8 @@ class Fault(StrEnum):
     CAN_SILENCE = "can-silence"
     SAFETY_SILENT = "safety-silent"
     POSITION_JUMP = "position-jump"
+    MOTOR_STUCK = "motor-stuck"
+    MOTOR_STILL = "motor-still"
     BUS_SHARED = "bus-shared"
     NOT_A_NUMBER = "not-a-number"
     JOINT_LIMIT = "joint-limit"
@@ -48,139 +68,12 @@ class Fault(StrEnum):
     CONTACT_FORCE = "contact-force"
     CONTACT_MOMENT = "contact-moment"
     CONTACT_GROWTH = "contact-growth"
+    CONTACT_MOVE = "contact-move"
     LOOP_LATE = "loop-late"
     MOVE_REFUSED = "move-refused"
     CONSOLE_SILENT = "console-silent"
     CONSOLE_LOST = "console-lost"
     RECORDER_SILENT = "recorder-silent"
-
-
-@dataclass(frozen=True, slots=True)
-class NoDetail:
-    """A fault without numbers."""
-
-
-@dataclass(frozen=True, slots=True)
-class CircuitCauses:
-    """Monitors of the safety circuit that caused its stop; none for the pendant."""
-
-    causes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class ReplySilence:
-    """Silence of the arm.
-
-    Attributes:
-        ms: how long replies have been missing [ms].
-        silent: bit i set = motor i+1 did not answer in the last cycle.
-    """
-
-    ms: float
-    silent: int
-
-
-@dataclass(frozen=True, slots=True)
-class SafetySilence:
-    """Age of the safety module's last answer [ms]."""
-
-    ms: float
-
-
-@dataclass(frozen=True, slots=True)
-class ForeignFrame:
-    """Identifier of a frame of another master on the arm's bus."""
-
-    can_id: int
-
-
-@dataclass(frozen=True, slots=True)
-class JointExcess:
-    """A joint beyond its limit.
-
-    Attributes:
-        joint: its number, 1-7.
-        value: position [rad], or magnitude of speed [rad/s] or torque [N m].
-        limit: of the same quantity.
-    """
-
-    joint: int
-    value: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class FootSpeedExcess:
-    """Speed of the sole and its limit [m/s]."""
-
-    value: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class Joint7Slip:
-    """Displacement of the locked joint 7 and its limit [mrad]."""
-
-    mrad: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class ForceAge:
-    """Age of the newest force sample and its limit [ms]."""
-
-    ms: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class ContactExcess:
-    """Force [N] or moment [N m] of the ground on the foot, and its limit."""
-
-    value: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class Saturation:
-    """How long the sensor has been beyond its range, and its limit [ms]."""
-
-    ms: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class ForceGrowth:
-    """By how much the force grew within 0.5 s, and its limit [N]."""
-
-    value: float
-    limit: float
-
-
-@dataclass(frozen=True, slots=True)
-class LateCycles:
-    """Late cycles within a second, and how many are tolerated."""
-
-    late: int
-    limit: int
-
-
-FaultDetail = (
-    NoDetail
-    | CircuitCauses
-    | ReplySilence
-    | SafetySilence
-    | PositionJump
-    | ForeignFrame
-    | JointExcess
-    | FootSpeedExcess
-    | Joint7Slip
-    | ForceAge
-    | ContactExcess
-    | Saturation
-    | ForceGrowth
-    | LateCycles
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,6 +108,10 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.POSITION_JUMP: FaultSpec(
         (Action.HOLD, Action.IDLE), PositionJump, ends_session=True
     ),
+    Fault.MOTOR_STUCK: FaultSpec(_IDLE, StuckMotor, ends_session=True),
+    Fault.MOTOR_STILL: FaultSpec(
+        _IDLE, StillMotor, needs_trial=True, ends_session=True
+    ),
     Fault.BUS_SHARED: FaultSpec(_IDLE, ForeignFrame, ends_session=True),
     Fault.NOT_A_NUMBER: FaultSpec(_IDLE, ends_session=True),
     Fault.JOINT_LIMIT: FaultSpec(_DAMP, JointExcess),
@@ -227,6 +124,7 @@ FAULTS: Mapping[Fault, FaultSpec] = {
     Fault.CONTACT_FORCE: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
     Fault.CONTACT_MOMENT: FaultSpec((Action.END_TRIAL, Action.HOLD), ContactExcess),
     Fault.CONTACT_GROWTH: FaultSpec(_END_TRIAL, ForceGrowth, needs_trial=True),
+    Fault.CONTACT_MOVE: FaultSpec(_HOLD, ContactExcess),
     Fault.LOOP_LATE: FaultSpec(_HOLD, LateCycles),
     Fault.MOVE_REFUSED: FaultSpec(_HOLD),
     Fault.CONSOLE_SILENT: FaultSpec(_HOLD),

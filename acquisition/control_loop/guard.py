@@ -2,32 +2,42 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import dist
 from typing import NamedTuple
 
 import numpy as np
 
 from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
 from acquisition.control_loop.contact import Contact, ContactState, check_contact
-from acquisition.control_loop.faults import (
-    OK,
+from acquisition.control_loop.details import (
     CircuitCauses,
-    Fault,
     FootSpeedExcess,
     ForceAge,
     ForeignFrame,
-    GuardVerdict,
     Joint7Slip,
     JointExcess,
     LateCycles,
     ReplySilence,
     SafetySilence,
-    verdict_for,
+    StillMotor,
+    StuckMotor,
 )
+from acquisition.control_loop.faults import OK, Fault, GuardVerdict, verdict_for
 from acquisition.control_loop.limits import GuardLimits
 from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
+_TREMBLE = 1  # counts by which an encoder at rest flickers
+
+Point = tuple[float, float, float]
+
+
+class MotorRest(NamedTuple):
+    """Where a motor stands [encoder counts], and the sole since it does [m]."""
+
+    counts: int
+    sole: Point
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,12 +51,14 @@ class GuardState:
             from then on a braked arm is a stop, and no longer the state before
             activation.
         contact: what is remembered of the load on the foot.
+        rests: in a trial, where each motor turned last.
     """
 
     armed: int = 0
     late: tuple[int, ...] = ()
     may_drive: bool = False
     contact: ContactState = _NO_LOAD
+    rests: tuple[MotorRest, ...] = ()
 
 
 class Observation(NamedTuple):
@@ -64,6 +76,9 @@ class Observation(NamedTuple):
         is_commanded: the state of the arm commands torques (not idle).
         is_late: this cycle began after its deadline.
         contact: the load on the foot; None = it is not known.
+        stuck_motor: the motor that a move turns in vain, 1-7; 0 = none.
+        sole: centre of the sole in the base frame [m].
+        is_moving: the arm moves by itself, or keeps the goal of a move.
     """
 
     reading: ArmReading
@@ -77,6 +92,9 @@ class Observation(NamedTuple):
     is_commanded: bool
     is_late: bool
     contact: Contact | None = None
+    stuck_motor: int = 0
+    sole: Point = (0.0, 0.0, 0.0)
+    is_moving: bool = False
 
 
 def check(
@@ -96,7 +114,12 @@ def check(
     if not (state.may_drive or is_stopped):
         return state, OK
     contact, load = check_contact(
-        limits, state.contact, now, seen.contact, is_recording=seen.is_recording
+        limits,
+        state.contact,
+        now,
+        seen.contact,
+        is_recording=seen.is_recording,
+        is_moving=seen.is_moving,
     )
     if contact is not state.contact:
         state = replace(state, contact=contact)
@@ -106,10 +129,12 @@ def check(
         _check_safety(limits, seen),
         _check_silence(limits, seen),
         _check_master(seen.reading.foreign_id),
+        _check_move(seen.stuck_motor),
         _check_numbers(sum(q) + sum(qd) + sum(tau), seen),
         _check_position(limits, state, q),
         _check_speed(limits, seen, qd),
         _check_torque(limits, tau),
+        _check_rests(limits, state, seen.sole),
         _check_trial(limits, seen),
         load,
         _check_cadence(limits, state, now),
@@ -136,10 +161,30 @@ def _remember(
         kept = tuple(t for t in late if t >= now - NS_PER_S)
         late = (*kept, now) if seen.is_late else kept
     may_drive = seen.is_commanded and (state.may_drive or seen.safety not in _BRAKED)
-    is_same = armed == state.armed and late is state.late
+    rests = _rests(state.rests, seen) if seen.is_recording else ()
+    is_same = armed == state.armed and late is state.late and rests is state.rests
     if is_same and may_drive is state.may_drive:
         return state
-    return GuardState(armed, late, may_drive, state.contact)
+    return GuardState(armed, late, may_drive, state.contact, rests)
+
+
+def _rests(rests: tuple[MotorRest, ...], seen: Observation) -> tuple[MotorRest, ...]:
+    """Return where each motor turned last; a motor that is not heard is none."""
+    counts, fresh = seen.reading.counts, seen.reading.fresh
+    if not rests:
+        return tuple(MotorRest(now, seen.sole) for now in counts)
+    pairs = enumerate(zip(rests, counts, strict=True))
+    turned = [
+        i
+        for i, (rest, now) in pairs
+        if not -_TREMBLE <= now - rest.counts <= _TREMBLE or not fresh >> i & 1
+    ]
+    if not turned:
+        return rests
+    newer = list(rests)
+    for i in turned:
+        newer[i] = MotorRest(counts[i], seen.sole)
+    return tuple(newer)
 
 
 def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
@@ -173,6 +218,23 @@ def _check_master(foreign_id: int | None) -> GuardVerdict:
     if foreign_id is None:
         return OK
     return verdict_for(Fault.BUS_SHARED, ForeignFrame(foreign_id))
+
+
+def _check_move(stuck_motor: int) -> GuardVerdict:
+    """Brake a move that turns a motor in vain: it would be pulled on for ever."""
+    if not stuck_motor:
+        return OK
+    return verdict_for(Fault.MOTOR_STUCK, StuckMotor(stuck_motor))
+
+
+def _check_rests(limits: GuardLimits, state: GuardState, sole: Point) -> GuardVerdict:
+    """End a trial in which the sole goes on and a motor does not."""
+    for i, rest in enumerate(state.rests):
+        way, most = dist(rest.sole, sole), limits.still_ways[i]
+        if way > most:
+            detail = StillMotor(i + 1, 1e3 * way, 1e3 * most)
+            return verdict_for(Fault.MOTOR_STILL, detail)
+    return OK
 
 
 def _check_numbers(total: float, seen: Observation) -> GuardVerdict:

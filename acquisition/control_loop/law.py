@@ -29,6 +29,14 @@ class ControlLaw(Protocol):
         """
         ...
 
+    def is_moving(self) -> bool:
+        """Return whether a move is made, or its goal is kept."""
+        ...
+
+    def stuck_motor(self) -> int:
+        """Return the motor that a move turns in vain, 1-7; 0 = none."""
+        ...
+
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         ...

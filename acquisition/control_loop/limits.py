@@ -6,6 +6,7 @@ it is of: torques within their limits, and no sudden ones.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -35,7 +36,13 @@ class GuardLimits:
         contact_moment_hold: of it about the sensor's origin, ends in hold [N m].
         contact_growth: of the force within 0.5 s of a foot that stands, ends a trial
             [N].
+        contact_force_move: of whatever is in the way of an arm that moves by itself,
+            ends in hold [N]. The weight of a foot of 1 kg that is told on the wrong
+            side makes 20.
         late_per_second: late cycles in a second that end in hold.
+        still_ways: how far the sole may go in a trial while a motor stands still [m],
+            seven. In simulated trials it is 3 mm for motors 2 and 3, 5 mm for 4 and
+            15 mm for 5 and 6, whatever the friction; joints 1 and 7 may stand.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
         idle_after_safety_ms: age of the safety module's last answer that ends in idle
@@ -59,6 +66,8 @@ class GuardLimits:
     contact_moment_hold: float
     contact_growth: float
     late_per_second: int
+    contact_force_move: float = 40.0
+    still_ways: Sequence[float] = (inf, 0.02, 0.02, 0.02, 0.045, 0.045, inf)
     hold_after_missing: int = 5
     idle_after_missing: int = 25
     idle_after_safety_ms: float = 400.0

@@ -7,13 +7,18 @@ another version counts as not there. Files are written whole or not at all.
 Values become JSON and come back exactly: dataclasses, named tuples, arrays, numbers.
 Nothing is ever unpickled: a type is found by name in a table of the types that may
 appear, and its fields must be exactly its own.
+
+The folder has a size: beyond `MOST_BYTES` the results that were used longest ago go,
+down to nine tenths of it. A result that is read counts as used.
 """
 
 import base64
+import contextlib
 import hashlib
 import json
 import math
 import os
+import stat
 import tempfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -36,6 +41,9 @@ from analysis.tustin import model as tustin
 Types = Mapping[str, type]
 
 _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
+MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
+LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
+_KEPT = 0.9  # share of the size that is left when results go
 VERSION = 3  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
@@ -76,19 +84,26 @@ class ResultStore:
 
     Args:
         folder: made when the first result is kept; may be deleted at any time.
+        most: bytes that its results may have together.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, most: int = MOST_BYTES) -> None:
         self._folder = folder
+        self._most = most
+        self._bytes: int | None = None  # of the folder, as far as it is known
 
     def get(self, task: Any) -> Any | None:  # noqa: ANN401
         """Return the result of a task done before, None if there is none."""
+        path = self._path(task)
         try:
-            content = json.loads(self._path(task).read_bytes())
+            content = json.loads(_read(path))
             is_whole = content["digest"] == _digest(content["result"])
-            return decode(content["result"], TYPES) if is_whole else None
+            result = decode(content["result"], TYPES) if is_whole else None
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
+        with contextlib.suppress(OSError):  # a folder that is only read from
+            os.utime(path)
+        return result
 
     def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
         """Keep a result.
@@ -98,10 +113,54 @@ class ResultStore:
         """
         plain = encode(result)
         content = {"digest": _digest(plain), "result": plain}
-        write_atomic(self._path(task), json.dumps(content).encode())
+        path, data = self._path(task), json.dumps(content).encode()
+        if path.is_dir():  # nobody's result; it is made again every time
+            return
+        write_atomic(path, data)
+        if self._bytes is not None:
+            self._bytes += len(data)
+        if self._bytes is None or self._bytes > self._most:
+            self._bytes = remove_oldest(self._folder, self._most)
 
     def _path(self, task: Any) -> Path:  # noqa: ANN401
         return self._folder / f"{task_key(task)}.json"
+
+
+def _read(path: Path) -> bytes:
+    """Return the content of a regular file that is no link and not too large.
+
+    Raises:
+        OSError: it cannot be opened.
+        ValueError: it is no such file.
+    """
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    with os.fdopen(os.open(path, flags), "rb") as file:
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode) or found.st_size > LARGEST:
+            raise ValueError("no result")
+        return file.read(LARGEST)
+
+
+def remove_oldest(folder: Path, most: int) -> int:
+    """Remove what was used longest ago if all results together exceed `most` bytes.
+
+    What other processes remove meanwhile is no error. Returns the bytes that are left.
+    """
+    files: list[tuple[int, int, Path]] = []
+    for path in (*folder.glob("*.json"), *folder.glob(".*.json.*")):
+        with contextlib.suppress(OSError):
+            found = path.lstat()
+            files.append((found.st_mtime_ns, found.st_size, path))
+    total = sum(size for _, size, _ in files)
+    if total <= most:
+        return total
+    for _, size, path in sorted(files):
+        if total <= _KEPT * most:
+            break
+        with contextlib.suppress(OSError):
+            path.unlink()
+            total -= size
+    return total
 
 
 def task_key(task: Any) -> str:  # noqa: ANN401

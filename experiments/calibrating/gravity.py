@@ -14,7 +14,15 @@ from wam.calibration import (
     choose_poses,
     plan_halts,
 )
-from wam.model import Array, MomentFit, check_fit, fit_moments
+from wam.model import (
+    Array,
+    MomentFit,
+    ZeroErrors,
+    check_fit,
+    check_zeros,
+    fit_moments,
+    zero_errors,
+)
 
 AVERAGE = 0.5  # s of torques that are averaged
 
@@ -87,8 +95,11 @@ class GravityGuide:
         tau = np.array([pose.tau for pose in measured])
         fit = fit_moments(rig.model.constants, q, tau)
         self._say_residuals(fit, measured)
+        zeros = zero_errors(rig.model.constants, q, fit)
+        self._say_zeros(zeros)
         if not is_forced:
             check_fit(fit)
+            check_zeros(zeros)
         assert rig.model.tool is not None
         return GravityCalibration(
             mus=fit.mus,
@@ -100,6 +111,21 @@ class GravityGuide:
             is_simulated=rig.is_simulated,
             poses=q,
             torques=tau,
+        )
+
+    def _say_zeros(self, zeros: ZeroErrors) -> None:
+        joints = [
+            f"joint {joint} {error:+.1f} ± {deviation:.1f}"
+            for joint, error, deviation in zip(
+                zeros.joints,
+                np.degrees(zeros.errors),
+                np.degrees(zeros.deviations),
+                strict=True,
+            )
+        ]
+        self._console.say(
+            f"errors of the zero by the torques [degrees]: {', '.join(joints)}; those "
+            "of joints 1, 6 and 7 do not show"
         )
 
     def _say_residuals(self, fit: MomentFit, measured: list[MeasuredMoments]) -> None:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition import PreflightError, TractionError
+from acquisition.ipc import unpack_wrenches
 from experiments.messages import FaultContext, fault_text, rest_text
 from experiments.operator import Prompt
 from experiments.run.console_loop import TICK, ConsoleLoop
@@ -16,7 +17,7 @@ from wam.calibration import (
     MeasurementPose,
     way_seconds,
 )
-from wam.control import JointMove
+from wam.control import JointMove, move_reference
 from wam.model import Array
 
 INTERRUPTED = 130
@@ -61,6 +62,7 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
     return 0
 
 
+WEIGHED = 0.3  # s of readings of the free foot
 SETTLE = 0.5  # s after a move
 STILL = 0.02  # rad/s, largest joint speed while something is averaged
 # rad, how far a joint may be from its place in a move; gravity that is off by a quarter
@@ -112,7 +114,29 @@ class PoseWalk:
             "clear the space. [space] when clear.",
             Prompt.CLEAR,
         )
+        self._weigh_foot()
         return halts
+
+    def _weigh_foot(self) -> None:
+        """Take what the sensor shows while nothing touches the foot.
+
+        From here on the guard sees what the arm meets in its moves.
+        """
+        loop_client = self._rig.backend.loop_client
+        reader = loop_client.wrenches()
+        self.wait(WEIGHED)
+        readings = [
+            sample.wrench
+            for sample in unpack_wrenches(reader.read())
+            if sample.is_valid and not sample.saturated
+        ]
+        if not readings:
+            self._console.say("▲ The F/T sensor is silent: contact is not noticed.")
+            return
+        position = loop_client.latest()["position"][0]
+        rotation = self._rig.model.sole_pose(position)[1]
+        tared = self._rig.payload.tared(np.array(readings).mean(axis=0), rotation)
+        loop_client.set_bias(tared.bias.tolist())
 
     def go_to(self, halt: MeasurementPose) -> None:
         """Move to a halt and wait until the arm has settled.
@@ -142,7 +166,7 @@ class PoseWalk:
         if loop_client.status.verdict is not None:
             return  # the guard has stopped the move; the next tick says why
         record = loop_client.latest()[0]
-        wanted, _ = move.at((int(record["host_ns"]) - sent_ns) * 1e-9)
+        wanted, _ = move_reference(move, (int(record["host_ns"]) - sent_ns) * 1e-9)
         apart = np.abs(record["position"] - wanted)
         joint = int((apart / ASTRAY).argmax())
         if apart[joint] <= ASTRAY[joint]:

@@ -19,6 +19,7 @@ from acquisition.trial_file.reader import MAX_ROWS, TrialReader
 from acquisition.trial_file.salvage import SoundRecords
 from analysis.data.columns import LONGEST_LINE
 from analysis.data.tables import LARGEST_FILE, MOST_TRIALS, load_tables
+from analysis.study.store import LARGEST, MOST_BYTES
 from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import parse_object
@@ -47,6 +48,8 @@ STATED = (
     "| 1 MB | 64-bit integers, 20 levels |",
     "| 24 MB | npz: unpacked; CSV: 65 536 characters a line; 2000 trials |",
     "| terrain database | 6 MB | 200 terrains, 400 points an axis |",
+    "| 16 MiB | all together 256 MiB: what was used longest ago goes; "
+    "a damaged one is made again |",
 )
 
 
@@ -55,6 +58,7 @@ def test_the_limits_proved_here_are_those_that_are_stated():
     for row, stated in zip(rows[1:], STATED, strict=True):  # behind the head
         assert row.strip().endswith(stated)
     assert (MAX_ROWS, MOST_EVENTS, RECORD_LIMIT) == (300_000, 50_000, 16 * MIB)
+    assert (LARGEST, MOST_BYTES) == (16 * MIB, 256 * MIB)
     assert (LARGEST_FILE, LONGEST_LINE, MOST_TRIALS) == (24_000_000, 65_536, 2000)
 
 

@@ -72,8 +72,10 @@ Row = tuple[Cell, ...]
 OK = Cell(End.COMPLETE)
 NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
 UNSEEN = Cell(
-    End.COMPLETE, why="not detected: where the foot is and how fast is recorded wrongly"
+    End.COMPLETE,
+    why="not while the sole stands; motors 2 to 6 end a trial after 20 to 45 mm of it",
 )
+OTHER_REFUSED = Cell(End.COMPLETE, why="the other command is refused (arm-busy)")
 AT_REVIEW = ("session ended at the review",)
 
 
@@ -432,6 +434,7 @@ TABLE: dict[str, Row] = {
         idle=_not_ready("Pucks 1,2,3,4,5,6,7 have not answered for 100 ms."),
     ),
     "clock-step": _row(OK),
+    "second-command": _row(OTHER_REFUSED),
     "disk-full": _disk("No space left on device"),
     "disk-read-only": _disk("Read-only file system"),
 }

@@ -9,6 +9,8 @@ _SERVER = "tests/acquisition/ipc/test_loop_server.py::"
 _ARM = "tests/wam/driver/test_arm.py::"
 _LOST = "tests/wam/driver/test_lost_replies.py::"
 _POLLER = "tests/wam/driver/test_status_poller.py::"
+_CONTACT = "tests/acquisition/control_loop/test_contact.py::"
+_LOCK = "tests/experiments/rig/test_arm_lock.py::"
 _PROCESSES = "tests/faults/test_process_faults.py::test_what_befalls_the_computer_leaves_the_arm_safe"
 _MOTORS = range(1, 8)
 _LIES = tuple(f"lie-of-motor-{motor}" for motor in _MOTORS)
@@ -28,13 +30,18 @@ ROWS: dict[str, dict[str, Fields]] = {
             (_MATRIX, _GUARD + "test_silence_tells_how_long_and_which_motors"),
         ),
         "stuck": (
-            "the joint is pulled on without end while the arm moves by itself; in a trial speed and place are recorded wrongly",
+            "the joint is pulled faster and faster while the arm moves by itself; in a trial speed and place are recorded wrongly",
             "encoder or its puck stands still and goes on answering",
-            "not detected in a trial. In a move: a joint 40 mrad (joint 7: 100) from its place on the way, looked at every 20 ms",
-            "in a move the arm is braked; in a trial none, the arm floats and a person leads it",
+            "in a move: a motor that does not turn, while the move goes on and its torque would move it for certain (1.5 times the dry friction identified on another arm and a share of the weight). In a trial: motors 2 to 4 that stand while the sole goes 20 mm, 5 and 6 while it goes 45 mm; motors 1 and 7 are not looked at, for both may stand in a sound trial. Not detected while the arm stands",
+            "brakes",
             _STUCK,
-            "of joint 1, which hardly moves in a calibration, and of joint 7 about its own axis the torque limit only",
-            (_MATRIX,),
+            "measured in a move and while the sole stands. On an arm almost without friction (0.02) a wrist joint reaches 1.7 of its limit in other moves, with 0.3 of it 1.1. An encoder that freezes within the last 17 mrad of joint 7's way is noticed in the next move only. In a trial motor 7, frozen, lets the ground turn the foot: 2.1 of the limit",
+            (
+                _MATRIX,
+                "tests/fakes/world/test_stopped_moves.py::test_a_motor_whose_encoder_freezes_in_a_move_is_noticed",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast",
+                "tests/faults/test_stuck_in_trials.py::test_a_frozen_motor_that_hardly_turns_in_a_trial_does_no_harm",
+            ),
         ),
         "drifting": (
             "gravity of a false place pulls; a damper brakes a speed that is none",
@@ -229,7 +236,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             "age of the newest sample: flagged after 6 ms, trial stopped after 20",
             "hold, trial interrupted",
             ("ft-stale", "ft-unplugged"),
-            "in a move the force is not looked at",
+            "in a move contact is not noticed then",
             (_CYCLE + "test_a_silent_sensor_stops_a_trial_after_20_ms",),
         ),
         "stuck": (
@@ -540,6 +547,114 @@ ROWS: dict[str, dict[str, Fields]] = {
             (_ARM + "test_waiting_for_a_missing_reply_ends_at_the_deadline",),
         ),
     },
+    "contact force": {
+        "lost": (
+            "the arm pushes on against what it has met",
+            "sensor silent in a move, or not yet weighed",
+            "a move: the foot is weighed while it hangs free, a silent sensor is told then; a trial: as a lost wrench",
+            "in a move none; a joint that is held up is braked as a stuck motor",
+            ("ft-stale", "ft-unplugged"),
+            "the torque that moves a joint for certain, then the brakes",
+            (
+                "tests/fakes/world/test_stopped_moves.py::test_a_hand_that_holds_the_arm_in_a_move_has_it_braked",
+                _CONTACT + "test_before_the_first_tare_nothing_is_known_of_the_load",
+            ),
+        ),
+        "stuck": (
+            "the foot is caught and pulled on",
+            "stones, a container's wall",
+            "in a trial a force that grows by 40 N within 0.5 s while the sole stands",
+            "the trial ends, the arm holds",
+            (),
+            "40 N more than before",
+            (_CONTACT + "test_a_force_that_grows_while_the_foot_stands_ends_a_trial",),
+        ),
+        "drifting": (
+            "a move is stopped though nothing is met",
+            "foot of another weight than in rig.toml, drift of the sensor",
+            "40 N are more than twice the weight of a foot of 2 kg that is told wrongly",
+            "none; beyond, the arm holds",
+            ("ft-jump",),
+            "",
+            (_MATRIX,),
+        ),
+        "implausible": (
+            "arm, foot or a person is pressed",
+            "something is in the way (`contact-force`: 120 N at the sole)",
+            "in a move 40 N beyond the weight for 10 ms, in a trial 100 N, at any time 150 N",
+            "in a move the arm holds, then the brakes; a trial ends; hold",
+            ("contact-force",),
+            "",
+            (
+                _MATRIX,
+                _CONTACT
+                + "test_what_an_arm_meets_in_its_own_move_makes_it_hold_after_ten_milliseconds",
+                _CONTACT
+                + "test_a_load_beyond_a_limit_is_a_fault_after_ten_milliseconds",
+            ),
+        ),
+        "late": (
+            "the arm goes on for some cycles",
+            "a load counts when it lasts 10 ms; the sensor is 1 to 6 ms late",
+            "as implausible",
+            "as implausible",
+            (),
+            "16 ms and a cycle, 5 mm at 0.3 m/s",
+            (_CONTACT + "test_a_blow_that_is_over_at_once_is_no_fault",),
+        ),
+    },
+    "second command": {
+        "lost": (
+            "a command that died keeps the arm from others",
+            "killed process",
+            "the lock is the kernel's: its owner's death opens it",
+            "the next command has the arm",
+            (),
+            "none",
+            (_LOCK + "test_a_killed_owner_gives_the_arm_back",),
+        ),
+        "stuck": (
+            "a command that hangs keeps the arm",
+            "a defect",
+            "the second command is refused with process, command line and time of the first",
+            "a person ends it",
+            (),
+            "the arm holds or is braked, as for a silent console",
+            (_LOCK + "test_a_second_process_is_refused_and_told_who_has_the_arm",),
+        ),
+        "drifting": (
+            "none: a lock has no value",
+            "-",
+            "not applicable",
+            "none",
+            (),
+            "none",
+            (_LOCK + "test_names_of_different_buses_differ",),
+        ),
+        "implausible": (
+            "two commands mix their questions and torques",
+            "a second command for the same arm on this computer",
+            "lock per interface and channel (arm-busy)",
+            "it is refused before its first frame; the first goes on",
+            ("second-command",),
+            "",
+            (
+                _MATRIX,
+                "tests/experiments/commands/test_shared_arm.py::test_an_arm_that_another_program_has_is_not_opened",
+            ),
+        ),
+        "late": (
+            "a command opens an arm that others have made active",
+            "activated from another computer, or left active",
+            "the bus is listened to for 50 ms and the mode asked for before anything is sent",
+            "refused (arm-active, other-master)",
+            (),
+            "nothing is sent but the question",
+            (
+                "tests/experiments/commands/test_shared_arm.py::test_an_active_arm_is_asked_for_its_mode_and_left_active",
+            ),
+        ),
+    },
     "serial line": {
         "lost": (
             "as a lost wrench",
@@ -630,12 +745,14 @@ ROWS: dict[str, dict[str, Fields]] = {
         "implausible": (
             "gravity pulls askew, the foot is not where it is recorded",
             "zeroed away from home",
-            "mech_at_home at the zeroing and at every start; without it not detected but by the residual at a tare where the bias of the sensor is known",
-            "refused",
+            "mech_at_home at the zeroing and at every start. Where it is not known: the torques of traction calibrate gravity, for joints 2 to 5; the residual at a tare where the bias of the sensor is known. Not detected otherwise",
+            "refused beyond 3 degrees and four standard deviations",
             (),
-            "modulo a motor turn (joint 1: 0.15 rad); gravity would not see a turn about joint 1 at all; the residual of 1 N is 13 degrees of the foot's weight",
+            "with mech_at_home: modulo a motor turn (joint 1: 0.15 rad). By torques that are 0.1 N m rms off: a standard deviation of 0.5 degrees at joint 2, 0.9 at joint 3, 4 at joints 4 and 5; joints 1, 6 and 7 do not show. The residual of 1 N is 13 degrees of the foot's weight",
             (
                 "tests/experiments/preflight/test_zero_check.py::test_five_degrees_in_any_joint_are_noticed_and_the_joint_is_named",
+                "tests/wam/model/test_zero_errors.py::test_six_degrees_at_upper_arm_are_refused_with_the_joint",
+                "tests/wam/model/test_zero_errors.py::test_a_wrong_zero_of_joints_1_6_and_7_does_not_show",
             ),
         ),
         "late": (

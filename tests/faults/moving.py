@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from tests.faults.expected import OK, TABLE, Cell, End
+from tests.faults.expected import HOLD, OK, OTHER_REFUSED, TABLE, Arm, Cell, End
 from tests.faults.phases import PHASES
 
 _TARE = PHASES.index("tare")
@@ -16,15 +16,32 @@ _UNLOCKED = Cell(
 _ASTRAY = Cell(
     End.UNMEASURED, why="seen where the arm was sent, not how fast it truly goes"
 )
+_IN_VAIN = Cell(
+    End.UNMEASURED,
+    " stands still although the arm is sent on.",
+    why="seen when the move turns the motor in vain, at the latest in the next move",
+)
+_MET = Cell(
+    End.UNMEASURED,
+    " N on the foot beyond its weight (limit 40)",
+    arm=Arm(30, "driven", HOLD, "holding"),
+)
+_OWN = {
+    "joint7-slip": _UNLOCKED,
+    "contact-force": _MET,
+    "second-command": OTHER_REFUSED,
+}
 _STOPPING = {End.ENDED, End.TOLD, End.REDONE, End.SOMEHOW}
 
 
 def _cell(fault: str) -> Cell:
     """Return the cell that follows from the fault's own during a tare."""
+    if fault in _OWN:
+        return _OWN[fault]
     still = TABLE[fault][_TARE]
-    if fault == "joint7-slip":
-        return _UNLOCKED
-    if fault.startswith(("creep", "stuck")):
+    if fault.startswith("stuck"):
+        return _IN_VAIN
+    if fault.startswith("creep"):
         return _ASTRAY
     if fault.startswith("ft-"):
         return _WEIGHED

@@ -139,6 +139,32 @@ def run_with(inject: Strike, phase: str, config: Path, data: Path) -> Seen:
     return Seen(done, scenes[0], found[0] if found else None, data, logs[0])
 
 
+def run_whole(
+    inject: Strike, seconds: float, config: Path, data: Path, friction: float
+) -> Seen:
+    """Run a session of one whole trial, struck after so many of its seconds."""
+    with pytest.MonkeyPatch.context() as patch:
+        logs, scenes = watch_truth(patch), _watch(patch)
+        usual_answer = AutoOperator.answer
+
+        def answer(operator, asked):
+            scene = scenes[0]
+            is_due = asked.prompt is Prompt.RECORDING and asked.since > seconds
+            if is_due and not scene.strikes:
+                scene.strikes += 1
+                scene.struck_ns = scene.clock.now_ns()
+                inject(scene)
+            return usual_answer(operator, asked)
+
+        patch.setattr(AutoOperator, "answer", answer)
+        options = ("--fake", "--fast", "--operator-script", "auto", "--trials", 1)
+        more = ("--friction", friction, "--config", config, "--data", data)
+        done = traction("run", "TF", *options, *more)
+        _let_the_world_go_on(scenes[0])
+    folder = next((data / "sessions").glob("2*"))
+    return Seen(done, scenes[0], folder, data, logs[0])
+
+
 def _let_the_world_go_on(scene: SimulatedScene) -> None:
     """Let the arm do what it does when the program is gone."""
     rig, clock = scene.rig, scene.clock

@@ -2,11 +2,18 @@
 
 import errno
 import os
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from experiments.messages import CATALOGUE
+from experiments.rig.arm_lock import ArmLock
+from tests.experiments.program import write_config
 from tests.faults.rehearse import MS, SimulatedScene, Strike, inject
 from wam.bus.frames import MOTOR_NODES, position_reply_id
 from wam.control.controller import FootController
@@ -144,6 +151,23 @@ def _long_heartbeat_and_silence(scene: SimulatedScene) -> None:
     inject("can-silence")(scene)
 
 
+def _second_command(_: SimulatedScene) -> None:
+    """Start another command for an arm that this process has: it has to be refused."""
+    with tempfile.TemporaryDirectory(prefix="second-") as place:
+        config = write_config(Path(place), rig=('"socketcan" ', '"traction-fake" '))
+        channel = f"{place}/bus"
+        config.write_text(config.read_text().replace('"can0"', f'"{channel}"'))
+        lock = ArmLock("traction-fake", channel)
+        try:
+            command = [sys.executable, "-m", "experiments", "check", "--config", config]
+            done = subprocess.run(command, capture_output=True, check=False, text=True)
+        finally:
+            lock.close()
+            lock.path.unlink()
+    assert done.returncode == CATALOGUE["arm-busy"].exit_code, done.stderr
+    assert f"in use: process {os.getpid()}" in done.stderr
+
+
 _BY_HAND: dict[str, Strike] = {
     "joint-limit": _tighten(_behind_a_stop),
     "torque-limit": _tighten(_weak),
@@ -153,6 +177,7 @@ _BY_HAND: dict[str, Strike] = {
     "stall-20-ms": _stall(20),
     "stall-150-ms": _stall(150),
     "clock-step": _step_utc,
+    "second-command": _second_command,
     "disk-full": _no_disk(errno.ENOSPC),
     "disk-read-only": _no_disk(errno.EROFS),
     "stall-150-ms, heartbeat 1 s": _stall_under_a_long_heartbeat,

@@ -82,10 +82,9 @@ LIMP = Promise(
     "braked",
 )
 STUCK = Promise(
-    speed=8.0,
-    travel=0.2,
-    why="a motor whose place stands still is pulled on as long as the arm moves: "
-    "its torque limit and 40 mrad of the other joints, or the way's end, bound it",
+    speed=1.75,
+    why="a motor whose encoder stands still in a move is pulled until its torque would "
+    "move it for certain; an arm almost without friction goes some way meanwhile",
 )
 STOPPING = Promise(travel=0.1)
 

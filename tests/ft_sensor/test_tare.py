@@ -68,6 +68,11 @@ def test_limit_can_be_set():
         measure(samples(steps), spread_limit=0.8)
 
 
+def test_a_spread_of_just_the_limit_is_accepted():
+    steps = np.repeat([0.0, 0.0, 0.5, 0.0, 0.0], 160)
+    assert measure(samples(steps), spread_limit=0.5).spread == 0.5
+
+
 def test_one_second_is_enough():
     assert measure(samples(noise(800))).samples == 800
 

@@ -1,6 +1,6 @@
 from .controller import FootController
 from .joint_lock import LockGains
-from .position_control import TOP_SPEED, JointMove
+from .position_control import TOP_SPEED, JointMove, move_reference
 from .soft_walls import SoftWalls, Walls
 
 __all__ = [
@@ -10,4 +10,5 @@ __all__ = [
     "LockGains",
     "SoftWalls",
     "Walls",
+    "move_reference",
 ]

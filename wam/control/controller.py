@@ -5,7 +5,14 @@ import numpy as np
 from acquisition import ArmReading, Vector
 from acquisition.control_loop import ArmState, ControlLaw
 from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
-from wam.control.position_control import TOP_SPEED, JointMove, PositionHold, joint_pd
+from wam.control.position_control import (
+    TOP_SPEED,
+    JointMove,
+    MotorWatch,
+    PositionHold,
+    joint_pd,
+    move_reference,
+)
 from wam.control.soft_walls import SoftWalls
 from wam.model import ArmModel, VirtualMass, compensation
 
@@ -44,6 +51,8 @@ class FootController(ControlLaw):
         self._state = ArmState.IDLE
         self._move: JointMove | None = None
         self._move_ns = 0
+        self._watch = MotorWatch(model.constants)
+        self._stuck_motor = 0
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Begin `state`; torques change continuously except for the damping.
@@ -58,6 +67,7 @@ class FootController(ControlLaw):
         else:
             self._hold.begin(reading.q, self._move_spring(reading))
         self._move = None
+        self._stuck_motor = 0
         self._state = state
         self._mass.aim(self._target_mass if state is ArmState.FLOAT else 0.0, now)
         if state in _POWERED:
@@ -68,8 +78,8 @@ class FootController(ControlLaw):
     def move_to(self, goal: Vector, speed: float, reading: ArmReading) -> float:
         """Go to `goal` [rad], shape (7,), on a straight line; return how long [s].
 
-        No joint is faster than `speed` [rad/s]. Joint 7 is released for the move. Only
-        in hold.
+        No joint is faster than `speed` [rad/s] but joint 7, which is released for the
+        move and then turns at 0.5 rad/s. Only in hold.
 
         Raises:
             ValueError: the arm does not hold, `goal` is beyond a stop or not finite, or
@@ -88,13 +98,14 @@ class FootController(ControlLaw):
         now = reading.host_ns
         # From where the arm is held, or the torque would jump.
         if self._move is not None:
-            start = self._move.at((now - self._move_ns) * 1e-9)[0]
+            start = move_reference(self._move, (now - self._move_ns) * 1e-9)[0]
         else:
             start = reading.q + self._hold.spring(reading) / constants.kp
         self._hold.release()
         self._lock.release(now)
         self._move = JointMove(start, goal.copy(), speed)
         self._move_ns = now
+        self._watch.begin()
         return self._move.duration
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
@@ -116,12 +127,22 @@ class FootController(ControlLaw):
             tau[LOCKED_JOINT] += lock  # fades from the moment of its release
             # A move never asks for what the guard would stop it for.
             tau = np.clip(tau, -self._largest, self._largest)
+            wanted, _ = move_reference(self._move, (now - self._move_ns) * 1e-9)
+            self._stuck_motor = self._watch.stuck_motor(wanted, tau - gravity, reading)
         else:
             tau = gravity + self._standing_torque(reading, gravity)
             tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         if self._walls is not None:
             self._walls.apply(tau, reading)
         return tau, gravity
+
+    def is_moving(self) -> bool:
+        """Return whether a move is made, or its goal is kept."""
+        return self._move is not None
+
+    def stuck_motor(self) -> int:
+        """Return the motor that the move turns in vain, 1-7; 0 = none."""
+        return self._stuck_motor
 
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
@@ -143,7 +164,7 @@ class FootController(ControlLaw):
 
     def _move_torque(self, move: JointMove, reading: ArmReading) -> Vector:
         """Return what the PD of `move` adds to gravity [N m], shape (7,)."""
-        q, qd = move.at((reading.host_ns - self._move_ns) * 1e-9)
+        q, qd = move_reference(move, (reading.host_ns - self._move_ns) * 1e-9)
         constants = self._model.constants
         rate = qd - reading.qd
         return joint_pd(constants.kp, constants.kd, q - reading.q, rate)
@@ -152,7 +173,7 @@ class FootController(ControlLaw):
         """Return the spring's part of a move's torque [N m]; None without a move."""
         if self._move is None:
             return None
-        q, _ = self._move.at((reading.host_ns - self._move_ns) * 1e-9)
+        q, _ = move_reference(self._move, (reading.host_ns - self._move_ns) * 1e-9)
         constants = self._model.constants
         return joint_pd(constants.kp, constants.kd, q - reading.q, np.zeros(7))
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition import ArmReading
+from wam.control.joint_lock import RAMP
 from wam.model import ArmConstants, Array
 
 # Shares of the vendor's gains of joint PD, which are made to follow moves: softer, and
@@ -102,6 +103,8 @@ class PositionHold:
 
 TOP_SPEED = 0.5  # rad/s
 ACCELERATION = 0.5  # rad/s^2
+# Of joint 7: soon at its speed, and with little overshoot of its stiff, light axis.
+TURN_ACCELERATION = 6.0  # rad/s^2
 PD_TORQUE_LIMIT = np.array([25.0, 20.0, 15.0, 15.0, 5.0, 5.0, 5.0])  # N m, PD part only
 
 
@@ -130,7 +133,7 @@ class JointMove:
         """Return (positions [rad], velocities [rad/s]) `t` seconds after the start."""
         length, T, a = self._length, self.duration, self.acceleration
         if length == 0.0 or t >= T:
-            return self.goal.copy(), np.zeros(7)
+            return self.goal.copy(), np.zeros_like(self.goal)
         ramp = min(self.speed / a, T / 2.0)
         if t <= 0.0:
             s, v = 0.0, 0.0
@@ -149,6 +152,75 @@ class JointMove:
         return float(np.abs(self.goal - self.start).max())
 
 
+def move_reference(move: JointMove, t: float) -> tuple[Array, Array]:
+    """Return (positions [rad], velocities [rad/s]) that are wanted, shapes (7,).
+
+    Joint 7 turns at its own pace as soon as its lock has let go: light as it is, it
+    would be thrown by a torque that grows slowly while its encoder stands still. It
+    turns the foot about its own axis, so the way is as free as on a straight line.
+
+    Args:
+        move: of the joints.
+        t: time since its start [s].
+    """
+    q, qd = move.at(t)
+    turn = JointMove(move.start[6:], move.goal[6:], TOP_SPEED, TURN_ACCELERATION)
+    q[6:], qd[6:] = turn.at(t - RAMP)
+    return q, qd
+
+
 def joint_pd(kp: Array, kd: Array, error: Array, rate_error: Array) -> Array:
     """Return kp e + kd de [N m], shape (7,), clipped to the limits of the PD part."""
     return np.clip(kp * error + kd * rate_error, -PD_TORQUE_LIMIT, PD_TORQUE_LIMIT)
+
+
+# N m beyond the weight that move a joint for certain: one and a half times the dry
+# friction that was identified on another arm, and a quarter of the joint's weight.
+BREAKAWAY = np.array([4.0, 9.0, 4.5, 3.5, 0.7, 0.7, 0.16])
+# rad at the joint that a move goes on meanwhile, a fifth of what dry friction holds.
+_IN_VAIN = np.array([1.0, 0.5, 0.5, 0.5, 2.0, 2.0, 3.0]) * 1e-3
+_TREMBLE = 1  # counts by which an encoder at rest flickers
+
+
+class MotorWatch:
+    """Notices the motor that a move turns in vain.
+
+    Its position stays while the move goes on, and its torque would move it whatever
+    the friction: the encoder stands still, or something holds the joint. A motor whose
+    encoder stands still is pulled faster and faster, so it has to be noticed before
+    the joint seems to be far off.
+    """
+
+    def __init__(self, constants: ArmConstants) -> None:
+        self._j2mp = np.array(constants.j2mp)
+        self._of_torques = np.linalg.inv(self._j2mp).T
+        self._breakaway: list[float] = (np.abs(self._of_torques) @ BREAKAWAY).tolist()
+        self._in_vain: list[float] = (np.abs(self._j2mp) @ _IN_VAIN).tolist()
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget what was seen: a move begins."""
+        self._counts: list[int] = []
+        self._wanted: list[float] = []
+
+    def stuck_motor(self, wanted: Array, excess: Array, reading: ArmReading) -> int:
+        """Return the first motor that is turned in vain, 1-7; 0 = none.
+
+        Args:
+            wanted: where the move wants the joints [rad], shape (7,).
+            excess: torques beyond the weight that it asks for [N m], shape (7,).
+            reading: of this cycle.
+        """
+        angles = (self._j2mp @ wanted).tolist()
+        if not self._counts:
+            self._counts, self._wanted = list(reading.counts), angles
+        stuck = 0
+        torques = (self._of_torques @ excess).tolist()
+        for i, counts in enumerate(reading.counts):
+            is_still = abs(counts - self._counts[i]) <= _TREMBLE
+            if not is_still or not reading.fresh >> i & 1:
+                self._counts[i], self._wanted[i] = counts, angles[i]
+            elif abs(angles[i] - self._wanted[i]) > self._in_vain[i]:
+                is_pulled = abs(torques[i]) > self._breakaway[i]
+                stuck = stuck or (i + 1 if is_pulled else 0)
+        return stuck

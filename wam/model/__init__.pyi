@@ -10,7 +10,15 @@ from .clearance import (
 )
 from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
 from .gravity import VirtualMass, compensation, gravity_model
-from .moments import MomentFit, check_fit, fit_moments, regressor
+from .moments import (
+    MomentFit,
+    ZeroErrors,
+    check_fit,
+    check_zeros,
+    fit_moments,
+    regressor,
+    zero_errors,
+)
 from .tool import Tool, sensor_body, tool_metadata, tool_of
 
 __all__ = [
@@ -27,9 +35,11 @@ __all__ = [
     "ObstacleBox",
     "Tool",
     "VirtualMass",
+    "ZeroErrors",
     "add_point",
     "build_pinocchio",
     "check_fit",
+    "check_zeros",
     "compensation",
     "drive_inertia_matrix",
     "fit_moments",
@@ -41,4 +51,5 @@ __all__ = [
     "tool_metadata",
     "tool_of",
     "urdf",
+    "zero_errors",
 ]

@@ -19,6 +19,10 @@ from wam.model.constants import GRAVITY, ArmConstants, Array, Body
 OBSERVABLE = 12  # numbers of the 21 that show in the torques
 LARGEST_RESIDUAL = 0.5  # N m rms over all joints and poses
 LARGEST_CONDITION = 30.0  # of what is observable; the shipped poses have 7
+LARGEST_ZERO_ERROR = 3.0  # degrees
+SEEN_ZEROS = (2, 3, 4, 5)  # joints whose zero shows in the torques
+_TURN = 1e-5  # rad of a difference that stands for a slope
+_LEAST_NOISE = 0.01  # N m that torques are known to at best
 _SINGULAR = 1e-3  # of the largest singular value: below it a direction is not seen
 
 
@@ -122,6 +126,76 @@ def fit_moments(
         rank=rank,
         condition=float(values[0] / values[rank - 1]),
         residuals=tau - (Y @ mus).reshape(tau.shape),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroErrors:
+    """Errors of the joints' zeros that would explain the torques better.
+
+    Attributes:
+        joints: numbers of the joints whose zero shows in the torques.
+        errors: true less believed position of each [rad], shape (4,).
+        deviations: standard deviation of each [rad], shape (4,).
+    """
+
+    joints: tuple[int, ...]
+    errors: Array
+    deviations: Array
+
+
+def zero_errors(
+    constants: ArmConstants, q: NDArray[np.float64], fit: MomentFit
+) -> ZeroErrors:
+    """Return what the residuals of a fit say about the zeros of joints 2 to 5.
+
+    To first order residuals = P (dg/dq) e, with P the projection on what no moments
+    explain. The zeros of joints 1 and 7 do not show at all (a vertical axis, and
+    moments that turn with it), that of joint 6 hardly: 1 N m would be 1000 degrees.
+
+    Args:
+        constants: of the arm.
+        q: joint positions at rest [rad], shape (n, 7).
+        fit: of the torques there.
+    """
+    Y = np.vstack([regressor(constants, row) for row in q])
+    seen = np.linalg.svd(Y, full_matrices=False)[0][:, : fit.rank]
+    slopes = np.empty((len(Y), len(SEEN_ZEROS)))
+    for column, joint in enumerate(SEEN_ZEROS):
+        turned = q.copy()
+        turned[:, joint - 1] += _TURN
+        later = np.vstack([regressor(constants, row) for row in turned])
+        slope = (later - Y) @ fit.mus.ravel() / _TURN
+        slopes[:, column] = slope - seen @ (seen.T @ slope)
+    residuals = fit.residuals.ravel()
+    errors = np.linalg.lstsq(slopes, residuals)[0]
+    left = residuals - slopes @ errors
+    free = max(len(left) - fit.rank - len(SEEN_ZEROS), 1)
+    noise = max(float(left @ left) / free, _LEAST_NOISE**2)
+    covariance = noise * np.linalg.pinv(slopes.T @ slopes)
+    deviations = np.sqrt(np.diag(covariance))
+    return ZeroErrors(
+        SEEN_ZEROS, np.asarray(errors, np.float64), np.asarray(deviations, np.float64)
+    )
+
+
+def check_zeros(found: ZeroErrors) -> None:
+    """Refuse an arm whose torques say that it was zeroed away from home.
+
+    Raises:
+        SettingsError: a joint is further off than 3 degrees, and than four standard
+            deviations.
+    """
+    degrees, sure = np.degrees(found.errors), 4.0 * np.degrees(found.deviations)
+    beyond = np.abs(degrees) / np.maximum(sure, LARGEST_ZERO_ERROR)
+    worst = int(beyond.argmax())
+    if beyond[worst] <= 1.0:
+        return
+    raise SettingsError(
+        f"Joint {found.joints[worst]} seems to be zeroed {degrees[worst]:+.1f} degrees "
+        f"away from home (limit {LARGEST_ZERO_ERROR:g}, standard deviation "
+        f"{sure[worst] / 4.0:.1f}): its weight pulls elsewhere.",
+        hint="Bring the arm home and zero it anew: traction zero.",
     )
 
 

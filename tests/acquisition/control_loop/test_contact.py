@@ -34,13 +34,18 @@ def load(force=0.0, moment=0.0, sole=HERE, *, is_saturated=False):
     return Contact(force, moment, is_saturated, sole)
 
 
-def follow(loads, *, is_recording=True, state=None):
+def follow(loads, *, is_recording=True, is_moving=False, state=None):
     """Return the first verdict that is none of nothing, and its cycle."""
     state = state or ContactState()
     for cycle, seen in enumerate(loads):
         now_ns = START_NS + cycle * PERIOD_NS
         state, verdict = check_contact(
-            LIMITS, state, now_ns, seen, is_recording=is_recording
+            LIMITS,
+            state,
+            now_ns,
+            seen,
+            is_recording=is_recording,
+            is_moving=is_moving,
         )
         if verdict is not OK:
             return verdict, cycle
@@ -70,6 +75,21 @@ def test_a_load_beyond_a_limit_is_a_fault_after_ten_milliseconds(
 )
 def test_a_load_at_its_limit_is_none(seen):
     assert follow([seen] * 500)[0] is OK
+
+
+def test_what_an_arm_meets_in_its_own_move_makes_it_hold_after_ten_milliseconds():
+    moving = {"is_recording": False, "is_moving": True}
+    verdict, cycle = follow([load(force=40.1)] * 20, **moving)
+    assert (verdict.fault, verdict.action) == (Fault.CONTACT_MOVE, Action.HOLD)
+    assert (verdict.detail, cycle) == (ContactExcess(40.1, 40.0), CYCLES)
+    assert follow([load(force=40.0)] * 20, **moving)[0] is OK
+    assert follow([load(force=40.1)] * 20, is_recording=False)[0] is OK
+    assert follow([*[load(force=90.0)] * CYCLES, load()] * 3, **moving)[0] is OK
+
+
+def test_a_move_does_not_hide_what_is_beyond_the_limit_of_hold():
+    verdict, _ = follow([load(force=151.0)] * 20, is_moving=True, is_recording=False)
+    assert (verdict.fault, verdict.detail.limit) == (Fault.CONTACT_FORCE, 150.0)
 
 
 def test_a_blow_that_is_over_at_once_is_no_fault():

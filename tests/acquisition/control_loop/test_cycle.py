@@ -130,6 +130,8 @@ class Law:
         self.state = ArmState.IDLE
         self.entered = []
         self.offset = 0.0
+        self.stuck = 0
+        self.moves = False
         self.torques = TORQUE
 
     def enter(self, state, reading):
@@ -142,6 +144,12 @@ class Law:
 
     def joint7_offset(self, reading):
         return self.offset
+
+    def is_moving(self):
+        return self.moves
+
+    def stuck_motor(self):
+        return self.stuck
 
 
 class Observer:

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from acquisition.control_loop.faults import (
     LateCycles,
     ReplySilence,
     SafetySilence,
+    StillMotor,
+    StuckMotor,
 )
 from acquisition.control_loop.guard import GuardLimits, GuardState, Observation, check
 from acquisition.devices import ArmReading, PositionJump, SafetyMode
@@ -66,6 +69,9 @@ OBSERVED = {
     "is_recording": True,
     "is_commanded": True,
     "is_late": False,
+    "stuck_motor": 0,
+    "sole": (0.0, 0.0, 0.0),
+    "is_moving": False,
 }
 QUIET = Observation(**OBSERVED)
 
@@ -180,7 +186,7 @@ def test_a_joint_may_be_at_its_limit_of(joint, sign, field, limits, fault):
 def test_a_quiet_cycle_passes():
     state, verdict = check(LIMITS, ARMED, QUIET)
     assert verdict is OK
-    assert state == ARMED
+    assert replace(state, rests=()) == ARMED
 
 
 @pytest.mark.parametrize("field", ["q", "qd", "tau"])
@@ -333,6 +339,75 @@ def test_the_memory_of_late_cycles_does_not_grow():
     assert len(state.late) <= 3
     state, _ = check(LIMITS, state, seen(host_ns=70 * S))
     assert state.late == ()
+
+
+def test_a_cycle_that_brings_nothing_new_makes_no_new_state():
+    state, _ = late_cycles([0])
+    assert check(LIMITS, state, seen(host_ns=500 * MS))[0] is state
+
+
+def led(steps, **changes):
+    """Judge cycles of a trial; `steps` are (counts of motor 4, the sole's x [m])."""
+    state, verdict = ARMED, OK
+    for counts, x in steps:
+        now = seen(counts=[0, 0, 0, counts, 0, 0, 0], sole=(x, 0.0, 0.0), **changes)
+        state, verdict = check(ONE_MOTOR, state, now)
+    return state, verdict
+
+
+ONE_MOTOR = replace(LIMITS, still_ways=(9.0, 9.0, 9.0, 0.02, 9.0, 9.0, 9.0))
+
+
+def test_a_motor_that_stands_still_while_the_sole_goes_on_ends_the_session():
+    _, verdict = led([(100, 0.3), (100, 0.3201)])
+    assert (verdict.fault, verdict.action) == (Fault.MOTOR_STILL, Action.IDLE)
+    assert verdict.detail == StillMotor(4, pytest.approx(20.1), pytest.approx(20.0))
+    assert verdict.ends_session
+
+
+@pytest.mark.parametrize("counts", [99, 101])
+def test_a_flicker_of_one_count_is_no_motion(counts):
+    assert led([(100, 0.3), (counts, 0.31), (100, 0.3201)])[1].fault is not None
+
+
+@pytest.mark.parametrize("counts", [98, 102])
+def test_a_motor_that_turns_meanwhile_stands_not_still(counts):
+    steps = [(100, 0.3), (counts, 0.319), (counts, 0.3389)]
+    assert led(steps)[1] is OK
+    assert led([*steps, (counts, 0.3391)])[1].fault is Fault.MOTOR_STILL
+
+
+def test_a_sole_that_stands_or_comes_back_judges_no_motor():
+    assert led([(100, 0.3), (100, 0.3199), (100, 0.3), (100, 0.2801)])[1] is OK
+
+
+def test_a_motor_that_is_not_heard_is_not_said_to_stand_still():
+    quiet = {"fresh": 0x77, "is_complete": False, "missing_cycles": 1}
+    assert led([(100, 0.3), (100, 0.33)], **quiet)[1] is OK
+
+
+def test_between_trials_no_motor_is_said_to_stand_still():
+    state, verdict = led([(100, 0.3), (100, 0.4)], is_recording=False)
+    assert verdict is OK
+    assert state.rests == ()
+
+
+def test_a_motor_at_rest_makes_no_new_state():
+    state, _ = led([(100, 0.3)])
+    again = seen(counts=[0, 0, 0, 100, 0, 0, 0], sole=(0.31, 0.0, 0.0))
+    assert check(ONE_MOTOR, state, again)[0] is state
+
+
+def test_motors_1_and_7_may_stand_for_a_whole_trial():
+    assert [way < 0.1 for way in LIMITS.still_ways] == [False, *[True] * 5, False]
+
+
+@pytest.mark.parametrize("motor", [1, 7])
+def test_a_move_that_turns_a_motor_in_vain_is_braked(motor):
+    verdict = judge(stuck_motor=motor, is_recording=False)
+    assert (verdict.fault, verdict.action) == (Fault.MOTOR_STUCK, Action.IDLE)
+    assert verdict.detail == StuckMotor(motor)
+    assert verdict.ends_session
 
 
 def test_silence_tells_how_long_and_which_motors():

@@ -12,7 +12,7 @@ import pytest
 from acquisition.errors import TrialFileError
 from acquisition.recording.recorder import seal
 from acquisition.sample import Flag
-from acquisition.schema import TRUTH
+from acquisition.schema import CYCLE, TRUTH
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file, recovered_path
 from acquisition.trial_file.salvage import SoundRecords, recorded_seconds
@@ -31,7 +31,7 @@ from tests.acquisition.trials import (
     write_trial,
 )
 
-MESSAGE_INDEX, CHUNK, ATTACHMENT = 7, 6, 9
+MESSAGE, MESSAGE_INDEX, CHUNK, ATTACHMENT = 5, 7, 6, 9
 BLOCK = 50  # cycles in a chunk
 
 
@@ -216,6 +216,16 @@ def test_missed_and_late_cycles_are_counted_anew(put, tmp_path):
         "cycles_missed": "2",
         "late_cycles": "10",
     }
+
+
+def test_a_message_as_long_as_a_cycle_is_not_counted_as_one(put, left):
+    channels = TrialReader(recover_file(put(left)).path).summary.channels
+    other = next(n for n, known in channels.items() if known.topic != "/cycle")
+    body = struct.pack("<HIQQ", other, 0, START_NS, START_NS) + CYCLE.template
+    message = struct.pack("<BQ", MESSAGE, len(body)) + body
+    recovery = recover_file(put(left + message, "T08.mcap.partial"))
+    assert recovery.messages == recover_file(put(left)).messages + 1
+    assert TrialReader(recovery.path).metadata["result"]["cycles_written"] == "300"
 
 
 def test_what_was_lost_is_told_in_seconds(put, left):

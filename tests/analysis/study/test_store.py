@@ -1,4 +1,5 @@
 import json
+import os
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,14 @@ from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import run_tasks
 from analysis.study.models import FitOptions
-from analysis.study.store import ResultStore, decode, encode, task_key
+from analysis.study.store import (
+    LARGEST,
+    ResultStore,
+    decode,
+    encode,
+    remove_oldest,
+    task_key,
+)
 
 ANY = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
@@ -107,6 +115,93 @@ def test_a_flipped_digit_is_noticed(tmp_path, task, result):
     (path,) = tmp_path.iterdir()
     path.write_text(path.read_text().replace('"fold": 0', '"fold": 1'))
     assert store.get(task) is None
+
+
+def filled(folder, results, size=1000):
+    """Return the paths of so many files, each used a second after the one before."""
+    paths = [folder / f"{number:064x}.json" for number in range(results)]
+    for second, path in enumerate(paths):
+        path.write_bytes(bytes(size))
+        os.utime(path, (second, second))
+    return paths
+
+
+def left(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_what_was_used_longest_ago_goes_when_the_folder_is_full(tmp_path):
+    paths = filled(tmp_path, 10)
+    assert remove_oldest(tmp_path, 9_999) == 8000
+    assert left(tmp_path) == {path.name for path in paths[2:]}
+
+
+def test_a_folder_that_is_not_full_keeps_everything(tmp_path):
+    filled(tmp_path, 10)
+    assert remove_oldest(tmp_path, 10_000) == 10_000
+    assert len(left(tmp_path)) == 10
+
+
+def test_a_store_never_grows_beyond_its_size(tmp_path, task, result):
+    tasks = [
+        replace(task, options=replace(task.options, seed=seed)) for seed in range(6)
+    ]
+    ResultStore(tmp_path).put(tasks[0], result)
+    size = sum(path.stat().st_size for path in tmp_path.iterdir())
+    store = ResultStore(tmp_path, most=int(3.5 * size))
+    for number, one in enumerate(tasks):
+        store.put(one, result)
+        assert sum(p.stat().st_size for p in tmp_path.iterdir()) <= 3.5 * size
+        os.utime(next(tmp_path.glob(f"{task_key(one)}*")), (number, number))
+    assert [store.get(one) is not None for one in tasks] == [False] * 3 + [True] * 3
+
+
+def test_a_result_that_was_read_counts_as_used(tmp_path, task, result):
+    store = ResultStore(tmp_path)
+    store.put(task, result)
+    (path,) = tmp_path.iterdir()
+    os.utime(path, (1, 1))
+    newer = filled(tmp_path, 2, size=path.stat().st_size)
+    assert store.get(task) is not None
+    remove_oldest(tmp_path, 2 * path.stat().st_size)
+    assert path.exists()
+    assert not newer[0].exists()
+
+
+def test_what_a_killed_study_left_half_written_goes_too(tmp_path):
+    (tmp_path / ".0123.json.abc").write_bytes(bytes(1000))
+    assert remove_oldest(tmp_path, 500) == 0
+    assert left(tmp_path) == set()
+
+
+def test_what_is_no_result_is_left_alone(tmp_path):
+    (tmp_path / "notes.txt").write_bytes(bytes(5000))
+    filled(tmp_path, 2)
+    remove_oldest(tmp_path, 100)
+    assert left(tmp_path) == {"notes.txt"}
+
+
+@pytest.mark.parametrize("what", ["folder", "link", "pipe", "huge", "unreadable"])
+def test_a_name_that_holds_no_result_is_no_error(tmp_path, task, result, what):
+    store, folder = ResultStore(tmp_path / "folds"), tmp_path / "folds"
+    store.put(task, result)
+    (path,) = folder.iterdir()
+    whole = path.read_bytes()
+    path.unlink()
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_bytes(whole)
+    make = {
+        "folder": path.mkdir,
+        "link": lambda: path.symlink_to(elsewhere),
+        "pipe": lambda: os.mkfifo(path),
+        "huge": lambda: path.write_bytes(whole + b" " * LARGEST),
+        "unreadable": lambda: path.write_bytes(b"[" * 100_000),
+    }
+    make[what]()
+    assert store.get(task) is None
+    store.put(task, result)
+    assert (store.get(task) is None) is (what == "folder")
+    assert elsewhere.read_bytes() == whole
 
 
 @dataclass

@@ -12,7 +12,7 @@ from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run import pose_walk as walk
-from fakes.plant.plant import PlantOptions
+from fakes.plant.plant import ArmPlant, PlantOptions
 from tests.experiments.program import traction, write_config
 from wam.calibration import poses as calibration_poses
 from wam.calibration.gravity_file import gravity_from_toml
@@ -227,3 +227,27 @@ def test_what_belongs_to_a_simulation_is_refused_on_the_real_arm(option):
     done = traction("calibrate", "gravity", *option)
     assert done.code == 2
     assert "only with --fake" in done.err
+
+
+def test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint(tmp_path):
+    """Its encoders tell a joint 2 that is 5 degrees from where it truly is."""
+    out, usual = tmp_path / "gravity.toml", ArmPlant.counts
+    per_joint = np.array(load_constants().j2mp)[:, 1] * 4096 / (2 * np.pi)
+    shift = np.round(np.radians(-5.0) * per_joint).astype(int)
+
+    def counts(plant):
+        pairs = zip(usual(plant), shift.tolist(), strict=True)
+        return [true + lie for true, lie in pairs]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ArmPlant, "counts", counts)
+        done, _ = calibrate(out, "--poses", 6)
+    assert done.code == 2, done.err
+    assert "Joint 2 seems to be zeroed +5." in done.err
+    assert not out.exists()
+
+
+def test_how_well_the_zero_is_known_is_told(calibrated):
+    (line,) = [row for row in calibrated[0].out.splitlines() if "of the zero" in row]
+    assert "joint 2" in line
+    assert "1, 6 and 7 do not show" in line

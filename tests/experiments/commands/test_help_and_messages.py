@@ -268,6 +268,23 @@ def _swing(scene):
     scene.rig.plant.qd[1] = 1.45
 
 
+def _meet(scene):
+    """Let the arm seem to move by itself, and its foot to meet something."""
+    scene.patch.setattr(FootController, "is_moving", lambda _: True)
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, contact_force_move=0.01)
+
+
+def _pull_in_vain(scene):
+    scene.patch.setattr(FootController, "stuck_motor", lambda _: 2)
+
+
+def _stand_still(scene):
+    """Let any way of the sole be too far for motor 1, which leads no foot."""
+    cycle = scene.built.cycle
+    cycle.limits = replace(cycle.limits, still_ways=(1e-4, *[1.0] * 6))
+
+
 def _narrow(scene):
     """Let joint 6, which stands at 1.2 rad, be allowed 1 rad only."""
     cycle = scene.built.cycle
@@ -431,6 +448,7 @@ CASES = {
     "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
     "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
     "contact-moment": acted(Prompt.RECORDING, _tender, words="N m on the foot (limit"),
+    "contact-move": acted(Prompt.READY, _meet, words="beyond its weight (limit 0)"),
     "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
@@ -460,6 +478,8 @@ CASES = {
     "pendant-idle": struck("pendant-idle"),
     "safety-idle": struck("safety-torque", words="torque fault"),
     "safety-stop": struck("safety-voltage", E_STOP, "voltage fault"),
+    "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 stands still"),
+    "motor-still": acted(Prompt.RECORDING, _stand_still, 4, "(limit 0)"),
     "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
     "console-lost": acted(Prompt.READY, _orphan, since=0.0),
     "process-lost": acted(Prompt.LIFT, _lose_recorder, 4, "recorder process ended"),

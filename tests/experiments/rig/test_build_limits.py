@@ -1,8 +1,9 @@
 """What bounds the arm is what rig.toml and the arm's constants say, no more."""
 
 import numpy as np
+import pytest
 
-from experiments.rig.build import build_limits, build_walls
+from experiments.rig.build import build_limits, build_safety_limits, build_walls
 from experiments.settings.load import load_settings
 from wam.driver.settings import ArmSettings
 from wam.model.constants import load_constants
@@ -40,3 +41,11 @@ def test_the_host_leaves_the_motors_what_the_joints_may_have():
         CONSTANTS.ipnm * np.linalg.solve(CONSTANTS.j2mp.T, np.diag(RIG.limits.torque)).T
     )
     assert (np.abs(units).max(axis=0) <= own).all()
+
+
+def test_the_module_warns_at_nine_tenths_of_what_it_stops_for():
+    unsaid = {"speed_warning": None, "torque_warning_units": None}
+    safety = RIG.safety.model_copy(update=unsaid)
+    limits = build_safety_limits(RIG.model_copy(update={"safety": safety}))
+    assert limits.speed_warning == pytest.approx(0.9 * RIG.safety.speed_fault)
+    assert limits.torque_warning_units == int(0.9 * RIG.safety.torque_fault_units)

@@ -77,6 +77,14 @@ def test_a_note_is_in_the_journal_with_its_author(tmp_path):
     assert (note["text"], note["who"]) == ("wet", "mk")
 
 
+def test_a_note_on_a_trial_names_trial_and_attempt(tmp_path):
+    context = make_context(tmp_path, Keys(lines=["tilted"]))
+    take_note(context, TrialName(1, 2), is_on_trial=True)
+    (note,) = [e for e in context.metadata.folder.events() if e["event"] == "noted"]
+    assert (note["trial"], note["attempt"]) == (1, 2)
+    assert (note["text"], note["who"]) == ("tilted", "mk")
+
+
 def test_a_kept_trial_counts(tmp_path):
     context = make_context(tmp_path, Keys("x", "r", "k"))
     ask_verdict(context, FIRST, reviewed(context))

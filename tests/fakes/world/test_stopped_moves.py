@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acquisition.control_loop.details import StuckMotor
 from acquisition.control_loop.faults import FAULTS, Fault, verdict_for
 from acquisition.control_loop.states import ArmState
 from fakes.world.rig import LocalSimulation
 from tests.fakes.world.holding import LIMITS, HoldBench
+from wam.bus.frames import position_reply_id
 
 pytestmark = pytest.mark.slow
 
@@ -173,3 +175,75 @@ def test_the_torque_makes_no_step_when_a_person_stops_a_move_at_rest():
     bench.enter(ArmState.HOLD)
     bench.run(0.01)
     assert np.abs(np.array(bench.sent[-1]) - bench.sent[0])[:4].max() < 0.5
+
+
+def freeze(bench, motor):
+    """Let a motor go on telling the place it is at now."""
+    here = bench.plant.counts()[motor - 1]
+    bench.rig.network.faults.falsify(position_reply_id(motor), lambda _: here)
+
+
+def worst_speed(bench, seconds):
+    """Let time pass; return the largest true speed as a share of its limit."""
+    shares = []
+    for _ in range(round(seconds * 500)):
+        bench.step()
+        shares.append(float((np.abs(bench.plant.qd) / LIMITS.speed).max()))
+    return max(shares)
+
+
+# What surely moves a joint makes one without friction faster than one with it.
+FASTEST = {0.02: 1.75, 0.3: 1.15, 1.0: 1.0}
+FROZEN = [(friction, motor) for friction in FASTEST for motor in range(1, 7)]
+
+
+@pytest.mark.parametrize(("friction", "motor"), FROZEN)
+def test_a_motor_whose_encoder_freezes_in_a_move_is_noticed(friction, motor):
+    bench = HoldBench(friction=friction)
+    move(bench)
+    freeze(bench, motor)
+    assert worst_speed(bench, 0.5) < FASTEST[friction]
+    assert bench.cycle.status.verdict.detail == StuckMotor(motor)
+    assert bench.plant.is_held
+
+
+@pytest.mark.parametrize(("friction", "motor"), [*FROZEN, (0.02, 7), (1.0, 7)])
+def test_a_motor_whose_encoder_is_frozen_before_a_move_is_noticed(friction, motor):
+    bench = HoldBench(friction=friction)
+    freeze(bench, motor)
+    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    assert worst_speed(bench, 2.0) < FASTEST[friction]
+    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STUCK
+
+
+@pytest.mark.parametrize("error", [-0.3, 0.3])
+@pytest.mark.parametrize("friction", [0.02, 0.3, 1.0])
+def test_a_sound_arm_goes_to_and_fro_whatever_its_friction_and_weight(friction, error):
+    bench = HoldBench(friction=friction, error=error)
+    begin = bench.plant.q.copy()
+    for goal, speed in ((WAY, 0.5), (0.0 * WAY, 0.05), (0.1 * WAY, 0.05), (0.0, 0.5)):
+        bench.cycle.move_to((begin + goal).tolist(), speed)
+        bench.run(np.abs(WAY).max() / speed + 1.5 if speed > 0.1 else 3.0)
+        assert bench.cycle.status.verdict is None
+
+
+def test_joint_7_is_turned_at_its_top_speed_and_frozen_there_is_braked():
+    bench = HoldBench()
+    bench.cycle.move_to((bench.plant.q + WAY).tolist(), SPEED)
+    bench.run(0.8)
+    assert bench.plant.qd[6] == pytest.approx(SPEED, rel=0.1)
+    freeze(bench, 7)
+    assert worst_speed(bench, 0.5) < 1.0
+    assert bench.cycle.status.verdict.detail == StuckMotor(7)
+
+
+def test_a_hand_that_holds_the_arm_in_a_move_has_it_braked():
+    """What does not turn is not told from what is held."""
+    bench = HoldBench()
+    move(bench)
+    q = bench.plant.q.copy()
+    for _ in range(50):
+        bench.plant.qd[:] = 0.0
+        bench.plant.q[:] = q
+        bench.step()
+    assert bench.cycle.status.verdict.fault is Fault.MOTOR_STUCK

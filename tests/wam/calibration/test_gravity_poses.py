@@ -84,6 +84,12 @@ def test_a_way_that_dips_is_not_clear(model):
     assert is_clear(model, ends[0], ends[1], 0.0)  # it dips to 0.05 m
 
 
+def test_a_space_is_left_by_a_way_that_dips_below_its_floor(model):
+    ends = np.array([TWISTED, UPRIGHT])
+    assert not FreeSpace(FLOOR).is_clear(model, ends[0], ends[1])
+    assert FreeSpace(0.0).is_clear(model, ends[0], ends[1])
+
+
 def test_the_elbow_counts_too(model):
     leaning = np.array([0.0, -1.5, 0.0, 1.6, 0.0, 0.0, 0.0])
     assert model.sole_pose(leaning)[0][2] > 0.3

@@ -61,9 +61,10 @@ def test_the_spring_pushes_inward_and_gives_half_the_limit_at_the_stop(stop, sig
     assert not np.delete(tau, 3).any()
 
 
-def test_the_spring_begins_from_zero():
-    tau = pushed(armed(), at(2.0 - DEPTH + 1e-6))
-    assert 0.0 < abs(tau[3]) < 1e-3
+@pytest.mark.parametrize(("stop", "sign"), [(-1.0, 1.0), (2.0, -1.0)])
+def test_the_spring_begins_from_zero(stop, sign):
+    tau = pushed(armed(), at(stop + sign * (DEPTH - 1e-6)))
+    assert 0.0 < sign * tau[3] < 1e-3
 
 
 def test_motion_into_the_wall_is_braked_and_motion_out_is_not():

@@ -35,6 +35,7 @@ def test_a_new_estimator_stands_at_zero():
     assert estimator.counts == [0] * 7
     assert not estimator.q.any()
     assert not estimator.qd.any()
+    assert estimator.qd7_raw == 0.0
 
 
 def test_steady_motion_is_seen_with_its_velocity(estimator):

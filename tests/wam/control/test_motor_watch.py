@@ -1,0 +1,91 @@
+"""A motor that a move turns in vain: still, pulled, and the move goes on."""
+
+import numpy as np
+import pytest
+
+from acquisition.devices import ArmReading
+from wam.control.position_control import BREAKAWAY, MotorWatch
+from wam.model.constants import load_constants
+
+CONSTANTS = load_constants()
+STEP = np.full(7, 0.004)  # rad that a move goes on
+REST = [1000, -2000, 3000, 0, 50, 60, 70]
+J2MP = np.array(CONSTANTS.j2mp)
+
+
+def reading(counts, fresh=0x7F):
+    return ArmReading(
+        host_ns=0,
+        arm_ns=0,
+        counts=list(counts),
+        q=np.zeros(7),
+        qd=np.zeros(7),
+        qd7_raw=0.0,
+        fresh=fresh,
+        is_complete=True,
+        missing_cycles=0,
+    )
+
+
+def turned(motor):
+    """Return counts after all motors but one have turned."""
+    counts = [count + 40 for count in REST]
+    counts[motor - 1] = REST[motor - 1]
+    return counts
+
+
+def pull(share):
+    """Return torques of all joints that give each motor its share of breakaway."""
+    bounds = np.abs(np.linalg.inv(J2MP).T) @ BREAKAWAY
+    return J2MP.T @ (share * bounds)
+
+
+def look(counts, share=1.01, way=STEP, fresh=0x7F):
+    watch = MotorWatch(CONSTANTS)
+    assert watch.stuck_motor(np.zeros(7), pull(share), reading(REST)) == 0
+    return watch.stuck_motor(way, pull(share), reading(counts, fresh))
+
+
+def moved_one(motor):
+    """Return a way of the joints that turns one motor only [rad], shape (7,)."""
+    return np.linalg.solve(J2MP, 0.3 * np.eye(7)[motor - 1])
+
+
+@pytest.mark.parametrize("motor", range(1, 8))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_motor_that_is_pulled_and_stands_is_named(motor, sign):
+    assert look(turned(motor), 1.01 * sign, moved_one(motor)) == motor
+
+
+@pytest.mark.parametrize("motor", range(1, 8))
+def test_less_than_what_moves_it_is_borne_by_friction(motor):
+    assert look(turned(motor), 0.99, moved_one(motor)) == 0
+
+
+@pytest.mark.parametrize("motor", range(1, 8))
+def test_a_motor_that_the_move_leaves_alone_may_stand(motor):
+    other = motor % 7 + 1
+    assert look(turned(motor), way=moved_one(other)) == 0
+
+
+def test_a_flicker_of_one_count_is_no_turn_and_two_are_one():
+    counts = turned(4)
+    for flicker, stuck in ((-1, 4), (1, 4), (-2, 0), (2, 0)):
+        assert look([*counts[:3], REST[3] + flicker, *counts[4:]]) == stuck
+
+
+def test_a_motor_that_is_not_heard_is_not_said_to_stand():
+    assert look(turned(4), fresh=0x77) == 0
+
+
+def test_a_new_move_begins_anew():
+    watch = MotorWatch(CONSTANTS)
+    watch.stuck_motor(np.zeros(7), pull(2.0), reading(REST))
+    watch.begin()
+    assert watch.stuck_motor(STEP, pull(2.0), reading(REST)) == 0
+    assert watch.stuck_motor(2.0 * STEP, pull(2.0), reading(REST)) > 0
+
+
+def test_what_moves_a_joint_is_well_above_its_dry_friction():
+    assert (1.3 * CONSTANTS.coulomb < BREAKAWAY).all()
+    assert (2.0 * CONSTANTS.coulomb + 5.0 > BREAKAWAY).all()

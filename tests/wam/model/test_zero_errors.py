@@ -1,0 +1,91 @@
+"""Zeros of the joints by the torques that hold the arm: which show, and how well."""
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from wam.calibration.free_space import FreeSpace
+from wam.calibration.poses import choose_poses
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+from wam.model.moments import ZeroErrors, check_zeros, fit_moments, zero_errors
+
+CONSTANTS = load_constants()
+# N m, rms: what a real arm leaves unexplained when all is well.
+NOISE = 0.1
+DEVIATIONS = {2: 0.6, 3: 1.2, 4: 5.0, 5: 5.0}  # degrees at that noise, 12 poses
+
+
+@pytest.fixture(scope="module")
+def model(example_tool):
+    return ArmModel(CONSTANTS, example_tool)
+
+
+@pytest.fixture(scope="module")
+def poses(model):
+    return np.array(choose_poses(model, 12, FreeSpace(0.33)))
+
+
+def measured(model, poses, joint=2, degrees=0.0, noise=0.0, seed=1):
+    """Return what is said of an arm one of whose joints is zeroed elsewhere."""
+    true = poses.copy()
+    true[:, joint - 1] += np.radians(degrees)
+    tau = np.array([model.gravity(q) for q in true])
+    tau += noise * np.random.default_rng(seed).normal(size=tau.shape)
+    return zero_errors(CONSTANTS, poses, fit_moments(CONSTANTS, poses, tau))
+
+
+@pytest.mark.parametrize("degrees", [-5.0, 1.0, 5.0])
+@pytest.mark.parametrize("joint", [2, 3, 4, 5])
+def test_a_wrong_zero_is_recovered_with_its_sign(model, poses, joint, degrees):
+    found = measured(model, poses, joint, degrees)
+    expected = [degrees if other == joint else 0.0 for other in found.joints]
+    assert np.degrees(found.errors) == pytest.approx(
+        expected, abs=0.8
+    )  # to first order
+
+
+@pytest.mark.parametrize("joint", [1, 6, 7])
+def test_a_wrong_zero_of_joints_1_6_and_7_does_not_show(model, poses, joint):
+    found = measured(model, poses, joint, 5.0)
+    assert np.abs(np.degrees(found.errors)).max() < 0.3
+    check_zeros(found)
+
+
+def test_how_well_a_zero_is_seen_is_said_and_true(model, poses):
+    every = [measured(model, poses, noise=NOISE, seed=seed) for seed in range(40)]
+    spread = np.degrees(np.std([found.errors for found in every], axis=0))
+    told = np.degrees(np.mean([found.deviations for found in every], axis=0))
+    assert told == pytest.approx(spread, rel=0.35)
+    assert (told < list(DEVIATIONS.values())).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_sound_arm_is_not_refused(model, poses, seed):
+    check_zeros(measured(model, poses, noise=2.0 * NOISE, seed=seed))
+
+
+@pytest.mark.parametrize("joint", [2, 3])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_six_degrees_at_upper_arm_are_refused_with_the_joint(model, poses, joint, sign):
+    found = measured(model, poses, joint, 6.0 * sign, NOISE)
+    with pytest.raises(SettingsError, match=f"Joint {joint} seems") as refused:
+        check_zeros(found)
+    assert f"{'+' if sign > 0 else '-'}" in refused.value.message
+    assert "limit 3" in refused.value.message
+
+
+@pytest.mark.parametrize(
+    ("error", "deviation", "is_refused"),
+    [(3.1, 0.1, True), (2.9, 0.1, False), (-3.1, 0.1, True), (6.0, 1.6, False)],
+)
+def test_what_is_refused_is_beyond_three_degrees_and_four_deviations(
+    error, deviation, is_refused
+):
+    errors = np.radians([0.0, error, 0.0, 0.0])
+    found = ZeroErrors((2, 3, 4, 5), errors, np.full(4, np.radians(deviation)))
+    if is_refused:
+        with pytest.raises(SettingsError, match="Joint 3"):
+            check_zeros(found)
+    else:
+        check_zeros(found)
