@@ -1,0 +1,158 @@
+"""Boots the machine and runs scenarios: python -m lab [--short] [--only NAME] ..."""
+
+import argparse
+import shlex
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition import NS_PER_S, SystemClock
+from lab import initramfs, report
+from lab.guest.scenarios.registry import ALL, Scenario, chosen
+from lab.kernel import fetch_kernel
+from lab.machine import Machine, Sockets, command
+from lab.requirements import LabError, install_line, missing_packages, program
+from lab.results import Begun, Finished, ScenarioResult, Verdict, from_line
+
+ROOT = Path(__file__).parents[1]
+CACHE = ROOT / ".lab"
+NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
+BOOT_LIMIT = 180.0  # s of wall time until the first scenario begins
+LIMIT = 1500.0  # s of wall time for one scenario on a busy host
+_CLOCK = SystemClock()
+_JOB = """\
+export PATH=/usr/sbin:/usr/bin:/sbin:/bin
+cd {root}
+{python} -m lab.guest {names}
+echo b > /proc/sysrq-trigger
+sleep 60
+"""
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the options."""
+    options = argparse.ArgumentParser(prog="python -m lab", description=__doc__)
+    options.add_argument("--short", action="store_true", help="the short form")
+    options.add_argument(
+        "--only", action="append", default=[], metavar="NAME", help="this scenario"
+    )
+    options.add_argument("--list", action="store_true", help="name them and end")
+    options.add_argument(
+        "--check", action="store_true", help="say what is missing and end"
+    )
+    options.add_argument(
+        "--write", type=Path, metavar="FILE", help="the table of a full run, e.g. "
+        "docs/lab.md"
+    )
+    options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
+    options.add_argument("--console", action="store_true", help="show the machine's")
+    return options
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what the arguments ask for; return the exit code."""
+    options = parser().parse_args(arguments)
+    names = {scenario.name for scenario in ALL}
+    if unknown := [name for name in options.only if name not in names]:
+        print(f"--only {unknown[0]!r} is none of: {', '.join(sorted(names))}")
+        return 2
+    if options.write and (options.short or options.only):
+        print("--write belongs to a full run.")
+        return 2
+    scenarios = chosen(options.only, is_short=options.short)
+    if options.list:
+        for scenario in scenarios:
+            print(f"{scenario.name:<28} {scenario.what}")
+        return 0
+    if missing := missing_packages():
+        print(f"The laboratory needs: {', '.join(missing)}. As root:")
+        print(f"    {install_line(missing)}")
+        return NOT_READY
+    if options.check:
+        return 0
+    try:
+        return _run(scenarios, options)
+    except LabError as error:
+        print(error)
+        return NOT_READY
+
+
+def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
+    start_ns = _CLOCK.now_ns()
+    results = run_machine(scenarios, options.cache, is_shown=options.console)
+    wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
+    print(report.summary(results, wall))
+    if options.write:
+        what = {scenario.name: scenario.what for scenario in scenarios}
+        options.write.write_text(report.page(results, what, wall), encoding="utf-8")
+    return 0 if all(result.verdict.is_fine for result in results) else 1
+
+
+def run_machine(
+    scenarios: Sequence[Scenario], cache: Path, *, is_shown: bool
+) -> list[ScenarioResult]:
+    """Boot, run scenarios in turn and return their results.
+
+    Args:
+        scenarios: what to run.
+        cache: where the kernel is kept.
+        is_shown: the machine's own output is printed, too.
+    """
+    kernel = fetch_kernel(cache)
+    names = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
+    job = _JOB.format(root=ROOT, python=sys.executable, names=names)
+    with tempfile.TemporaryDirectory(prefix="lab") as place:
+        folder = Path(place)
+        first_root = folder / "initramfs"
+        busybox = Path(program("busybox"))
+        first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
+        sockets = Sockets(folder / "line", folder / "monitor")
+        machine = Machine(command(kernel, first_root, sockets))
+        try:
+            return _follow(machine, [one.name for one in scenarios], is_shown)
+        finally:
+            machine.close()
+
+
+def _follow(machine: Machine, names: list[str], is_shown: bool) -> list[ScenarioResult]:
+    """Read the console to its end; what has not come then has hung."""
+    results: list[ScenarioResult] = []
+    running, is_over = "boot", False
+    own: list[str] = []
+    try:
+        for line in machine.lines(BOOT_LIMIT + LIMIT):
+            message = from_line(line)
+            if isinstance(message, Begun):
+                running = message.name
+            elif isinstance(message, Finished):
+                is_over = True
+            elif isinstance(message, ScenarioResult):
+                results.append(message)
+                _show(message)
+            else:
+                own.append(line)
+                if is_shown:
+                    print(line)
+    except TimeoutError:
+        own.append("[the time limit ended the machine]")
+    done = {result.name for result in results}
+    if is_over and done >= set(names):
+        return results
+    words = "\n".join(own[-40:])
+    reason = "the machine ended or hung in it"
+    lost = ScenarioResult(running, Verdict.HUNG, 0.0, {}, reason, words)
+    _show(lost)
+    return [*results, lost]
+
+
+def _show(result: ScenarioResult) -> None:
+    print(report.result_line(result), flush=True)
+    if not result.verdict.is_fine:
+        print("\n".join(f"    {line}" for line in result.output.splitlines()))
+        if "\n" in result.reason:
+            print(result.reason)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
