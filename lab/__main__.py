@@ -8,12 +8,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition import NS_PER_S, SystemClock
-from lab import initramfs, report
+from lab import initramfs, report, timer_rate
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import fetch_kernel
-from lab.machine import Machine, Sockets, command
+from lab.machine import SLOWNESS, Machine, Sockets, command
 from lab.requirements import LabError, install_line, missing_packages, program
-from lab.results import Begun, Finished, ScenarioResult, Verdict, from_line
+from lab.results import (
+    Begun,
+    Finished,
+    ScenarioResult,
+    TimerAddresses,
+    Verdict,
+    from_line,
+)
 
 ROOT = Path(__file__).parents[1]
 CACHE = ROOT / ".lab"
@@ -42,8 +49,10 @@ def parser() -> argparse.ArgumentParser:
         "--check", action="store_true", help="say what is missing and end"
     )
     options.add_argument(
-        "--write", type=Path, metavar="FILE", help="the table of a full run, e.g. "
-        "docs/lab.md"
+        "--write",
+        type=Path,
+        metavar="FILE",
+        help="the table of a full run, e.g. docs/lab.md",
     )
     options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
     options.add_argument("--console", action="store_true", help="show the machine's")
@@ -107,51 +116,63 @@ def run_machine(
         first_root = folder / "initramfs"
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
-        sockets = Sockets(folder / "line", folder / "monitor")
+        sockets = Sockets(folder / "line", folder / "monitor", folder / "debug")
         machine = Machine(command(kernel, first_root, sockets))
         try:
-            return _follow(machine, [one.name for one in scenarios], is_shown)
+            run = Follower(sockets.debugger, is_shown=is_shown)
+            return run.follow(machine, [one.name for one in scenarios])
         finally:
             machine.close()
 
 
-def _follow(machine: Machine, names: list[str], is_shown: bool) -> list[ScenarioResult]:
-    """Read the console to its end; what has not come then has hung."""
-    results: list[ScenarioResult] = []
-    running, is_over = "boot", False
-    own: list[str] = []
-    try:
-        for line in machine.lines(BOOT_LIMIT + LIMIT):
-            message = from_line(line)
-            if isinstance(message, Begun):
-                running = message.name
-            elif isinstance(message, Finished):
-                is_over = True
-            elif isinstance(message, ScenarioResult):
-                results.append(message)
-                _show(message)
-            else:
-                own.append(line)
-                if is_shown:
-                    print(line)
-    except TimeoutError:
-        own.append("[the time limit ended the machine]")
-    done = {result.name for result in results}
-    if is_over and done >= set(names):
-        return results
-    words = "\n".join(own[-40:])
-    reason = "the machine ended or hung in it"
-    lost = ScenarioResult(running, Verdict.HUNG, 0.0, {}, reason, words)
-    _show(lost)
-    return [*results, lost]
+class Follower:
+    """Reads a machine's console to its end; what has not come then has hung."""
 
+    def __init__(self, debugger: Path, *, is_shown: bool) -> None:
+        self._debugger = debugger
+        self._is_shown = is_shown
+        self._results: list[ScenarioResult] = []
+        self._running = "boot"
+        self._is_over = False
+        self._own: list[str] = []  # what the machine says beside messages
 
-def _show(result: ScenarioResult) -> None:
-    print(report.result_line(result), flush=True)
-    if not result.verdict.is_fine:
-        print("\n".join(f"    {line}" for line in result.output.splitlines()))
-        if "\n" in result.reason:
-            print(result.reason)
+    def follow(self, machine: Machine, names: Sequence[str]) -> list[ScenarioResult]:
+        """Return a result for each of the scenarios `names` that has begun."""
+        try:
+            for line in machine.lines(BOOT_LIMIT + LIMIT):
+                self._take(line)
+        except TimeoutError:
+            self._own.append("[the time limit ended the machine]")
+        done = {result.name for result in self._results}
+        if not (self._is_over and done >= set(names)):
+            words = "\n".join(self._own[-40:])
+            reason = "the machine ended or hung in it"
+            lost = ScenarioResult(self._running, Verdict.HUNG, 0.0, {}, reason, words)
+            self._add(lost)
+        return self._results
+
+    def _take(self, line: str) -> None:
+        match from_line(line):
+            case Begun(name):
+                self._running = name
+            case TimerAddresses(offsets, events):
+                timer_rate.correct(self._debugger, offsets, events, SLOWNESS)
+            case Finished():
+                self._is_over = True
+            case ScenarioResult() as result:
+                self._add(result)
+            case None:
+                self._own.append(line)
+                if self._is_shown:
+                    print(line, flush=True)
+
+    def _add(self, result: ScenarioResult) -> None:
+        self._results.append(result)
+        print(report.result_line(result), flush=True)
+        if not result.verdict.is_fine:
+            print("\n".join(f"    {line}" for line in result.output.splitlines()))
+            if "\n" in result.reason:
+                print(result.reason)
 
 
 if __name__ == "__main__":

@@ -31,10 +31,12 @@ class Sockets:
     Attributes:
         line: the far end of the serial adapter.
         monitor: QEMU's, to plug devices in and out.
+        debugger: for `timer_rate`.
     """
 
     line: Path
     monitor: Path
+    debugger: Path
 
 
 def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
@@ -60,6 +62,8 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
         *_can_cards(),
         *_serial_adapter(sockets.line),
         *_monitor(sockets.monitor),
+        *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
+        *("-gdb", "chardev:debug"),
     ]
 
 

@@ -56,13 +56,29 @@ class Begun:
 
 
 @dataclass(frozen=True, slots=True)
+class TimerAddresses:
+    """Where the kernel keeps its timer, for `timer_rate`; the machine waits meanwhile.
+
+    Attributes:
+        offsets: of the processors' parts of the memory.
+        events: the timer within such a part.
+    """
+
+    offsets: int
+    events: int
+
+
+@dataclass(frozen=True, slots=True)
 class Finished:
     """The machine has run everything; `boot_seconds`: guest time until the first."""
 
     boot_seconds: float
 
 
-Message = ScenarioResult | Begun | Finished
+Message = ScenarioResult | Begun | TimerAddresses | Finished
+
+
+_PLAIN = {one.__name__: one for one in (Begun, TimerAddresses, Finished)}
 
 
 def to_line(message: Message) -> str:
@@ -84,6 +100,6 @@ def from_line(line: str) -> Message | None:
         kind = fields.pop("kind")
         if kind == ScenarioResult.__name__:
             return ScenarioResult(verdict=Verdict(fields.pop("verdict")), **fields)
-        return {Begun.__name__: Begun, Finished.__name__: Finished}[kind](**fields)
+        return _PLAIN[kind](**fields)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None

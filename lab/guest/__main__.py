@@ -4,8 +4,9 @@ import importlib
 import os
 import sys
 import traceback
+from pathlib import Path
 
-from lab.guest.commands import ScenarioError, seconds
+from lab.guest.commands import ScenarioError, seconds, wait
 from lab.guest.machine_room import PLACE, MachineRoom
 from lab.guest.scenarios.registry import Scenario, chosen
 from lab.results import (
@@ -13,11 +14,13 @@ from lab.results import (
     Finished,
     Message,
     ScenarioResult,
+    TimerAddresses,
     Verdict,
     to_line,
 )
 
 _WARM = ("numpy", "pinocchio", "can", "serial", "mcap", "pydantic", "rich", "scipy")
+_PAUSE = 0.2  # s
 _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
 
@@ -26,6 +29,8 @@ def main(names: list[str]) -> None:
     os.environ["TMPDIR"] = str(PLACE / "tmp")
     os.environ["HOME"] = str(PLACE)
     (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
+    _tell(_timer_addresses())
+    wait(_PAUSE)  # the host writes into the kernel's memory
     # Guest time jumps while the host's files are read: read them before it counts.
     for name in _WARM:
         importlib.import_module(name)
@@ -34,6 +39,15 @@ def main(names: list[str]) -> None:
         _tell(Begun(scenario.name))
         _tell(_result(scenario))
     _tell(Finished(round(booted, 2)))
+
+
+def _timer_addresses() -> TimerAddresses:
+    found: dict[str, int] = {}
+    with Path("/proc/kallsyms").open(encoding="ascii") as lines:
+        for line in lines:
+            address, _, name, *_ = line.split()
+            found[name] = int(address, 16)
+    return TimerAddresses(found["__per_cpu_offset"], found["lapic_events"])
 
 
 def _result(scenario: Scenario) -> ScenarioResult:

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from lab.guest.commands import Program, ScenarioError, Shell
+from lab.guest.commands import Program, ScenarioError, Shell, read_text
 
 PLACE = Path("/run/lab")
 ROOT = Path(__file__).parents[2]
@@ -21,6 +21,23 @@ _START = "import sys; from experiments.__main__ import main; sys.exit(main())"
 _ARM_PATIENCE = 60.0  # s of guest time until the served arm is ready
 _BUS_SENSOR = {'kind = "bota" ': 'kind = "barrett" '}
 _SERIAL_KEYS = ("port =", "baudrate =", "sinc =")
+
+
+def line_port() -> Path:
+    """Return the virtio port behind the serial adapter."""
+    return virtio_port("lab.line")
+
+
+def virtio_port(wanted: str) -> Path:
+    """Return the device of a virtio port by the name that the machine gave it.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    for name in Path("/sys/class/virtio-ports").glob("vport*/name"):
+        if read_text(name) == wanted:
+            return Path("/dev") / name.parent.name
+    raise ScenarioError(f"the machine has no virtio port {wanted}")
 
 
 class MachineRoom:
@@ -70,7 +87,11 @@ class MachineRoom:
     def traction(self, *arguments: str, user: int | None = None) -> Program:
         """Start the program with the scenario's configuration and data folder."""
         where = ("--config", str(self.config), "--data", str(self.data))
-        return self.start(_PYTHON, "-c", _START, *arguments, *where, user=user)
+        return self.start_plain(*arguments, *where, user=user)
+
+    def start_plain(self, *arguments: str, user: int | None = None) -> Program:
+        """Start the program with these arguments only."""
+        return self.start(_PYTHON, "-c", _START, *arguments, user=user)
 
     def finish(self, program: Program, patience: float, code: int = 0) -> str:
         """Return the output of a program that is to end with an exit code.
@@ -95,6 +116,13 @@ class MachineRoom:
         """Return a server of an arm with hand and ground, above the container."""
         command = (_PYTHON, "-m", "lab.guest.pushed_arm", "--config", str(self.config))
         server = self.start(*command, "--channel", FAR_CAN, *options)
+        server.expect("ready", _ARM_PATIENCE)
+        return server
+
+    def serve_far_sensor(self) -> Program:
+        """Return a server of the configured serial sensor behind the adapter."""
+        command = (_PYTHON, "-m", "lab.guest.far_sensor", "--config", str(self.config))
+        server = self.start(*command, "--line", str(line_port()))
         server.expect("ready", _ARM_PATIENCE)
         return server
 
