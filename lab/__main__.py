@@ -71,9 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     scenarios = chosen(options.only, is_short=options.short)
     if options.list:
-        for scenario in scenarios:
-            print(f"{scenario.name:<28} {scenario.what}")
+        print("\n".join(f"{one.name:<28} {one.what}" for one in scenarios))
         return 0
+    return _run_if_ready(scenarios, options)
+
+
+def _run_if_ready(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     if missing := missing_packages():
         print(f"The laboratory needs: {', '.join(missing)}. As root:")
         print(f"    {install_line(missing)}")

@@ -1,4 +1,4 @@
-"""The first root of the machine: busybox, modules, an init that lays the host's root."""
+"""The first root of the machine: busybox, modules, and an init."""
 
 import stat
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Debian's kernel: its package in the cache, unpacked, with an order for its modules."""
+"""Debian's kernel: its package in the cache, unpacked, and its modules in order."""
 
 import lzma
 import re

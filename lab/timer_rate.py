@@ -6,6 +6,7 @@ timer would expire `SLOWNESS` times too early and be set anew, a few dozen times
 sleep. Times come out right all the same, but the host works for nothing.
 """
 
+import contextlib
 import re
 import socket
 import struct
@@ -48,8 +49,8 @@ class Debugger:
 
     def close(self) -> None:
         """Let the machine go on."""
-        self._ask("D")
-        self._socket.close()
+        with self._socket, contextlib.suppress(OSError):
+            self._ask("D")
 
     def _ask(self, text: str) -> str:
         """Return the answer to a command; reports of a stop come unasked."""

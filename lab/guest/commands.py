@@ -51,9 +51,8 @@ class Program:
         log: list[str],
         *,
         environment: Mapping[str, str] | None = None,
-        user: int | None = None,
     ) -> None:
-        """Start it; `user`: number of the user it runs as."""
+        """Start it; `environment`: what is added to that of the guest."""
         self.output = ""
         self.log = log
         self._seen = 0
@@ -70,7 +69,6 @@ class Program:
             stderr=subprocess.STDOUT,
             env={**os.environ, **(environment or {})},
             start_new_session=True,
-            user=user,
         )
         os.close(line)
         assert self._process.stdout is not None

@@ -78,20 +78,23 @@ class MachineRoom:
         """The configuration, once one of `write_config` was called."""
         return self.folder / "rig.toml"
 
-    def start(self, *command: str, user: int | None = None) -> Program:
+    def start(self, *command: str) -> Program:
         """Start a process that ends with the scenario at the latest."""
-        program = Program(command, self.log, user=user)
+        program = Program(command, self.log)
         self._stack.callback(program.close)
         return program
 
-    def traction(self, *arguments: str, user: int | None = None) -> Program:
-        """Start the program with the scenario's configuration and data folder."""
-        where = ("--config", str(self.config), "--data", str(self.data))
-        return self.start_plain(*arguments, *where, user=user)
+    def traction(self, *arguments: str, before: Sequence[str] = ()) -> Program:
+        """Start the program with the scenario's configuration and data folder.
 
-    def start_plain(self, *arguments: str, user: int | None = None) -> Program:
+        `before`: a command that starts another one, with its options.
+        """
+        where = ("--config", str(self.config), "--data", str(self.data))
+        return self.start(*before, _PYTHON, "-c", _START, *arguments, *where)
+
+    def start_plain(self, *arguments: str) -> Program:
         """Start the program with these arguments only."""
-        return self.start(_PYTHON, "-c", _START, *arguments, user=user)
+        return self.start(_PYTHON, "-c", _START, *arguments)
 
     def finish(self, program: Program, patience: float, code: int = 0) -> str:
         """Return the output of a program that is to end with an exit code.
@@ -115,7 +118,7 @@ class MachineRoom:
     def serve_pushed_arm(self, *options: str) -> Program:
         """Return a server of an arm with hand and ground, above the container."""
         command = (_PYTHON, "-m", "lab.guest.pushed_arm", "--config", str(self.config))
-        server = self.start(*command, "--channel", FAR_CAN, *options)
+        server = self.start(*command, "--bus", f"socketcan:{FAR_CAN}", *options)
         server.expect("ready", _ARM_PATIENCE)
         return server
 

@@ -14,10 +14,9 @@ from acquisition import SystemClock
 from experiments.rig.fake import SimulatedRig
 from experiments.settings import load_settings
 from experiments.tools import Lines
-from fakes.bus import CanPort
 from fakes.plant import PACES
 from fakes.pucks import WiredNetwork
-from fakes.serving import scene_of
+from fakes.serving import open_can_port, scene_of
 from fakes.world import FakeRig, LocalSimulation
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.guest.far_sensor import FarEnd
@@ -41,7 +40,8 @@ class PushedArm:
         )
         self._simulation = LocalSimulation(rig, PACES[fields["pace"]])
         self._wired = WiredNetwork(rig.network, is_far=True)
-        self._port = CanPort("socketcan", options.channel, settings.rig.can.bitrate)
+        interface, _, channel = options.bus.partition(":")
+        self._port = open_can_port(interface, channel, settings.rig.can.bitrate)
         self._line: FarEnd | None = None
         if options.line is not None:
             self._line = FarEnd(rig.stream, options.line, self._clock.now_ns())
@@ -96,7 +96,7 @@ def main() -> None:
     """Serve until a line says quit."""
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--config", type=Path, required=True)
-    options.add_argument("--channel", required=True)
+    options.add_argument("--bus", required=True, metavar="INTERFACE:CHANNEL")
     options.add_argument("--row", default="TF")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--line", type=Path)

@@ -111,7 +111,7 @@ def cycle_figures(room: MachineRoom) -> dict[str, str]:
     cycles = missed = 0
     worst = 0
     for path in sorted((session_folder(room) / "trials").glob("T??.mcap")):
-        times = TrialReader(path).cycles.data["host_ns"].tolist()
+        times = TrialReader(path).cycles().data["host_ns"].tolist()
         steps = [b - a for a, b in pairwise(times)]
         cycles += len(times)
         missed += sum(round(step / PERIOD_NS) - 1 for step in steps)

@@ -73,7 +73,7 @@ def full_queue(room: MachineRoom) -> Figures:
 def second_host(room: MachineRoom) -> Figures:
     """Let another host ask the safety module: every command refuses to begin."""
     _served(room)
-    other = room.start("cangen", FAR_CAN, *"-I 00A -g 5 -L 1 -D 08".split())
+    other = room.start("cangen", FAR_CAN, "-I", "00A", "-g", "5", "-L", "1", "-D", "08")
     try:
         output = room.finish(room.traction("check"), _PATIENCE, _REFUSED)
     finally:
