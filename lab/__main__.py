@@ -55,7 +55,9 @@ def parser() -> argparse.ArgumentParser:
         help="the table of a full run, e.g. docs/lab.md",
     )
     options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
-    options.add_argument("--console", action="store_true", help="show the machine's")
+    options.add_argument(
+        "--console", action="store_true", help="show what the machine says"
+    )
     return options
 
 
@@ -113,6 +115,8 @@ def run_machine(
     """
     kernel = fetch_kernel(cache)
     names = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
+    if is_shown:
+        names += " --echo"
     job = _JOB.format(root=ROOT, python=sys.executable, names=names)
     with tempfile.TemporaryDirectory(prefix="lab") as place:
         folder = Path(place)

@@ -25,7 +25,10 @@ _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
 
 def main(names: list[str]) -> None:
-    """Run the scenarios `names`, telling begin and result of each."""
+    """Run the scenarios `names`, telling begin and result of each.
+
+    "--echo" among them: what is run and said goes to the console as it comes.
+    """
     os.environ["TMPDIR"] = str(PLACE / "tmp")
     os.environ["HOME"] = str(PLACE)
     (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
@@ -37,7 +40,7 @@ def main(names: list[str]) -> None:
     booted = seconds()
     for scenario in chosen(names, is_short=False):
         _tell(Begun(scenario.name))
-        _tell(_result(scenario))
+        _tell(_result(scenario, is_echoed="--echo" in names))
     _tell(Finished(round(booted, 2)))
 
 
@@ -50,11 +53,11 @@ def _timer_addresses() -> TimerAddresses:
     return TimerAddresses(found["__per_cpu_offset"], found["lapic_events"])
 
 
-def _result(scenario: Scenario) -> ScenarioResult:
+def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:
     start = seconds()
     figures: dict[str, str] = {}
     reason = ""
-    room = MachineRoom(scenario.name)
+    room = MachineRoom(scenario.name, is_echoed=is_echoed)
     try:
         with room:
             figures = scenario.run(room)

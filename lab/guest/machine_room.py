@@ -40,6 +40,16 @@ def virtio_port(wanted: str) -> Path:
     raise ScenarioError(f"the machine has no virtio port {wanted}")
 
 
+class EchoedLog(list[str]):
+    """A log that is written to stdout as it grows."""
+
+    def append(self, text: str) -> None:
+        """Add and write `text`."""
+        super().append(text)
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
 class MachineRoom:
     """One scenario's surroundings; leaving it ends every process it started.
 
@@ -49,8 +59,9 @@ class MachineRoom:
         folder: empty at the start; configuration and data go there.
     """
 
-    def __init__(self, name: str) -> None:
-        self.log: list[str] = []
+    def __init__(self, name: str, *, is_echoed: bool = False) -> None:
+        """Name its folder; `is_echoed`: the log goes to stdout as it grows, too."""
+        self.log: list[str] = EchoedLog() if is_echoed else []
         self.shell = Shell(self.log)
         self.folder = PLACE / name.replace(" ", "-")
         self._stack = ExitStack()

@@ -11,7 +11,8 @@ from lab.guest.machine_room import MachineRoom
 
 _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
-_REST = 1.5  # s in which the foot comes to rest on the ground
+_REST = 1.0  # s in which the foot comes to rest on the ground
+_PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
 TERRAIN = "TF"
 MOST_MISSED_PPM = 10
 
@@ -48,7 +49,9 @@ class LedSession:
         self._hand("push")
 
     def keep(self) -> None:
-        """Wait until the trial is on the disk and keep it."""
+        """End the trial after a second, wait until it is on the disk, keep it."""
+        self.program.run_on(_PUSH)
+        self.program.press(" ")
         self.program.expect("written and verified", _STEP)
         self.program.expect("[k]eep", _STEP)
         self._hand("rest")
