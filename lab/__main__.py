@@ -1,10 +1,12 @@
 """Boots the machine and runs scenarios: python -m lab [--short] [--only NAME] ..."""
 
 import argparse
+import os
 import shlex
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from acquisition import NS_PER_S, SystemClock
@@ -25,6 +27,7 @@ from lab.results import (
 ROOT = Path(__file__).parents[1]
 CACHE = ROOT / ".lab"
 NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
+_MOST_MACHINES = 2  # unless more are asked for
 BOOT_LIMIT = 180.0  # s of wall time until the first scenario begins
 LIMIT = 1500.0  # s of wall time for one scenario on a busy host
 _CLOCK = SystemClock()
@@ -55,6 +58,13 @@ def parser() -> argparse.ArgumentParser:
         help="the table of a full run, e.g. docs/lab.md",
     )
     options.add_argument("--cache", type=Path, default=CACHE, metavar="FOLDER")
+    options.add_argument(
+        "--machines",
+        type=int,
+        choices=range(1, 9),
+        default=min(_MOST_MACHINES, os.cpu_count() or 1),
+        help="so many at once; each keeps a core busy",
+    )
     options.add_argument(
         "--console", action="store_true", help="show what the machine says"
     )
@@ -94,13 +104,35 @@ def _run_if_ready(scenarios: Sequence[Scenario], options: argparse.Namespace) ->
 
 def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     start_ns = _CLOCK.now_ns()
-    results = run_machine(scenarios, options.cache, is_shown=options.console)
+    results = run_machines(
+        shares(scenarios, options.machines), options.cache, is_shown=options.console
+    )
     wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
     print(report.summary(results, wall))
     if options.write:
         what = {scenario.name: scenario.what for scenario in scenarios}
         options.write.write_text(report.page(results, what, wall), encoding="utf-8")
     return 0 if all(result.verdict.is_fine for result in results) else 1
+
+
+def shares(scenarios: Sequence[Scenario], count: int) -> list[list[Scenario]]:
+    """Return what each of at most `count` machines runs, in turn; none is empty."""
+    parts = [list(scenarios[first::count]) for first in range(count)]
+    return [part for part in parts if part]
+
+
+def run_machines(
+    parts: Sequence[Sequence[Scenario]], cache: Path, *, is_shown: bool
+) -> list[ScenarioResult]:
+    """Run a machine for each part, all at once; return results in ALL's order."""
+    fetch_kernel(cache)  # once, before they all want it
+    with ThreadPoolExecutor(max(1, len(parts))) as pool:
+        runs = [
+            pool.submit(run_machine, part, cache, is_shown=is_shown) for part in parts
+        ]
+        results = [result for run in runs for result in run.result()]
+    order = {scenario.name: number for number, scenario in enumerate(ALL)}
+    return sorted(results, key=lambda result: order.get(result.name, -1))
 
 
 def run_machine(

@@ -82,3 +82,14 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
     assert len(cards) == 2
     assert all("canbus=bus0" in card for card in cards)
     assert f"tsc_early_khz={SLOWNESS}000000" in words[words.index("-append") + 1]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
+def test_machines_share_every_scenario_once_and_none_is_idle(count):
+    parts = program.shares(ALL[:5], count)
+    assert sorted(one.name for part in parts for one in part) == sorted(
+        one.name for one in ALL[:5]
+    )
+    assert all(parts)
+    assert len(parts) == min(count, 5)
+    assert max(map(len, parts)) - min(map(len, parts)) <= 1

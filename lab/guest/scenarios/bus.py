@@ -66,7 +66,7 @@ def full_queue(room: MachineRoom) -> Figures:
         output = room.finish(room.traction("check"), _PATIENCE, _REFUSED)
     finally:
         clear(room.shell, CAN)
-    require("unplugged" not in output, "a full queue is reported as unplugged")
+    require("plugged in" not in output, "a full queue is taken for a missing adapter")
     return {"said": output.strip().splitlines()[-1]}
 
 

@@ -39,7 +39,6 @@ class Make:
 
 MAKES = (
     Make("bota", 460_800, dropped=()),
-    Make("bota", 921_600, dropped=()),
     Make("robotous", 921_600),
     Make("optoforce", 1_000_000),
 )
