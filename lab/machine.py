@@ -13,9 +13,9 @@ from lab.kernel import Kernel
 from lab.requirements import program
 
 # With -icount an instruction takes 1 ns. The kernel is given a time stamp counter of
-# four times the true rate, so its time passes four times slower than the processor's,
+# six times the true rate, so its time passes six times slower than the processor's,
 # consistently: driver and simulated arm then fit into one cycle.
-SLOWNESS = 4
+SLOWNESS = 6
 _APPEND = (
     "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on "
     f"tsc_early_khz={SLOWNESS}000000 clocksource=tsc tsc=reliable lpj=4000000"
