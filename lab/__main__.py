@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Protocol
 
 from acquisition import NS_PER_S, SystemClock
 from lab import initramfs, report, timer_rate
@@ -28,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 CACHE = ROOT / ".lab"
 NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
 _MOST_MACHINES = 2  # unless more are asked for
-BOOT_LIMIT = 180.0  # s of wall time until the first scenario begins
+BOOT_LIMIT = 300.0  # s of wall time until the first scenario begins
 LIMIT = 1500.0  # s of wall time for one scenario on a busy host
 _CLOCK = SystemClock()
 _JOB = """\
@@ -164,6 +165,14 @@ def run_machine(
             machine.close()
 
 
+class ReadConsole(Protocol):
+    """What is read of a machine."""
+
+    def line(self, until_ns: int) -> str | None:
+        """Return the next line; None at its end, TimeoutError after `until_ns`."""
+        ...
+
+
 class Follower:
     """Reads a machine's console to its end; what has not come then has hung."""
 
@@ -173,12 +182,16 @@ class Follower:
         self._results: list[ScenarioResult] = []
         self._running = "boot"
         self._is_over = False
+        self._until_ns = 0
         self._own: list[str] = []  # what the machine says beside messages
 
-    def follow(self, machine: Machine, names: Sequence[str]) -> list[ScenarioResult]:
+    def follow(
+        self, machine: ReadConsole, names: Sequence[str]
+    ) -> list[ScenarioResult]:
         """Return a result for each of the scenarios `names` that has begun."""
+        self._allow(BOOT_LIMIT)
         try:
-            for line in machine.lines(BOOT_LIMIT + LIMIT):
+            while (line := machine.line(self._until_ns)) is not None:
                 self._take(line)
         except TimeoutError:
             self._own.append("[the time limit ended the machine]")
@@ -194,6 +207,7 @@ class Follower:
         match from_line(line):
             case Begun(name):
                 self._running = name
+                self._allow(LIMIT)
             case TimerAddresses(offsets, events):
                 timer_rate.correct(self._debugger, offsets, events, SLOWNESS)
             case Finished():
@@ -204,6 +218,10 @@ class Follower:
                 self._own.append(line)
                 if self._is_shown:
                     print(line, flush=True)
+
+    def _allow(self, wall: float) -> None:
+        """Begin a time limit [s] anew."""
+        self._until_ns = _CLOCK.now_ns() + int(wall * NS_PER_S)
 
     def _add(self, result: ScenarioResult) -> None:
         self._results.append(result)

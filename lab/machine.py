@@ -3,7 +3,6 @@
 import queue
 import subprocess
 import threading
-from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -119,25 +118,20 @@ class Machine:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def lines(self, limit: float) -> Iterator[str]:
-        """Yield the console's lines until the machine ends.
+    def line(self, until_ns: int) -> str | None:
+        """Return the console's next line; None once the machine has ended.
 
         Args:
-            limit: wall time from now after which it counts as hung [s].
+            until_ns: monotonic time of the host after which it counts as hung.
 
         Raises:
             TimeoutError: it is hung.
         """
-        end_ns = _CLOCK.now_ns() + int(limit * NS_PER_S)
-        while True:
-            left = (end_ns - _CLOCK.now_ns()) / NS_PER_S
-            try:
-                line = self._lines.get(timeout=max(0.0, left))
-            except queue.Empty:
-                raise TimeoutError from None
-            if line is None:
-                return
-            yield line
+        left = (until_ns - _CLOCK.now_ns()) / NS_PER_S
+        try:
+            return self._lines.get(timeout=max(0.0, left))
+        except queue.Empty:
+            raise TimeoutError from None
 
     def close(self) -> None:
         """Switch it off; safe to repeat."""
