@@ -11,7 +11,8 @@ from lab.guest.machine_room import MachineRoom
 
 _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
-_REST = 1.0  # s in which the foot comes to rest on the ground
+_REACTION = 0.3  # s from a prompt to the key
+_REST = 0.7  # s in which the foot comes to rest on the ground
 _PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
 TERRAIN = "TF"
 MOST_MISSED_PPM = 10
@@ -29,7 +30,7 @@ class LedSession:
         """Support the arm and press the pendant."""
         self.program.expect("Press Shift-activate", _START)
         self._hand("lift", "activate")
-        self.program.press(" ")
+        self._press(" ")
 
     def tare(self) -> None:
         """Lift the foot until the program has tared."""
@@ -45,17 +46,17 @@ class LedSession:
 
     def record(self) -> None:
         """Begin to record, and to push."""
-        self.program.press(" ")
+        self._press(" ")
         self._hand("push")
 
     def keep(self) -> None:
         """End the trial after a second, wait until it is on the disk, keep it."""
         self.program.run_on(_PUSH)
-        self.program.press(" ")
+        self._press(" ")
         self.program.expect("written and verified", _STEP)
         self.program.expect("[k]eep", _STEP)
         self._hand("rest")
-        self.program.press("k")
+        self._press("k")
 
     def trial(self, number: int) -> None:
         """Record one trial and keep it."""
@@ -67,6 +68,19 @@ class LedSession:
         """Wait for the end of the last tare and of the program."""
         self.tare()
         self.room.finish(self.program, _STEP, code)
+
+    def pause(self) -> None:
+        """Let the arm hold for a second, then go on; a trial is ready before."""
+        self._press("p")
+        self.program.expect("Paused.", _STEP)
+        self.program.run_on(_REACTION)
+        self._press(" ")
+        self.program.expect("[space] record", _STEP)
+
+    def _press(self, key: str) -> None:
+        """Press a key as a person does: what comes before a prompt is forgotten."""
+        self.program.run_on(_REACTION)
+        self.program.press(key)
 
     def _hand(self, *actions: str) -> None:
         for action in actions:
