@@ -119,7 +119,7 @@ def _cut_off(
     cut(session)
     output = room.finish(session.program, _ENDED, _FAULT_CODE)
     mend()
-    said = figure(output, r"(?m)^(.*ARM: .*)$")
+    said = figure(output, r"(?m)^((?!.*floating).*ARM: .*)$")
     return {"said": said, **_resume_after(room, arm)}
 
 
