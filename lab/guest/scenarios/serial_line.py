@@ -27,9 +27,15 @@ _PATIENCE = 60.0
 _MOST = 10.0  # s of guest time until an unplugged adapter is noticed
 
 
+_OPTOFORCE = (
+    "sensitivity = [18.28, 18.41, 2.12, 278.72, 259.55, 448.47]",
+    'serial_number = "HEX00042"',
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Make:
-    """A sensor as rig.toml names it."""
+    """A sensor as rig.toml names it; `extra`: lines that its section needs, too."""
 
     kind: str
     baudrate: int
@@ -40,7 +46,7 @@ class Make:
 MAKES = (
     Make("bota", 460_800, dropped=()),
     Make("robotous", 921_600),
-    Make("optoforce", 1_000_000),
+    Make("optoforce", 1_000_000, _OPTOFORCE),
 )
 
 
@@ -127,7 +133,7 @@ def check_with_serial_sensor(room: MachineRoom) -> Figures:
 def _write(room: MachineRoom, make: Make) -> None:
     changes = {
         _OLD_KIND: _NEW.format(make.kind),
-        "baudrate = 460800": f"baudrate = {make.baudrate}",
+        "baudrate = 460800": "\n".join([f"baudrate = {make.baudrate}", *make.extra]),
     }
     room.write_config(changes, make.dropped)
 
