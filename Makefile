@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint types contracts sbom clean
+.PHONY: demo test lab lab-page lint types contracts sbom clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
@@ -26,6 +26,12 @@ demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
 	  wait $$second || { cat demo/TF.log; exit 1; }
 	$(BIN)/traction status --data demo
 	$(BIN)/traction report --all --data demo
+
+lab: $(STAMP)  ## the program beside the real kernel's drivers, in an emulated machine
+	$(BIN)/python -m lab
+
+lab-page: $(STAMP)  ## the same, and docs/lab.md
+	$(BIN)/python -m lab --write docs/lab.md
 
 lint: $(STAMP)  ## ruff: lint and format
 	$(BIN)/ruff check .

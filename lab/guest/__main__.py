@@ -1,0 +1,83 @@
+"""Runs scenarios inside the machine: python -m lab.guest NAME...; one line each."""
+
+import importlib
+import os
+import sys
+import traceback
+from pathlib import Path
+
+from lab.guest.commands import ScenarioError, seconds, wait
+from lab.guest.machine_room import PLACE, MachineRoom
+from lab.guest.scenarios.registry import Scenario, chosen
+from lab.results import (
+    Begun,
+    Finished,
+    Message,
+    ScenarioResult,
+    TimerAddresses,
+    Verdict,
+    to_line,
+)
+
+_WARM = ("numpy", "pinocchio", "can", "serial", "mcap", "pydantic", "rich", "scipy")
+_PAUSE = 0.2  # s
+_LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
+
+
+def main(names: list[str]) -> None:
+    """Run the scenarios `names`, telling begin and result of each.
+
+    "--echo" among them: what is run and said goes to the console as it comes.
+    """
+    os.environ["TMPDIR"] = str(PLACE / "tmp")
+    os.environ["HOME"] = str(PLACE)
+    (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
+    _tell(_timer_addresses())
+    wait(_PAUSE)  # the host writes into the kernel's memory
+    # Guest time jumps while the host's files are read: read them before it counts.
+    for name in _WARM:
+        importlib.import_module(name)
+    booted = seconds()
+    for scenario in chosen(names, is_short=False):
+        _tell(Begun(scenario.name))
+        _tell(_result(scenario, is_echoed="--echo" in names))
+    _tell(Finished(round(booted, 2)))
+
+
+def _timer_addresses() -> TimerAddresses:
+    found: dict[str, int] = {}
+    with Path("/proc/kallsyms").open(encoding="ascii") as lines:
+        for line in lines:
+            address, _, name, *_ = line.split()
+            found[name] = int(address, 16)
+    return TimerAddresses(found["__per_cpu_offset"], found["lapic_events"])
+
+
+def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:
+    start = seconds()
+    figures: dict[str, str] = {}
+    reason = ""
+    room = MachineRoom(scenario.name, is_echoed=is_echoed)
+    try:
+        with room:
+            figures = scenario.run(room)
+    except ScenarioError as error:
+        reason = str(error)
+    except Exception:  # a defect of the scenario is a failure of its own
+        reason = traceback.format_exc()
+    verdict = Verdict.FAILED if reason else Verdict.PASSED
+    if scenario.expected:
+        verdict = Verdict.EXPECTED if reason else Verdict.SURPRISING
+        reason = scenario.expected if reason else f"passes, although: {reason}"
+    output = "" if verdict.is_fine else "".join(room.log)[-_LONGEST_OUTPUT:]
+    taken = round(seconds() - start, 2)
+    return ScenarioResult(scenario.name, verdict, taken, figures, reason, output)
+
+
+def _tell(message: Message) -> None:
+    sys.stdout.write(to_line(message) + "\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

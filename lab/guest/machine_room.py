@@ -1,0 +1,166 @@
+"""What a scenario gets: the network, a served arm, the program, a place for data."""
+
+import shutil
+import sys
+from collections.abc import Sequence
+from contextlib import ExitStack
+from importlib import resources
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from lab.guest.commands import Program, ScenarioError, Shell, read_text
+
+PLACE = Path("/run/lab")
+ROOT = Path(__file__).parents[2]
+CAN, FAR_CAN = "can0", "can1"  # the program's card, and the simulated arm's
+BITRATE = 1_000_000
+TRAVEL = 0.07  # m: a container that is crossed in a few seconds
+_PYTHON = sys.executable
+_START = "import sys; from experiments.__main__ import main; sys.exit(main())"
+_ARM_PATIENCE = 60.0  # s of guest time until the served arm is ready
+_BUS_SENSOR = {'kind = "bota" ': 'kind = "barrett" '}
+_SERIAL_KEYS = ("port =", "baudrate =", "sinc =")
+
+
+def line_port() -> Path:
+    """Return the virtio port behind the serial adapter."""
+    return virtio_port("lab.line")
+
+
+def virtio_port(wanted: str) -> Path:
+    """Return the device of a virtio port by the name that the machine gave it.
+
+    Raises:
+        ScenarioError: there is none.
+    """
+    for name in Path("/sys/class/virtio-ports").glob("vport*/name"):
+        if read_text(name) == wanted:
+            return Path("/dev") / name.parent.name
+    raise ScenarioError(f"the machine has no virtio port {wanted}")
+
+
+class EchoedLog(list[str]):
+    """A log that is written to stdout as it grows."""
+
+    def append(self, text: str) -> None:
+        """Add and write `text`."""
+        super().append(text)
+        sys.stdout.write(text)
+        sys.stdout.flush()
+
+
+class MachineRoom:
+    """One scenario's surroundings; leaving it ends every process it started.
+
+    Attributes:
+        log: what was run, typed and said.
+        shell: for commands of the system.
+        folder: empty at the start; configuration and data go there.
+    """
+
+    def __init__(self, name: str, *, is_echoed: bool = False) -> None:
+        """Name its folder; `is_echoed`: the log goes to stdout as it grows, too."""
+        self.log: list[str] = EchoedLog() if is_echoed else []
+        self.shell = Shell(self.log)
+        self.folder = PLACE / name.replace(" ", "-")
+        self._stack = ExitStack()
+
+    def __enter__(self) -> Self:
+        shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.mkdir(parents=True)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._stack.close()
+
+    @property
+    def data(self) -> Path:
+        """The data folder of the program."""
+        return self.folder / "data"
+
+    @property
+    def config(self) -> Path:
+        """The configuration, once one of `write_config` was called."""
+        return self.folder / "rig.toml"
+
+    def start(self, *command: str) -> Program:
+        """Start a process that ends with the scenario at the latest."""
+        program = Program(command, self.log)
+        self._stack.callback(program.close)
+        return program
+
+    def traction(self, *arguments: str, before: Sequence[str] = ()) -> Program:
+        """Start the program with the scenario's configuration and data folder.
+
+        `before`: a command that starts another one, with its options.
+        """
+        where = ("--config", str(self.config), "--data", str(self.data))
+        return self.start(*before, _PYTHON, "-c", _START, *arguments, *where)
+
+    def start_plain(self, *arguments: str) -> Program:
+        """Start the program with these arguments only."""
+        return self.start(_PYTHON, "-c", _START, *arguments)
+
+    def finish(self, program: Program, patience: float, code: int = 0) -> str:
+        """Return the output of a program that is to end with an exit code.
+
+        Raises:
+            ScenarioError: it ends otherwise, or not within `patience` [s].
+        """
+        ended = program.wait(patience)
+        if ended != code:
+            raise ScenarioError(f"exit code {ended} in place of {code}")
+        return program.output
+
+    def serve_home_arm(self, *options: str) -> Program:
+        """Return `traction fake` serving an arm at home, pucks asleep."""
+        where = ("--can", f"socketcan:{FAR_CAN}", "--idle-first")
+        command = (_PYTHON, "-c", _START, "fake", *where, *options)
+        server = self.start(*command, "--config", str(self.config))
+        server.expect("ready:", _ARM_PATIENCE)
+        return server
+
+    def serve_pushed_arm(self, *options: str) -> Program:
+        """Return a server of an arm with hand and ground, above the container."""
+        command = (_PYTHON, "-m", "lab.guest.pushed_arm", "--config", str(self.config))
+        server = self.start(*command, "--bus", f"socketcan:{FAR_CAN}", *options)
+        server.expect("ready", _ARM_PATIENCE)
+        return server
+
+    def serve_far_sensor(self) -> Program:
+        """Return a server of the configured serial sensor behind the adapter."""
+        command = (_PYTHON, "-m", "lab.guest.far_sensor", "--config", str(self.config))
+        server = self.start(*command, "--line", str(line_port()))
+        server.expect("ready", _ARM_PATIENCE)
+        return server
+
+    def write_bus_config(self) -> None:
+        """Write the shipped configuration with the sensor on the bus."""
+        self.write_config(_BUS_SENSOR, _SERIAL_KEYS)
+
+    def write_config(
+        self, changes: dict[str, str], dropped: Sequence[str] = ()
+    ) -> None:
+        """Write the shipped configuration, a short container in it.
+
+        Args:
+            changes: what stands in rig.toml, and what is to stand there.
+            dropped: beginnings of lines that are left out.
+        """
+        shipped = resources.files("experiments.data")
+        text = (shipped / "rig.toml").read_text(encoding="utf-8")
+        for old, new in changes.items():
+            if old not in text:
+                raise ScenarioError(f"rig.toml has no {old!r}")
+            text = text.replace(old, new)
+        lines = [row for row in text.splitlines() if not row.startswith(tuple(dropped))]
+        self.config.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        matrix = (shipped / "matrix.toml").read_text(encoding="utf-8")
+        short = matrix.replace("travel = 0.45", f"travel = {TRAVEL}")
+        (self.folder / "matrix.toml").write_text(short, encoding="utf-8")

@@ -1,0 +1,60 @@
+"""All scenarios, in the order in which they run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from lab.guest.machine_room import MachineRoom
+from lab.guest.scenarios import bus, recording, serial_line
+
+Run = Callable[[MachineRoom], dict[str, str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One scenario.
+
+    Attributes:
+        name: as `--only` takes it and the table shows it.
+        run: does it, returns figures, raises ScenarioError.
+        is_short: it is part of the short form, too.
+        expected: why it fails for now; empty = it has to pass.
+    """
+
+    name: str
+    run: Run
+    is_short: bool = False
+    expected: str = ""
+
+    @property
+    def what(self) -> str:
+        """What it does, in a sentence."""
+        return (self.run.__doc__ or "").strip().splitlines()[0]
+
+
+_ENOBUFS = "ENOBUFS (105) is told like an interface that is down or missing"
+
+ALL = (
+    Scenario("home arm", bus.home_arm, is_short=True),
+    Scenario("link down at start", bus.link_down_at_start, is_short=True),
+    Scenario("second host", bus.second_host, is_short=True),
+    Scenario("full queue", bus.full_queue, expected=_ENOBUFS),
+    Scenario("slow and lossy adapter", bus.disturbed_adapter),
+    Scenario("serial low latency", serial_line.low_latency, is_short=True),
+    Scenario("serial makes", serial_line.three_makes),
+    Scenario("serial no rights", serial_line.no_rights),
+    Scenario("serial unplugged", serial_line.unplugged),
+    Scenario("serial check", serial_line.check_with_serial_sensor),
+    Scenario("session", recording.three_trials),
+    Scenario("console killed", recording.killed_console),
+    Scenario("link down recording", recording.link_down),
+    Scenario("link down ready", recording.link_down_while_ready),
+    Scenario("link down idle", recording.link_down_before_activation),
+    Scenario("card out recording", recording.card_out),
+)
+
+
+def chosen(names: list[str], *, is_short: bool) -> list[Scenario]:
+    """Return the scenarios of a run; names that are none are left out."""
+    if names:
+        return [one for one in ALL if one.name in names]
+    return [one for one in ALL if one.is_short or not is_short]

@@ -1,0 +1,149 @@
+"""The emulated machine: its command line, its console, a limit on its time."""
+
+import queue
+import subprocess
+import threading
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition import NS_PER_S, SystemClock
+from lab.kernel import Kernel
+from lab.requirements import program
+
+# With -icount an instruction takes 1 ns. The kernel is given a time stamp counter of
+# six times the true rate, so its time passes six times slower than the processor's,
+# consistently: driver and simulated arm then fit into one cycle.
+SLOWNESS = 6
+_APPEND = (
+    "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on "
+    f"tsc_early_khz={SLOWNESS}000000 clocksource=tsc tsc=reliable lpj=4000000"
+)
+MEMORY_MB = 3072
+_CLOCK = SystemClock()
+
+
+@dataclass(frozen=True, slots=True)
+class Sockets:
+    """Unix sockets of one machine, below a short path.
+
+    Attributes:
+        line: the far end of the serial adapter.
+        monitor: QEMU's, to plug devices in and out.
+        debugger: for `timer_rate`.
+    """
+
+    line: Path
+    monitor: Path
+    debugger: Path
+
+
+def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
+    """Return the command line of the machine.
+
+    Both ends of the serial adapter and of QEMU's monitor are in the guest: each socket
+    is joined to a port of its own, so a simulated sensor runs on guest time, too.
+    """
+    options = (
+        "-accel tcg -cpu max -smp 1 -nodefaults -no-reboot -display none "
+        "-serial stdio -icount shift=0,sleep=off -no-hpet "
+        "-rtc base=2026-01-01T08:00:00,clock=vm "
+        # qboot and the unpacked kernel start in a few seconds less
+        "-bios qboot.rom"
+    )
+    return [
+        program("qemu-system-x86_64"),
+        *options.split(),
+        *("-m", str(MEMORY_MB)),
+        *("-kernel", str(kernel.image), "-initrd", str(initramfs)),
+        *("-append", _APPEND),
+        *_host_files(),
+        *_can_cards(),
+        *_serial_adapter(sockets.line),
+        *_monitor(sockets.monitor),
+        *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
+        *("-gdb", "chardev:debug"),
+    ]
+
+
+def _host_files() -> list[str]:
+    where = "local,id=host,path=/,security_model=none,readonly=on,multidevs=remap"
+    return [
+        *("-fsdev", where),
+        *("-device", "virtio-9p-pci,fsdev=host,mount_tag=host"),
+        *("-device", "virtio-rng-pci"),
+    ]
+
+
+def _can_cards() -> list[str]:
+    """Two cards on one bus; each can be pulled out of its slot."""
+    return [
+        *("-object", "can-bus,id=bus0"),
+        *("-device", "kvaser_pci,canbus=bus0,id=card0,addr=0x10"),
+        *("-device", "kvaser_pci,canbus=bus0,id=card1,addr=0x11"),
+    ]
+
+
+def _serial_adapter(socket: Path) -> list[str]:
+    return [
+        *("-device", "qemu-xhci,id=usb"),
+        *("-device", "virtio-serial-pci,id=ports"),
+        *("-chardev", f"socket,id=line,path={socket},server=on,wait=off"),
+        *("-device", "usb-serial,chardev=line,always-plugged=on,id=adapter"),
+        *("-chardev", f"socket,id=far,path={socket}"),
+        *("-device", "virtserialport,chardev=far,name=lab.line,nr=1"),
+    ]
+
+
+def _monitor(socket: Path) -> list[str]:
+    return [
+        *("-chardev", f"socket,id=monitor,path={socket},server=on,wait=off"),
+        *("-mon", "chardev=monitor,mode=control"),
+        *("-chardev", f"socket,id=operator,path={socket}"),
+        *("-device", "virtserialport,chardev=operator,name=lab.monitor,nr=2"),
+    ]
+
+
+class Machine:
+    """A running machine whose console is read line by line."""
+
+    def __init__(self, arguments: list[str]) -> None:
+        self._process = subprocess.Popen(
+            arguments,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def line(self, until_ns: int) -> str | None:
+        """Return the console's next line; None once the machine has ended.
+
+        Args:
+            until_ns: monotonic time of the host after which it counts as hung.
+
+        Raises:
+            TimeoutError: it is hung.
+        """
+        left = (until_ns - _CLOCK.now_ns()) / NS_PER_S
+        try:
+            return self._lines.get(timeout=max(0.0, left))
+        except queue.Empty:
+            raise TimeoutError from None
+
+    def close(self) -> None:
+        """Switch it off; safe to repeat."""
+        self._process.kill()
+        self._process.wait()
+        self._reader.join()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        with closing(self._process.stdout) as stream:
+            for line in stream:
+                self._lines.put(line.decode(errors="replace").rstrip())
+        self._lines.put(None)

@@ -1,0 +1,95 @@
+"""What `python -m lab` makes of its arguments, and of missing packages."""
+
+import pytest
+
+from lab import __main__ as program
+from lab.guest.scenarios.registry import ALL, chosen
+from lab.kernel import Kernel, image_package
+from lab.machine import SLOWNESS, Sockets, command
+from lab.requirements import LabError, install_line, missing_packages
+
+
+def test_what_is_missing_is_named_once_as_a_package():
+    absent = {"modprobe", "depmod", "qemu-system-x86_64"}
+    packages = missing_packages(lambda name: None if name in absent else f"/bin/{name}")
+    assert packages == ["kmod", "qemu-system-x86"]
+
+
+def test_nothing_is_missing_where_every_program_is_there():
+    assert missing_packages(lambda name: f"/bin/{name}") == []
+
+
+def test_the_line_installs_the_firmware_too():
+    assert install_line(["kmod"]).split()[-2:] == ["kmod", "seabios"]
+
+
+def test_a_run_without_its_packages_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setattr(program, "missing_packages", lambda: ["kmod"])
+    assert program.main(["--short"]) == program.NOT_READY
+    assert install_line(["kmod"]) in capsys.readouterr().out
+
+
+def test_an_unknown_scenario_is_refused_with_those_that_are_known(capsys):
+    assert program.main(["--only", "nonsense"]) == 2
+    out = capsys.readouterr().out
+    assert all(scenario.name in out for scenario in ALL)
+
+
+@pytest.mark.parametrize("also", [["--short"], ["--only", ALL[0].name]])
+def test_the_page_is_written_by_a_full_run_only(tmp_path, also):
+    path = tmp_path / "lab.md"
+    assert program.main(["--write", str(path), *also]) == 2
+    assert not path.exists()
+
+
+def test_the_list_names_scenarios_without_any_package(monkeypatch, capsys):
+    monkeypatch.setattr(program, "missing_packages", lambda: ["kmod"])
+    assert program.main(["--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(ALL)
+
+
+def test_the_short_form_is_a_part_of_the_full_one():
+    short, full = chosen([], is_short=True), chosen([], is_short=False)
+    assert set(short) < set(full)
+    assert short
+
+
+def test_every_scenario_has_a_name_and_a_sentence_of_its_own():
+    assert len({scenario.name for scenario in ALL}) == len(ALL)
+    assert all(scenario.what.endswith(".") for scenario in ALL)
+
+
+def test_the_kernel_is_the_one_that_debian_depends_on():
+    text = "linux-image-amd64\n  Depends: linux-image-6.1.0-56-amd64\n"
+    assert image_package(text) == "linux-image-6.1.0-56-amd64"
+
+
+def test_a_system_without_debians_kernel_is_refused():
+    with pytest.raises(LabError, match="linux-image-amd64"):
+        image_package("")
+
+
+def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
+    monkeypatch, tmp_path
+):
+    monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
+    sockets = Sockets(tmp_path / "a", tmp_path / "b", tmp_path / "c")
+    kernel = Kernel(tmp_path / "vmlinux", ())
+    words = command(kernel, tmp_path / "initramfs", sockets)
+    assert any("path=/," in word and "readonly=on" in word for word in words)
+    cards = [word for word in words if word.startswith("kvaser_pci")]
+    assert len(cards) == 2
+    assert all("canbus=bus0" in card for card in cards)
+    assert f"tsc_early_khz={SLOWNESS}000000" in words[words.index("-append") + 1]
+
+
+@pytest.mark.parametrize("count", [1, 2, 5, 8])
+def test_machines_share_every_scenario_once_and_none_is_idle(count):
+    parts = program.shares(ALL[:5], count)
+    assert sorted(one.name for part in parts for one in part) == sorted(
+        one.name for one in ALL[:5]
+    )
+    assert all(parts)
+    assert len(parts) == min(count, 5)
+    assert max(map(len, parts)) - min(map(len, parts)) <= 1

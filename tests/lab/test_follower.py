@@ -1,0 +1,56 @@
+"""What the host makes of a machine's console: results, silence, a sudden end."""
+
+import pytest
+
+from lab.__main__ import Follower
+from lab.results import Begun, Finished, ScenarioResult, Verdict, to_line
+
+PASSED = ScenarioResult("bench", Verdict.PASSED, 1.0)
+FINISHED = to_line(Finished(2.0))
+
+
+class Tape:
+    """Lines of a machine that then ends, or hangs."""
+
+    def __init__(self, *lines, is_hanging=False):
+        self._lines = list(lines)
+        self._is_hanging = is_hanging
+
+    def line(self, until_ns):
+        assert until_ns > 0
+        if self._lines:
+            return self._lines.pop(0)
+        if self._is_hanging:
+            raise TimeoutError
+        return None
+
+
+def follow(tape, *names):
+    return Follower("no debugger", is_shown=False).follow(tape, names)
+
+
+def test_results_come_out_in_the_order_in_which_they_came():
+    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(PASSED), FINISHED]
+    assert follow(Tape(*lines), "bench") == [PASSED]
+
+
+@pytest.mark.parametrize("is_hanging", [True, False])
+def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
+    lines = [to_line(Begun("bench")), to_line(PASSED), to_line(Begun("session"))]
+    tape = Tape(*lines, "Oops: 0002", is_hanging=is_hanging)
+    passed, lost = follow(tape, "bench", "session", "never begun")
+    assert passed == PASSED
+    assert (lost.name, lost.verdict) == ("session", Verdict.HUNG)
+    assert "Oops" in lost.output
+
+
+def test_a_machine_that_never_boots_is_lost_in_its_boot():
+    (lost,) = follow(Tape("Kernel panic"), "bench")
+    assert (lost.name, lost.verdict) == ("boot", Verdict.HUNG)
+    assert "panic" in lost.output
+
+
+def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
+    lines = [to_line(Begun("bench")), to_line(PASSED), FINISHED]
+    results = follow(Tape(*lines), "bench", "session")
+    assert results[-1].verdict is Verdict.HUNG

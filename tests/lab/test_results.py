@@ -1,0 +1,62 @@
+"""Results cross the serial console as lines among the machine's own output."""
+
+import pytest
+
+from lab.results import (
+    MARK,
+    Begun,
+    Finished,
+    ScenarioResult,
+    TimerAddresses,
+    Verdict,
+    from_line,
+    to_line,
+)
+
+RESULT = ScenarioResult(
+    "session", Verdict.FAILED, 31.25, {"missed": "0"}, "exit code 4", "line\nline|2"
+)
+
+
+@pytest.mark.parametrize(
+    "message", [RESULT, Begun("session"), TimerAddresses(2**63, 7), Finished(2.5)]
+)
+def test_a_message_survives_the_console(message):
+    line = to_line(message)
+    assert "\n" not in line
+    assert from_line(line) == message
+
+
+def test_a_kernel_message_before_the_mark_is_passed_over():
+    assert from_line("[    1.25] usb 1-1: new " + to_line(RESULT)) == RESULT
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "[    1.25] usb 1-1: new full-speed device",
+        MARK + "{",
+        MARK + "[1]",
+        MARK + '{"kind": "Nothing"}',
+        MARK + '{"kind": "Begun"}',
+        MARK + '{"kind": "ScenarioResult", "name": "a", "verdict": "fine"}',
+        to_line(RESULT)[:-20],
+    ],
+)
+def test_what_is_no_message_is_none(line):
+    assert from_line(line) is None
+
+
+@pytest.mark.parametrize(
+    ("verdict", "is_fine"),
+    [
+        (Verdict.PASSED, True),
+        (Verdict.EXPECTED, True),
+        (Verdict.FAILED, False),
+        (Verdict.HUNG, False),
+        (Verdict.SURPRISING, False),
+    ],
+)
+def test_a_known_defect_is_fine_until_it_is_mended(verdict, is_fine):
+    assert verdict.is_fine is is_fine
