@@ -463,7 +463,7 @@ CASES = {
     "tare-moved": tared(text="tare-moved@T2+0.25s", words="Force varied "),
     "residual": tared(text="residual@T2+0s", words="feet.tread.mass 0.450 kg"),
     "tare-poor": tared(_saturate, words="were flagged during tare"),
-    "mounting": Case(_turned_sensor, 3, words="by 180 degrees"),
+    "mounting": Case(_turned_sensor, 3, words="degrees about z"),
     "no-end-tare": Case(_no_end_tare, 0, words="left out as asked."),
     # what takes the arm away; in a trial: test_bus_faults
     "can-silence": struck("can-silence"),
