@@ -31,13 +31,11 @@ class Scenario:
         return (self.run.__doc__ or "").strip().splitlines()[0]
 
 
-_ENOBUFS = "ENOBUFS (105) is told like an interface that is down or missing"
-
 ALL = (
     Scenario("home arm", bus.home_arm, is_short=True),
     Scenario("link down at start", bus.link_down_at_start, is_short=True),
-    Scenario("second host", bus.second_host, is_short=True),
-    Scenario("full queue", bus.full_queue, expected=_ENOBUFS),
+    Scenario("second host", bus.second_host),
+    Scenario("full queue", bus.full_queue),
     Scenario("slow and lossy adapter", bus.disturbed_adapter),
     Scenario("serial low latency", serial_line.low_latency, is_short=True),
     Scenario("serial makes", serial_line.three_makes),
