@@ -8,6 +8,7 @@ import numpy as np
 
 from acquisition import (
     LinkError,
+    LinkFullError,
     LinkTimeoutError,
     PreflightError,
     SafetyMode,
@@ -285,7 +286,8 @@ def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
 
     A bus that is down gets the catalogue's message, with the command that helps.
     """
-    is_bus = isinstance(error, LinkError) and not isinstance(error, LinkTimeoutError)
+    is_up = isinstance(error, LinkTimeoutError | LinkFullError)
+    is_bus = isinstance(error, LinkError) and not is_up
     can = settings.can
     if not is_bus or can.interface != "socketcan":
         return _as_preflight(error, "not touched")

@@ -1,0 +1,31 @@
+"""What is said of an arm that cannot be reached over SocketCAN."""
+
+import pytest
+
+from acquisition.errors import LinkError, LinkFullError, PreflightError
+from experiments.preflight import preflight
+from experiments.settings.load import load_settings
+
+
+def refusal(error, monkeypatch):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(preflight, "build_rig", fail)
+    settings = load_settings(None)
+    assert settings.rig.can.interface == "socketcan"
+    with pytest.raises(PreflightError) as refused:
+        preflight.connect_rig(settings, settings.matrix.terrains[0], None)
+    return str(refused.value)
+
+
+def test_an_interface_that_is_down_comes_with_the_command_that_helps(monkeypatch):
+    text = refusal(LinkError("can0 is down."), monkeypatch)
+    assert "ip link set can0 up type can bitrate 1000000" in text
+
+
+def test_a_full_queue_is_no_missing_adapter(monkeypatch):
+    full = LinkFullError("The queue is full.", hint="Nobody acknowledges.")
+    text = refusal(full, monkeypatch)
+    assert "Nobody acknowledges." in text
+    assert "plugged in" not in text
