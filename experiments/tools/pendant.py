@@ -99,17 +99,19 @@ class Lines:
 
     Attributes:
         is_ended: the other side has closed it.
+        is_terminal: a person is on the other side.
     """
 
     def __init__(self, descriptor: int | None) -> None:
         """Read from `descriptor`; None is one that never says anything."""
         self.is_ended = False
+        self.is_terminal = descriptor is not None and os.isatty(descriptor)
         self._descriptor = descriptor
         self._rest = b""
 
     def take(self) -> list[str]:
         """Return the whole lines that have arrived since the last call."""
-        if self._descriptor is None or self.is_ended:
+        if self._descriptor is None or self.is_ended or self._is_in_background():
             return []
         if not select.select([self._descriptor], [], [], 0)[0]:
             return []
@@ -119,11 +121,22 @@ class Lines:
         self._rest = rest[:_LONGEST_LINE]
         return [line.decode(errors="replace") for line in lines if line.strip()]
 
+    def _is_in_background(self) -> bool:
+        """Return whether another program has the terminal: reading would stop us."""
+        assert self._descriptor is not None
+        if not os.isatty(self._descriptor):
+            return False
+        try:
+            return os.tcgetpgrp(self._descriptor) != os.getpgrp()
+        except OSError:  # a terminal that controls nobody
+            return False
+
 
 class Pendant:
     """Presses buttons as a script and a person on stdin say.
 
-    The end of stdin quits, unless there is a script.
+    Ctrl-D on a terminal quits, unless there is a script. The end of a pipe or a file
+    does not: a service has no stdin, and goes on until a signal ends it.
     """
 
     def __init__(
@@ -145,7 +158,8 @@ class Pendant:
                 self._unknown.append(line)
             else:
                 pressed.append(press)
-        if self._lines.is_ended and not self._has_script:
+        is_left = self._lines.is_ended and self._lines.is_terminal
+        if is_left and not self._has_script:
             pressed.append("quit")
         return pressed
 

@@ -81,6 +81,23 @@ def test_a_signal_ends_the_service_cleanly(serve, tmp_path, number):
     assert not (tmp_path / "bus").exists()
 
 
+def test_a_service_without_stdin_goes_on_until_a_signal_ends_it(tmp_path):
+    command = [sys.executable, "-m", "experiments", "fake", "--can"]
+    with subprocess.Popen(
+        [*command, f"traction-fake:{tmp_path}/bus", "--idle-first"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        assert process.stdout.readline().startswith("ready: ")
+        with SocketBus(f"{tmp_path}/bus") as bus:
+            assert ask(bus, 10, b"\x08") == (0x546, "88 00 01 00")
+        process.terminate()
+        assert process.wait(PATIENCE) == 0
+    assert not (tmp_path / "bus").exists()
+
+
 def test_a_script_presses_and_quits_though_stdin_has_ended(tmp_path):
     script = tmp_path / "script"
     script.write_text("idle\n0.01 quit\n")

@@ -105,10 +105,32 @@ def test_a_script_presses_at_its_times():
 
 
 @pytest.mark.parametrize(("script", "pressed"), [(None, ["quit"]), ((), [])])
-def test_the_end_of_stdin_quits_unless_there_is_a_script(pipe, script, pressed):
+def test_the_end_of_a_terminal_quits_unless_there_is_a_script(script, pressed):
+    master, terminal = os.openpty()
+    os.write(master, b"\x04")  # Ctrl-D
+    assert Pendant(script, Lines(terminal), 0).due(0) == pressed
+    os.close(master)
+    os.close(terminal)
+
+
+def test_the_end_of_a_pipe_quits_nothing(pipe):
     descriptor, writer = pipe
+    writer.write(b"idle\n")
     writer.close()
-    assert Pendant(script, Lines(descriptor), 0).due(0) == pressed
+    pendant = Pendant(None, Lines(descriptor), 0)
+    assert [pendant.due(0), pendant.due(1), pendant.due(2)] == [["idle"], [], []]
+
+
+def test_a_terminal_that_another_program_has_is_not_read(monkeypatch):
+    master, terminal = os.openpty()
+    os.write(master, b"quit\n")
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp() + 1)
+    lines = Lines(terminal)
+    assert lines.take() == []
+    monkeypatch.setattr(os, "tcgetpgrp", lambda _: os.getpgrp())
+    assert lines.take() == ["quit"]
+    os.close(master)
+    os.close(terminal)
 
 
 @pytest.mark.parametrize(
