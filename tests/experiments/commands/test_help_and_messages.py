@@ -448,7 +448,9 @@ CASES = {
     "ft-saturated": fault("ft-saturated@T2+0.1s", words="range for 102 ms"),
     "contact-force": fault("contact-force@T2+0.1s", words="N on the foot (limit 100)"),
     "contact-moment": acted(Prompt.RECORDING, _tender, words="N m on the foot (limit"),
-    "contact-move": acted(Prompt.READY, _meet, words="beyond its weight (limit 0)"),
+    "contact-move": acted(
+        Prompt.READY, _meet, 4, words="beyond its weight (limit 0)", since=0.0
+    ),
     "contact-growth": acted(Prompt.RECORDING, _lean, words="while it stood (limit 40)"),
     "loop-late": fault("loop-late@T2+0.1s", words="11 late cycles"),
     "overspeed": fault("overspeed@T2+0.1s", words="Joint 6 "),
