@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import number_within
+
 if TYPE_CHECKING:
     from experiments.operator import Console
+    from experiments.settings import Settings
+    from wam.bus import BusErrors
 
 EXAMPLES = """\
+  traction check --bus 10                   who says what on the bus; nothing is sent
   traction check --fake                     the page with simulated devices
   traction check --explain estop            more about a message"""
 
@@ -26,6 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=5.0,
         metavar="SECONDS",
         help="how long the loop is measured (5)",
+    )
+    parser.add_argument(
+        "--bus",
+        type=number_within(0.1, 3600, "seconds to listen, e.g. 10"),
+        metavar="SECONDS",
+        help="only listen: rates, identifiers in words, errors, other masters",
     )
     parser.add_argument("--terrain", metavar="NAME", help="row of the matrix (first)")
     parser.add_argument(
@@ -58,6 +70,8 @@ def run(args: argparse.Namespace) -> int:
         for line in origin_lines(settings):
             console.say(f"   {line}")
         return 0
+    if args.bus is not None:
+        return _listen(settings, args.bus, console, is_fake=args.fake)
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
     fake = FakeOptions(args.fast, seed=1) if args.fake else None
@@ -67,6 +81,76 @@ def run(args: argparse.Namespace) -> int:
         run_preflight(rig, Path(args.data), console, args.loop_test)
     console.say("Fit to run. No torque was sent.")
     return 0
+
+
+def _listen(
+    settings: Settings, seconds: float, console: Console, *, is_fake: bool
+) -> int:
+    """Say who talks on the arm's bus; nothing is sent.
+
+    Raises:
+        SettingsError: a simulated bus is inside its own process only.
+        LinkError: the bus cannot be opened, or broke.
+    """
+    from acquisition import SettingsError, SystemClock
+    from wam.bus import BusTraffic, CanLink, open_bus
+
+    if is_fake:
+        raise SettingsError(
+            "A simulated bus is inside its own process: nobody can listen.",
+            hint="Serve one with traction fake --can traction-fake:PATH and name it in "
+            "[can] of rig.toml.",
+        )
+    can, clock, traffic = settings.rig.can, SystemClock(), BusTraffic()
+    console.say(
+        f"traction check --bus        {can.interface}:{can.channel} for {seconds:g} s, "
+        "nothing is sent"
+    )
+    link = CanLink(open_bus(can.interface, can.channel, can.bitrate), traffic)
+    try:
+        deadline_ns = clock.now_ns() + round(seconds * 1e9)
+        while clock.now_ns() < deadline_ns:
+            clock.wait(link, deadline_ns)
+            link.receive()
+    finally:
+        link.close()
+    load = traffic.load(seconds, can.bitrate)
+    _say_traffic(traffic.counts, seconds, load, console)
+    _say_trouble(link.foreign_ids, link.errors, console)
+    return 0
+
+
+def _say_traffic(
+    counts: Mapping[int, int], seconds: float, load: float, console: Console
+) -> None:
+    """Say how often each identifier was heard."""
+    from experiments.operator import GOOD
+    from wam.bus import describe_id
+
+    if not counts:
+        console.check(GOOD, "traffic", "silent, as an arm is that nobody asks")
+        return
+    rate = sum(counts.values()) / seconds
+    console.check(GOOD, "traffic", f"{rate:.1f} frames/s, about {load:.0%} of the bus")
+    for can_id, count in sorted(counts.items()):
+        console.say(f"   {can_id:03X} {count / seconds:8.1f}/s  {describe_id(can_id)}")
+
+
+def _say_trouble(foreign: Collection[int], errors: BusErrors, console: Console) -> None:
+    """Say who else is master, and what the controller reports."""
+    from acquisition import BusCondition
+    from experiments.messages import BUS_WORDS
+    from experiments.operator import BAD, GOOD, WARNING
+
+    names = ", ".join(f"{can_id:03X}" for can_id in sorted(foreign))
+    console.check(
+        *(WARNING if names else GOOD, "masters"),
+        f"another program drives the arm: {names}" if names else "none",
+    )
+    is_sound = errors.condition is BusCondition.SOUND
+    advice = "" if is_sound else f" {BUS_WORDS[errors.condition]}"
+    mark = GOOD if not errors.frames else WARNING if is_sound else BAD
+    console.check(mark, "errors", f"{errors.text() or 'none'}.{advice}")
 
 
 def _explain(name: str, console: Console) -> int:

@@ -1,4 +1,4 @@
-from .decoder import BusReader
+from .decoder import BusReader, describe_id
 from .error_frames import BusErrors, error_names
 from .frames import (
     GROUP_BIT,
@@ -32,7 +32,14 @@ from .frames import (
     wrap_position,
 )
 from .link import CanBus, CanLink, FrameTap, Link, open_bus
-from .log import LONGEST_LINE, BusSummary, CanLog, DecodedLine, parse_log
+from .log import (
+    LONGEST_LINE,
+    BusSummary,
+    BusTraffic,
+    CanLog,
+    DecodedLine,
+    parse_log,
+)
 from .properties import (
     MAGNETIC_ENCODER,
     MODERN,
@@ -65,6 +72,7 @@ __all__ = [
     "BusErrors",
     "BusReader",
     "BusSummary",
+    "BusTraffic",
     "CanBus",
     "CanLink",
     "CanLog",
@@ -88,6 +96,7 @@ __all__ = [
     "decode_request",
     "decode_torque",
     "decode_torques",
+    "describe_id",
     "device_of",
     "encode_acceleration",
     "encode_force",

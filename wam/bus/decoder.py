@@ -59,6 +59,21 @@ class ReplyKind(Enum):
     ACCELERATION = Group.ACCELERATION
 
 
+def describe_id(can_id: int) -> str:
+    """Return in words who says what to whom with an 11-bit identifier."""
+    address = split_id(can_id)
+    who = node_name(address.sender)
+    if address.is_group and address.to == Group.PROPERTY:
+        return f"{who} answers"
+    if address.is_group and address.to in {kind.value for kind in ReplyKind}:
+        return f"{who} tells its {ReplyKind(Group(address.to)).name.lower()}"
+    if not address.is_group:
+        return f"{who} to {node_name(address.to)}"
+    known = address.to in _GROUP_NAMES
+    whom = _GROUP_NAMES[Group(address.to)] if known else f"group {address.to}"
+    return f"{who} to {whom}"
+
+
 _SPECIAL = {
     (Device.MOTOR, "P"): (ReplyKind.POSITION,),
     (Device.MOTOR, "JP"): (ReplyKind.JOINT_ENCODER,),

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappushpop
 
@@ -78,6 +78,34 @@ class BusSummary:
     unasked: int = 0
     errors: Counter[str] = field(default_factory=Counter[str])
     silent: Counter[str] = field(default_factory=Counter[str])
+
+
+_OVERHEAD, _STUFFABLE = 47, 34  # bits of a frame without data
+_STUFFED = 0.1  # bits put in for each of those that may need it; at most a quarter
+
+
+class BusTraffic:
+    """Counts what passes on a bus; implements `wam.bus.link.Tap`.
+
+    Attributes:
+        counts: frames by identifier.
+        bits: about how many bits they took.
+    """
+
+    def __init__(self) -> None:
+        self.counts: Counter[int] = Counter()
+        self.bits = 0.0
+
+    def __call__(self, frames: Sequence[tuple[int, bytes, float]]) -> None:
+        """Count frames that were heard."""
+        for can_id, data, _ in frames:
+            self.counts[can_id] += 1
+            size = 8 * len(data)
+            self.bits += _OVERHEAD + size + _STUFFED * (_STUFFABLE + size)
+
+    def load(self, seconds: float, bitrate: int) -> float:
+        """Return the share of the time in which the bus was busy."""
+        return self.bits / (seconds * bitrate)
 
 
 def format_frame(utc_ns: int, channel: str, can_id: int, data: bytes) -> str:
