@@ -28,10 +28,10 @@ def home_arm(room: MachineRoom) -> Figures:
     room.write_bus_config()
     room.serve_home_arm()
     room.finish(room.traction("zero", "--yes"), _PATIENCE)
-    page = room.finish(room.traction("check"), _PATIENCE)
+    page = room.finish(room.traction("check", "--loop-test", "2"), _PATIENCE)
     require("LIVE RIG" in page, "check did not meet a live rig")
     missed = figure(page, r"missed (\d+/\d+)")
-    bench = room.finish(room.traction("bench", "--seconds", "3"), _PATIENCE)
+    bench = room.finish(room.traction("bench", "--seconds", "1"), _PATIENCE)
     return {
         "exchange": figure(page, r"7 positions after ([^,]+, \d+ incomplete)"),
         "sensor": figure(page, r"F/T samples\s+(.*)"),
