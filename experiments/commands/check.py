@@ -16,8 +16,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction check --bus 10                   who says what on the bus; nothing is sent
-  traction check --fake                     the page with simulated devices
-  traction check --explain estop            more about a message"""
+  traction check --fake                     the page with simulated devices"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--loop-test",
-        type=float,
+        type=number_within(0.1, 3600, "seconds, e.g. 5"),
         default=5.0,
         metavar="SECONDS",
         help="how long the loop is measured (5)",

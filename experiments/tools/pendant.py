@@ -123,8 +123,7 @@ class Lines:
 
     def _is_in_background(self) -> bool:
         """Return whether another program has the terminal: reading would stop us."""
-        assert self._descriptor is not None
-        if not os.isatty(self._descriptor):
+        if self._descriptor is None or not self.is_terminal:
             return False
         try:
             return os.tcgetpgrp(self._descriptor) != os.getpgrp()

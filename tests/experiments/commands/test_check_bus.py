@@ -10,7 +10,6 @@ from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
 from fakes.bus.hub import SocketHub
 from tests.experiments.program import traction, write_config
-from wam.bus import link as door
 from wam.bus.decoder import describe_id
 from wam.bus.log import BusTraffic
 
@@ -129,9 +128,7 @@ class DeafBus(can.BusABC):
 @pytest.fixture
 def served_by(monkeypatch):
     def serve(bus):
-        monkeypatch.setattr(can, "Bus", lambda **_: bus)
-        monkeypatch.setattr(door, "open_bus", lambda *_: bus)
-        monkeypatch.setattr("wam.bus.open_bus", lambda *_: bus, raising=False)
+        monkeypatch.setattr("wam.bus.open_bus", lambda *_: bus)
 
     return serve
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.devices import BusCondition
+from acquisition.sample import Flag, reading_bits
 from fakes.pucks.bus_faults import BusFaults
 from fakes.pucks.options import NetworkOptions
 from fakes.world.faults import network_faults
@@ -149,6 +150,53 @@ def test_an_interface_that_is_down_is_known_and_comes_back(bench):
     reading = bench.cycle()
     assert reading.is_complete
     assert bench.is_true(reading)
+    assert bench.arm.bus_condition is BusCondition.SOUND
+
+
+def test_a_controller_that_left_the_bus_is_known_until_the_arm_answers(bench):
+    bench.cycle()
+    bench.faults.go_off()
+    assert bench.cycle().fresh == 0
+    assert bench.arm.bus_condition is BusCondition.OFF
+    assert bench.arm.counters.link_errors == 0  # nothing was refused
+    bench.faults.clear_faults()
+    assert bench.cycle().is_complete
+    assert bench.arm.bus_condition is BusCondition.SOUND
+    assert "bus-off 1" in bench.arm.counters.metadata()["link:error_frames"]
+
+
+def test_a_host_that_nobody_acknowledges_fills_its_queue(bench):
+    bench.cycle()
+    bench.faults.go_unheard()
+    seen = {bench.arm.bus_condition for _ in range(15) if not bench.cycle().is_complete}
+    assert seen == {BusCondition.UNHEARD, BusCondition.FULL}
+
+
+def test_no_torque_waits_in_the_queue_of_a_host_that_is_not_heard(bench):
+    bench.cycle()
+    bench.faults.go_unheard()
+    for _ in range(30):
+        bench.cycle()
+    heard = []
+    receive = bench.rig.network.receive
+    bench.rig.network.receive = lambda *frame: (heard.append(frame[1]), receive(*frame))
+    bench.faults.clear_faults()
+    before_ns = bench.rig.clock.t_ns
+    bench.arm.read(before_ns)  # what waited leaves before it
+    assert heard.count(0x404) > 5
+    assert not {0x401, 0x402} & set(heard)
+
+
+def test_an_error_of_the_controller_marks_the_reading_of_its_cycle_only(bench):
+    assert not bench.cycle().has_bus_error
+    bench.faults.report_error(0x004, bytes((0, 4, 0, 0, 0, 0, 0, 0)))
+    reading = bench.cycle()
+    assert reading.has_bus_error
+    assert reading_bits(reading, is_late=False) & Flag.BUS_ERROR
+    after = bench.cycle()
+    assert not after.has_bus_error
+    assert not reading_bits(after, is_late=False) & Flag.BUS_ERROR
+    assert bench.arm.counters.metadata()["link:error_frames"] == "warning 1"
     assert bench.arm.bus_condition is BusCondition.SOUND
 
 
