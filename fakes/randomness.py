@@ -31,6 +31,11 @@ def trial_generators(seed: int, terrain: str, trial: int) -> TrialGenerators:
     return TrialGenerators(*trial_generator(seed, terrain, trial).spawn(3))
 
 
+def friction_generator(seed: int) -> np.random.Generator:
+    """Return the generator of the arm's friction: the same in every trial of a seed."""
+    return trial_generator(seed, "friction", 0)
+
+
 # Streams and processes below step up to 50 times per cycle of 2 ms. A chain hands the
 # numbers of a block out at half the cost of a generator, and a generator keeps its
 # frame between steps, which costs a third of a method's call.

@@ -1,86 +1,165 @@
-"""What resists the joints: dry and viscous friction, and the stops."""
+"""What drives the joints and resists them: motors, their friction, the stops."""
 
-import math
 from collections.abc import Sequence
 from struct import Struct
 from typing import NamedTuple
 
 import numpy as np
 
-from wam.model import ArmConstants, Array, drive_inertia_matrix
+from acquisition import PERIOD_NS
+from fakes.plant.friction import MotorBristles
+from wam.model import ArmConstants, Array, MotorFriction, drive_inertia_matrix
 
 _STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
-_EPSILON = 0.01  # rad/s, where Coulomb friction saturates
-_STANDSTILL = 1e-9  # rad/s, keeps the secant finite
 _NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
+_BEARING_NS = 4 * PERIOD_NS  # between two looks at load and ripple of the friction
 
 
-class Resistance(NamedTuple):
-    """What resists the joints at one place and speed; seven numbers of each.
+class StopForces(NamedTuple):
+    """What the stops do at one place and speed; seven numbers of each.
 
     Attributes:
-        inertias: drive inertia + dt D [kg m^2].
-        damping: D [N m s/rad].
-        springs: with which the stops push back [N m].
-        is_near_stop: a joint may be at a stop within a cycle.
+        torques: with which they push back and damp [N m].
+        damping: their damping [N m s/rad].
+        is_near: a joint may be at a stop within a cycle.
     """
 
-    inertias: list[float]
+    torques: list[float]
     damping: list[float]
-    springs: list[float]
-    is_near_stop: bool
+    is_near: bool
 
 
-class JointResistance:
-    """Resistance of the seven joints as damping, which an implicit step can take.
+class JointStops:
+    """Stops of the seven joints: springs with dampers."""
 
-    D = diag(c tanh(|qd| / 0.01) / |qd| + viscous) is the secant of dry friction. Taken
-    explicitly it is beyond stability for joint 7; so would be the damping of its stop.
-    """
+    def __init__(self, constants: ArmConstants) -> None:
+        """Take where the stops of the arm are."""
+        lower, upper = constants.q_lower, constants.q_upper
+        ends = zip(lower.tolist(), upper.tolist(), strict=True)
+        self._ends: list[tuple[float, float]] = list(ends)
+        free = zip((lower + _NEAR).tolist(), (upper - _NEAR).tolist(), strict=True)
+        self._free: list[tuple[float, float]] = list(free)
 
-    def __init__(self, constants: ArmConstants, friction: float, dt: float) -> None:
-        """Take the arm and the step.
-
-        Args:
-            constants: of the arm; its drives' inertia counts.
-            friction: share of the figures identified on another arm.
-            dt: length of a step [s].
-        """
-        self._dt = dt
-        self._joints: list[tuple[float, float, float, float, float]] = list(
-            zip(
-                np.diag(drive_inertia_matrix(constants)).tolist(),
-                (friction * constants.coulomb).tolist(),
-                (friction * constants.viscous).tolist(),
-                constants.q_lower.tolist(),
-                constants.q_upper.tolist(),
-                strict=True,
-            )
-        )
-
-    def at(self, q: Sequence[float], qd: Sequence[float]) -> Resistance:
-        """Return what resists the joints.
+    def at(self, q: Sequence[float], qd: Sequence[float]) -> StopForces:
+        """Return what the stops do.
 
         Args:
             q: joint positions [rad].
             qd: joint velocities [rad/s].
         """
-        inertias: list[float] = []
-        dampings: list[float] = []
-        springs = [0.0] * 7
-        is_near_stop = False
-        for i, (angle, rate, joint) in enumerate(zip(q, qd, self._joints, strict=True)):
-            drive, dry, damping, lower, upper = joint
-            speed = abs(rate) + _STANDSTILL
-            damping += dry * math.tanh(speed / _EPSILON) / speed
-            if not lower + _NEAR <= angle <= upper - _NEAR:
-                is_near_stop = True
-                beyond = max(angle - upper, 0.0) - max(lower - angle, 0.0)
-                springs[i] = -_STOP_K * beyond
-                damping += _STOP_B if beyond else 0.0
-            dampings.append(damping)
-            inertias.append(drive + self._dt * damping)
-        return Resistance(inertias, dampings, springs, is_near_stop)
+        for angle, (low, high) in zip(q, self._free, strict=True):
+            if not low <= angle <= high:
+                break
+        else:
+            return _CLEAR
+        torques, damping = [0.0] * 7, [0.0] * 7
+        for i, (angle, (lower, upper)) in enumerate(zip(q, self._ends, strict=True)):
+            beyond = max(angle - upper, 0.0) - max(lower - angle, 0.0)
+            if beyond:
+                damping[i] = _STOP_B
+                torques[i] = -_STOP_K * beyond - _STOP_B * qd[i]
+        return StopForces(torques, damping, is_near=True)
+
+
+_CLEAR = StopForces([0.0] * 7, [0.0] * 7, is_near=False)
+
+
+class JointDrives:
+    """What acts at the joints beside gravity, ground and hand.
+
+    Attributes:
+        disturbance: joint torques from outside [N m], shape (7,).
+        driving: torques that drive the joints whatever they do in a step [N m], seven.
+        stops: of the joints.
+        armature: inertia of the drives and dt D [kg m^2], shape (7,).
+    """
+
+    def __init__(
+        self,
+        constants: ArmConstants,
+        friction: MotorFriction,
+        inertia: Array,
+        dt: float,
+    ) -> None:
+        """Take the drives of an arm that stands without torque.
+
+        Args:
+            constants: of the arm.
+            friction: of the motors.
+            inertia: that a motor moves when it turns [kg m^2], shape (7,).
+            dt: length of a step [s].
+        """
+        self._dt = dt
+        self._j2mp, self._ipnm = constants.j2mp, constants.ipnm
+        self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
+        self._dampings = constants.j2mp.T**2  # of the joints by those of the motors
+        self._inertia = np.diag(drive_inertia_matrix(constants))
+        self._bristles = MotorBristles(friction, inertia, dt)
+        self._is_lively = False
+        self.disturbance = np.zeros(7)
+        self.stops = JointStops(constants)
+        self._stopping = _CLEAR
+        self.armature = self._inertia
+        self.drive([0.0] * 7)
+
+    def drive(self, units: Sequence[float]) -> None:
+        """Apply torques [puck units] to motors 1 to 7 from now on."""
+        self._tau = self._of_units.dot(units)
+        self._borne = [u / ipnm for u, ipnm in zip(units, self._ipnm, strict=True)]
+        self._add_up()
+
+    def rest(self) -> None:
+        """Unbend the bristles, as brakes do."""
+        self._bristles.rest()
+
+    def begin_cycle(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
+        """Take anew what stays as it is for 2 ms.
+
+        Args:
+            rows: positions [rad] and velocities [rad/s] of the joints, shape (3, 7).
+            speeds: of the motors [rad/s], seven.
+            t_ns: time [ns].
+        """
+        self._stop(rows)
+        if t_ns % _BEARING_NS == 0:
+            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), self._borne)
+        self._is_lively = self._bristles.is_lively(speeds)
+        self._resist(speeds)
+
+    def torques(self, rows: Array, speeds: Sequence[float]) -> list[float]:
+        """Return the torques of friction on the motors [N m] in a step, seven.
+
+        Near a stop, and where a motor is fast, the resistance is taken anew before.
+        Arguments as of `begin_cycle`.
+        """
+        if self._stopping.is_near:
+            self._stop(rows)
+            self._resist(speeds)
+        elif self._is_lively:
+            self._resist(speeds)
+        return self._bristles.torques(speeds)
+
+    def follow(self, speeds: Sequence[float]) -> None:
+        """Go on by a step at `speeds` of the motors [rad/s]."""
+        self._bristles.follow(speeds)
+
+    def _stop(self, rows: Array) -> None:
+        self._stopping = self.stops.at(*rows[:2].tolist())
+        self._add_up()
+
+    def _resist(self, speeds: Sequence[float]) -> None:
+        bristles = self._bristles
+        bristles.take(speeds)
+        damping = self._dampings.dot(bristles.damping)
+        if self._stopping.is_near:
+            damping += self._stopping.damping
+        self.armature = self._inertia + self._dt * damping
+
+    def _add_up(self) -> None:
+        driving = self._tau + self.disturbance
+        if self._stopping.is_near:
+            driving += self._stopping.torques
+        self.driving: list[float] = driving.tolist()
 
 
 class JointState:
@@ -117,40 +196,37 @@ class JointState:
         return rows
 
 
-_LAYOUT = Struct("26d")  # wrench on foot and hand, joint velocities, driving torques
+_LAYOUT = Struct("26d")  # wrench on foot and hand, against the motors, driving
 
 
 class JointLoads:
-    """Turns wrenches on foot and hand, motion and torques into torques of the joints.
+    """Turns wrenches on foot and hand and torques of motors into torques of the joints.
 
     Attributes:
         A: rows that give the sole's velocity, the foot's turn, the hand's velocity and
-            turn from the joint velocities, shape (12, 7); to be filled in place.
+            turn, and the speeds of the motors from the joint velocities, shape
+            (19, 7); the first twelve are to be filled in place.
     """
 
-    def __init__(self) -> None:
-        self._B = np.vstack((np.zeros((12, 7)), np.zeros((7, 7)), np.eye(7)))
-        self.A = self._B[:12]
-        self._resisting = self._B[12:19].reshape(-1)[:: 7 + 1]  # the diagonal of -D
+    def __init__(self, j2mp: Array) -> None:
+        """Take the transmission, motor angle = `j2mp` @ joint angle, shape (7, 7)."""
+        self._B = np.vstack((np.zeros((12, 7)), j2mp, np.eye(7)))
+        self.A = self._B[:19]
         self._buffer = bytearray(_LAYOUT.size)
         self._loads = np.frombuffer(self._buffer)
-
-    def resist(self, damping: Sequence[float]) -> None:
-        """Let the joints be damped by `damping` [N m s/rad], seven, from now on."""
-        np.negative(damping, out=self._resisting)
 
     def torques(
         self,
         wrench: Sequence[float],
-        qd: Sequence[float],
+        of_motors: Sequence[float],
         driving: Sequence[float],
     ) -> Array:
-        """Return A^T `wrench` - D `qd` + `driving` [N m], shape (7,).
+        """Return A^T (`wrench`, `of_motors`) + `driving` [N m], shape (7,).
 
         Args:
             wrench: on foot and hand, twelve numbers in the order of the rows of A.
-            qd: joint velocities [rad/s], seven.
+            of_motors: torques on the motors [N m], seven.
             driving: torques that drive the joints [N m], seven.
         """
-        _LAYOUT.pack_into(self._buffer, 0, *wrench, *qd, *driving)
+        _LAYOUT.pack_into(self._buffer, 0, *wrench, *of_motors, *driving)
         return self._loads.dot(self._B)

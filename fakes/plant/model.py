@@ -5,7 +5,14 @@ import numpy as np
 import pinocchio as pin
 
 from ft_sensor import TerrainFrame
-from wam.model import ArmConstants, Tool, add_point, build_pinocchio
+from wam.model import (
+    ArmConstants,
+    Array,
+    Tool,
+    add_point,
+    build_pinocchio,
+    drive_inertia_matrix,
+)
 
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
@@ -22,6 +29,20 @@ def arm_and_hand(
     _stand_in(model, frame)
     hand = _add_forearm(model, constants)
     return model, add_point(model, constants, "sole", tool.sole), hand
+
+
+def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
+    """Return what each motor moves when it turns alone [kg m^2], shape (7,).
+
+    Args:
+        model: the arm; gets the inertia of its drives.
+        constants: of the arm.
+        q: joint positions [rad], shape (7,).
+    """
+    model.armature = np.diag(drive_inertia_matrix(constants))
+    upper = np.triu(pin.computeMinverse(model, model.createData(), q))
+    inverse = upper + np.triu(upper, 1).T
+    return 1.0 / np.einsum("ij,jk,ik->i", constants.j2mp, inverse, constants.j2mp)
 
 
 def _stand_in(model: "pin.Model", frame: TerrainFrame) -> None:

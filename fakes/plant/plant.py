@@ -1,14 +1,18 @@
 # pyright: reportMissingImports=false
 """The arm as a body: seven joints, foot on the ground, hand on the forearm.
 
-    (M + dt D) qd' = M qd + dt (tau + J_s^T w_s + J_h^T w_h - nle),   q' = q + dt qd'
+    (M + dt D) (qd' - qd) = dt (tau + J_s^T w_s + J_h^T w_h + T^T f - nle)
+    q' = q + dt qd'
 
-nle at q and qd + dt qdd / 2, M with drive inertia, D the resistance of the joints taken
-implicitly, w_s the ground's wrench at the sole, w_h the hand's at the forearm. The
-implicit part is an addition to the armature, so one articulated-body pass solves it.
+nle at q and qd + dt qdd / 2, M with drive inertia, w_s the ground's wrench at the sole,
+w_h the hand's at the forearm, T the transmission, f the friction of the motors at qd.
+D is the diagonal of the damping of friction and stops, which is an addition to the
+armature, so one articulated-body pass solves it. What a differential adds beside the
+diagonal is taken explicitly: it is smaller than the diagonal, so steps stay stable.
 
 Ground and dynamics go on in substeps. What changes more slowly is taken anew once in a
-cycle of 2 ms: the Jacobians, D, and the force of the hand, which has 10 Hz at most.
+cycle of 2 ms: the Jacobians, D unless a motor is fast, and the force of the hand, which
+has 10 Hz at most.
 """
 
 from collections.abc import Sequence
@@ -20,10 +24,11 @@ import pinocchio as pin
 
 from acquisition import PERIOD_NS
 from fakes.ground import NO_CONTACT, Terrain
+from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
 from fakes.plant.hand import Hand
-from fakes.plant.joints import JointLoads, JointResistance, JointState
-from fakes.plant.model import FOREARM_MASS, arm_and_hand
+from fakes.plant.joints import JointDrives, JointLoads, JointState
+from fakes.plant.model import FOREARM_MASS, arm_and_hand, motor_inertia
 from fakes.plant.push import HandView
 from fakes.truth import Truth
 from ft_sensor import TerrainFrame
@@ -33,6 +38,7 @@ _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
+_NO_TORQUE = (0.0,) * 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +50,12 @@ class PlantOptions:
             it). A real arm's is unknown; with 0.05 of it a fifth of the slips bounce
             back, with more than about 0.1 hardly any.
         substeps: steps per 2 ms cycle.
+        seed: draws the parameters of friction; None = the nominal ones.
     """
 
     friction: float = 0.02
     substeps: int = 4
+    seed: int | None = None
 
 
 class ArmPlant:
@@ -60,6 +68,8 @@ class ArmPlant:
         finger: force of a person who touches the foot, terrain frame [N].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
+        friction: of the motors.
+        stops: of the joints.
     """
 
     def __init__(
@@ -78,20 +88,15 @@ class ArmPlant:
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
-        self.resistance = JointResistance(constants, options.friction, self._dt)
+        self.friction = draw_friction(constants, options.friction, options.seed)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
-        # counts of the encoders per joint angle, joint torque per puck unit
+        # counts of the encoders per joint angle
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
-        self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
-        self._tau = np.zeros(7)
-        self._stops = np.zeros(7)
-        self._driving = [0.0] * 7
         self._is_held = True
-        self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9)
         self.finger = (0.0, 0.0, 0.0)
@@ -109,10 +114,12 @@ class ArmPlant:
         pin.forwardKinematics(self._model, self._data, self.q)
         hand = pin.updateFramePlacement(self._model, self._data, self._hand)
         self._wanted = hand.rotation.copy()
-        self._loads = JointLoads()
-        self._rates = [0.0] * 12
+        self._loads = JointLoads(self._constants.j2mp)
         self._linearise()
-        self._resist(*self._joints.rows[:2].tolist())
+        inertia = motor_inertia(self._model, self._constants, self.q)
+        self._drives = JointDrives(self._constants, self.friction, inertia, self._dt)
+        self.disturbance, self.stops = self._drives.disturbance, self._drives.stops
+        self._begin_drives()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
 
     @property
@@ -143,8 +150,7 @@ class ArmPlant:
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        self._tau = self._of_units.dot(units)
-        self._drive()
+        self._drives.drive(units)
 
     @property
     def is_held(self) -> bool:
@@ -156,10 +162,10 @@ class ArmPlant:
         self._is_held = is_braked and is_powered
         if self._is_held:
             self._joints.rest(self.q)
-            self._rates = [0.0] * 12
+            self._rates, self._speeds = [0.0] * 12, [0.0] * 7
+            self._drives.rest()
         if is_braked or not is_powered:
-            self._tau = np.zeros(7)
-            self._drive()
+            self._drives.drive(_NO_TORQUE)
 
     # --- what the sensor feels ----------------------------------------------------
 
@@ -223,25 +229,16 @@ class ArmPlant:
         """Take anew what stays as it is for 2 ms."""
         self._linearise()
         rates, hand_at = self._rates, self._hand_at
-        sx, sy, sz, _, _, _, hx, hy, hz, _, _, _ = rates
+        sx, sy, sz, _, _, _, hx, hy, hz = rates[:9]
         view = HandView(self._sole_at, (sx, sy, sz), hand_at, (hx, hy, hz))
         self._push = x, y, z = self.hand.step(view)
         ux, uy, uz = self._up
         self._held = (x + ux, y + uy, z + uz)
-        self._resist(*self._joints.rows[:2].tolist())
+        self._begin_drives()
 
-    def _resist(self, q: list[float], qd: list[float]) -> None:
-        """Take friction and stops as they are at `q` [rad] and `qd` [rad/s]."""
-        now = self.resistance.at(q, qd)
-        self._model.armature = np.array(now.inertias)
-        self._loads.resist(now.damping)
-        self._stops = np.array(now.springs)
-        self._is_near_stop = now.is_near_stop
-        self._drive()
-
-    def _drive(self) -> None:
-        """Add up what drives the joints, whatever they do in a substep."""
-        self._driving = (self._tau + self.disturbance + self._stops).tolist()
+    def _begin_drives(self) -> None:
+        self._drives.begin_cycle(self._joints.rows, self._speeds, self.t_ns)
+        self._model.armature = self._drives.armature
 
     def _linearise(self) -> None:
         """Take positions and Jacobians anew, once per cycle.
@@ -263,20 +260,23 @@ class ArmPlant:
         ).tolist()
         self._tilt = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
         pin.computeJointJacobians(model, data, self._midway.dot(self._joints.rows))
-        pin.updateFramePlacement(model, data, self._sole)
-        pin.updateFramePlacement(model, data, self._hand)
         A[:6] = pin.getFrameJacobian(model, data, self._sole, _AXES)
-        A[6:] = pin.getFrameJacobian(model, data, self._hand, _AXES)
-        self._rates = A.dot(self.qd).tolist()
+        A[6:12] = pin.getFrameJacobian(model, data, self._hand, _AXES)
+        rates = A.dot(self.qd).tolist()
+        self._rates, self._speeds = rates[:12], rates[12:]
 
     def _integrate(self, wrench: tuple[float, ...]) -> None:
         """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
-        dt, state = self._dt, self._joints.rows
-        if self._is_near_stop:
-            self._resist(*state[:2].tolist())
-        tau = self._loads.torques(wrench, state[1].tolist(), self._driving)
+        dt, state, drives = self._dt, self._joints.rows, self._drives
+        armature = drives.armature
+        against = drives.torques(state, self._speeds)
+        if drives.armature is not armature:
+            self._model.armature = drives.armature
+        tau = self._loads.torques(wrench, against, drives.driving)
         qdd = pin.aba(self._model, self._data, state[0], state[2], tau)
-        self._rates = rates = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
+        motion = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
+        self._rates, self._speeds = rates, speeds = motion[:12], motion[12:]
+        drives.follow(speeds)
         sx, sy, sz, _, _, _, _, _, _, wx, wy, wz = rates
         x, y, z = self._sole_at
         self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)

@@ -124,7 +124,8 @@ class FakeRig:
         self._clock = clock
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
-        self.plant = ArmPlant(constants, tool, scene.frame, q, options)
+        drawn = replace(options or PlantOptions(), seed=scene.seed)
+        self.plant = ArmPlant(constants, tool, scene.frame, q, drawn)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
         chosen = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:

@@ -9,6 +9,14 @@ from .clearance import (
     straight_way,
 )
 from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
+from .friction import (
+    ELASTIC,
+    MotorFriction,
+    joint_coulomb,
+    motor_shares,
+    motor_turns,
+    plastic_share,
+)
 from .gravity import VirtualMass, compensation, gravity_model
 from .moments import (
     MomentFit,
@@ -24,6 +32,7 @@ from .tool import Tool, sensor_body, tool_metadata, tool_of
 __all__ = [
     "BASE_HEIGHT",
     "CLEARANCE_MARGIN",
+    "ELASTIC",
     "GRAVITY",
     "ArmClearance",
     "ArmConstants",
@@ -32,6 +41,7 @@ __all__ = [
     "Body",
     "BodyGap",
     "MomentFit",
+    "MotorFriction",
     "ObstacleBox",
     "Tool",
     "VirtualMass",
@@ -44,7 +54,11 @@ __all__ = [
     "drive_inertia_matrix",
     "fit_moments",
     "gravity_model",
+    "joint_coulomb",
     "load_constants",
+    "motor_shares",
+    "motor_turns",
+    "plastic_share",
     "regressor",
     "sensor_body",
     "straight_way",

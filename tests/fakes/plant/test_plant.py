@@ -321,13 +321,12 @@ def test_a_sensor_that_is_read_within_a_cycle_does_not_drive_the_arm_on():
 
 def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
     rng = np.random.default_rng(1)
-    loads = JointLoads()
-    loads.A[...] = rng.standard_normal((12, 7))
-    damping = rng.random(7)
-    loads.resist(damping.tolist())
-    wrench, qd, driving = (rng.standard_normal(n) for n in (12, 7, 7))
-    found = loads.torques(wrench, qd, driving)
-    assert found == pytest.approx(loads.A.T @ wrench - damping * qd + driving)
+    j2mp = rng.standard_normal((7, 7))
+    loads = JointLoads(j2mp)
+    loads.A[:12] = rows = rng.standard_normal((12, 7))
+    wrench, motors, driving = (rng.standard_normal(n) for n in (12, 7, 7))
+    found = loads.torques(wrench, motors, driving)
+    assert found == pytest.approx(rows.T @ wrench + j2mp.T @ motors + driving)
 
 
 @pytest.mark.parametrize(("away", "times"), [(0.5, 1), (0.02, 5)])
@@ -336,10 +335,8 @@ def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, tim
     plant.q[6] = CONSTANTS.q_upper[6] - away
     release(plant)
     taken = []
-    at = plant.resistance.at
-    monkeypatch.setattr(
-        plant.resistance, "at", lambda *state: taken.append(0) or at(*state)
-    )
+    at = plant.stops.at
+    monkeypatch.setattr(plant.stops, "at", lambda *state: taken.append(0) or at(*state))
     plant.advance(plant.t_ns + CYCLE_NS)
     assert len(taken) == times  # at the beginning of the cycle, and in four substeps
 

@@ -1,0 +1,222 @@
+"""Friction of the simulated arm: a table, an arm drawn from it, and its bristles.
+
+No WAM has published more than Coulomb and viscous friction of one arm. Every other
+figure is ASSUMED, with the range from which a simulated arm draws it.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition import PERIOD_NS
+from fakes.randomness import friction_generator
+from wam.model import (
+    ELASTIC,
+    ArmConstants,
+    Array,
+    MotorFriction,
+    motor_shares,
+    motor_turns,
+    plastic_share,
+)
+
+ASSUMED = "ASSUMED"  # not measured on any WAM
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionParameter:
+    """One row of the table.
+
+    Attributes:
+        name: of the parameter.
+        unit: in which it is stated.
+        nominal: its value in an arm without a seed.
+        low: smallest value drawn.
+        high: largest value drawn.
+        source: where it is from; `ASSUMED` = not measured on any WAM.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    low: float
+    high: float
+    source: str
+
+    def values(self, random: np.random.Generator | None) -> Array:
+        """Return one value for each motor, shape (7,); without `random`, nominal."""
+        if random is None:
+            return np.full(7, self.nominal)
+        return random.uniform(self.low, self.high, 7)
+
+
+_OWD = "Coulomb and viscous of one arm (OWD, wam7.toml); spread ASSUMED"
+FRICTION_TABLE = (
+    FrictionParameter("coulomb", "of wam7.toml", 1.0, 0.8, 1.2, _OWD),
+    FrictionParameter("viscous", "of wam7.toml", 1.0, 0.5, 1.5, _OWD),
+    FrictionParameter("asymmetry", "of Coulomb", 0.0, -0.1, 0.1, ASSUMED),
+    FrictionParameter("load", "N m per N m", 0.0, 0.0, 0.04, ASSUMED),
+    FrictionParameter("breakaway", "of sliding", 1.2, 1.05, 1.4, ASSUMED),
+    FrictionParameter("stribeck", "rad/s at the joint", 0.02, 0.01, 0.04, ASSUMED),
+    FrictionParameter("ripple", "of Coulomb", 0.0, 0.0, 0.08, ASSUMED),
+    FrictionParameter("phase", "rad of the motor", 0.0, -np.pi, np.pi, ASSUMED),
+    FrictionParameter("presliding_arm", "rad, motors 1-4", 1e-3, 5e-4, 1.5e-3, ASSUMED),
+    FrictionParameter(
+        "presliding_wrist", "rad, motors 5-7", 2e-3, 1e-3, 2.5e-3, ASSUMED
+    ),
+)
+# A move takes a motor that needs more than 1.5 of the figures for one that is stuck.
+_LARGEST_BREAKAWAY = 1.4
+_DAMPED = 1.4  # of a bristle: twice its damping ratio
+_LIVELY = 0.1  # of the sliding deflection in a cycle: a bristle is taken anew sooner
+_PERIOD = PERIOD_NS * 1e-9  # s
+_LEAST = 1e-9  # N m at a motor: an arm without friction has almost none
+
+
+def draw_friction(
+    constants: ArmConstants, share: float, seed: int | None
+) -> MotorFriction:
+    """Return the friction of a simulated arm.
+
+    Args:
+        constants: of the arm; its figures were identified on another one.
+        share: of these figures.
+        seed: of the parameters that are drawn; None = the nominal ones.
+    """
+    random = None if seed is None else friction_generator(seed)
+    drawn = {row.name: row.values(random) for row in FRICTION_TABLE}
+    nominal = share * motor_shares(constants, constants.coulomb, 1)
+    viscous = share * motor_shares(constants, constants.viscous, 2)
+    coulomb = nominal * drawn["coulomb"]
+    one_way = drawn["coulomb"] * (1.0 + np.abs(drawn["asymmetry"]))
+    turns = motor_turns(constants)
+    presliding = np.append(drawn["presliding_arm"][:4], drawn["presliding_wrist"][4:])
+    ripple, phase = drawn["ripple"], drawn["phase"]
+    return MotorFriction(
+        coulomb=np.maximum(coulomb, _LEAST),
+        asymmetry=coulomb * drawn["asymmetry"],
+        load=share * drawn["load"],
+        load_at=np.zeros(7),
+        breakaway=np.minimum(drawn["breakaway"], _LARGEST_BREAKAWAY / one_way),
+        stribeck=turns * drawn["stribeck"],
+        viscous=viscous * drawn["viscous"],
+        ripple_sin=ripple * np.cos(phase),
+        ripple_cos=ripple * np.sin(phase),
+        presliding=turns * presliding,
+    )
+
+
+class MotorBristles:
+    """Friction of the seven motors: one elasto-plastic bristle each.
+
+    Taken implicitly in the speed: over a step of length dt the torque against the
+    motion is c z + D w, w the speed at its end, and z <- a (z + dt w). With s0 = g at
+    standstill / presliding, s1 the damping of the bristle and b that of the motor,
+
+        a = 1 / (1 + dt alpha s0 |w| / g),  D = a (s0 dt + s1) + b
+        c = a (s0 + s1 / dt) - s1 / dt
+
+    c, D and a are taken anew in every cycle, and in every step where a motor goes a
+    tenth of its presliding in a cycle. They are never negative, so the bristles take
+    energy out or store it, whenever they are taken.
+
+    Attributes:
+        damping: D of the seven motors [N m s/rad].
+    """
+
+    def __init__(self, friction: MotorFriction, inertia: Array, dt: float) -> None:
+        """Take the friction of the motors; their bristles are not bent.
+
+        Args:
+            friction: of the motors.
+            inertia: that a motor moves when it turns [kg m^2], shape (7,).
+            dt: length of a step [s].
+        """
+        self._dt = dt
+        self._columns = _columns(friction, inertia, dt)
+        self._bent_springs = [s0 for _, _, s0, _, _, _ in self._columns]
+        self._bent_damping = [s0 * dt + s1 + b for _, _, s0, s1, _, b in self._columns]
+        self._lively: list[float] = (_LIVELY / _PERIOD * friction.presliding).tolist()
+        load_and_ripple = np.stack(
+            (
+                friction.coulomb - friction.load * friction.load_at,
+                friction.load,
+                friction.asymmetry,
+                friction.ripple_sin,
+                friction.ripple_cos,
+            ),
+            axis=-1,
+        )
+        self._levels: list[list[float]] = load_and_ripple.tolist()
+        self.bear([0.0] * 7, [0.0] * 7)
+        self.rest()
+
+    def rest(self) -> None:
+        """Let go of what bends the bristles, as in an arm that is braked."""
+        self._z = [0.0] * 7
+        self._keep = [1.0] * 7
+        self.take([0.0] * 7)
+
+    def bear(self, angles: Sequence[float], tau: Sequence[float]) -> None:
+        """Take the dry friction where the motors are.
+
+        Args:
+            angles: of the motors [rad].
+            tau: torques that they bear [N m].
+        """
+        ways: list[tuple[float, float]] = []
+        for angle, torque, row in zip(angles, tau, self._levels, strict=True):
+            coulomb, load, asymmetry, of_sin, of_cos = row
+            level = coulomb + load * abs(torque)
+            ripple = 1.0 + of_sin * math.sin(angle) + of_cos * math.cos(angle)
+            ways.append(((level + asymmetry) * ripple, (level - asymmetry) * ripple))
+        self._ways = ways
+
+    def follow(self, speeds: Sequence[float]) -> None:
+        """Bend the bristles by a step at `speeds` of the motors [rad/s]."""
+        dt = self._dt
+        state = zip(self._keep, self._z, speeds, strict=True)
+        self._z = [keep * (z + dt * w) for keep, z, w in state]
+
+    def is_lively(self, speeds: Sequence[float]) -> bool:
+        """Return whether a motor bends its bristle far within a cycle."""
+        for w, limit in zip(speeds, self._lively, strict=True):
+            if not -limit <= w <= limit:
+                return True
+        return False
+
+    def take(self, speeds: Sequence[float]) -> None:
+        """Take c, D and a anew at `speeds` of the motors [rad/s]."""
+        dt = self._dt
+        keeps, dampings = [1.0] * 7, list(self._bent_damping)
+        springs = list(self._bent_springs)
+        state = zip(speeds, self._z, self._ways, self._columns, strict=True)
+        for i, (w, z, (forward, backward), row) in enumerate(state):
+            if z * w <= 0.0:
+                continue
+            more, slow, s0, s1, s1_dt, b = row
+            x = w * slow
+            g = forward if w > 0.0 else backward
+            g *= 1.0 + more / (1.0 + x * x)
+            bent = abs(z) * s0 / g
+            if bent > ELASTIC:
+                rate = plastic_share(bent) * s0 * abs(w) / g
+                keeps[i] = keep = 1.0 / (1.0 + dt * rate)
+                dampings[i] = keep * (s0 * dt + s1) + b
+                springs[i] = keep * (s0 + s1_dt) - s1_dt
+        self._keep, self.damping, self._springs = keeps, dampings, springs
+
+    def torques(self, speeds: Sequence[float]) -> list[float]:
+        """Return the torques on the motors [N m], taken at their `speeds` [rad/s]."""
+        state = zip(self._springs, self._z, self.damping, speeds, strict=True)
+        return [-c * z - d * w for c, z, d, w in state]
+
+
+def _columns(friction: MotorFriction, inertia: Array, dt: float) -> list[list[float]]:
+    """Return for each motor: s - 1, 1 / w_s, s0, s1, s1 / dt, b."""
+    s0 = friction.coulomb * friction.breakaway / friction.presliding
+    s1 = _DAMPED * np.sqrt(s0 * inertia)
+    rows = (friction.breakaway - 1.0, 1.0 / friction.stribeck, s0, s1, s1 / dt)
+    return np.stack((*rows, friction.viscous), axis=-1).tolist()
