@@ -105,7 +105,7 @@ class JointDrives:
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         self._tau = self._of_units.dot(units)
-        self._borne = [u / ipnm for u, ipnm in zip(units, self._ipnm, strict=True)]
+        self._sent = [u / ipnm for u, ipnm in zip(units, self._ipnm, strict=True)]
         self._add_up()
 
     def rest(self) -> None:
@@ -122,7 +122,9 @@ class JointDrives:
         """
         self._stop(rows)
         if t_ns % _BEARING_NS == 0:
-            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), self._borne)
+            against = zip(self._sent, self._bristles.torques(speeds), strict=True)
+            borne = [sent + friction for sent, friction in against]
+            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
         self._is_lively = self._bristles.is_lively(speeds)
         self._resist(speeds)
 

@@ -1,0 +1,292 @@
+"""Friction of each motor from recorded rows: a pure function, with its intervals.
+
+Speed at half of the break-away excess and the excess itself are sought on a grid; for
+each of them everything else is linear, so weighted least squares with priors give it:
+
+    y = S(w) (sense (F_c + mu (|tau| - tau_0) + r_s sin + r_c cos) + F_a) + b w
+        + k inertia + Y_g d
+
+Gravity is known to a prior, or within half a radian nothing could tell it from an
+asymmetry. Residuals of neighbouring rows are alike: intervals come from sums over
+blocks of 2 s (a sandwich), not from rows taken as independent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition import SettingsError
+from wam.calibration.sliding import SlidingRows
+from wam.model import (
+    ArmConstants,
+    Array,
+    MotorFriction,
+    joint_coulomb,
+    motor_turns,
+)
+
+LARGEST_RESIDUAL = 0.2  # of Coulomb friction, rms on the held-out way
+LEAST_BOUND = 0.7  # of the estimate: its lower bound
+FEWEST = 60  # rows of a motor, in each sense a quarter of them
+_STRIBECK = np.geomspace(0.005, 0.08, 13)  # rad/s of the joint
+_EXCESS = np.linspace(0.0, 0.7, 15)  # s - 1
+_SIGMAS = 1.96
+# Priors: standard deviations of what a short way shows badly.
+_LOAD = 0.03  # N m per N m
+_RIPPLE = 0.1  # of Coulomb friction
+_INERTIA = 0.1  # of the model's
+_BREAK_AWAY_WEIGHT = 3.0  # of one peak against one row of sliding
+_NOISE = 0.03  # of Coulomb friction: rows are not known better
+_COLUMNS = 7  # F_c, F_a, mu, r_s, r_c, b, inertia; then gravity
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionFit:
+    """Friction as identified, with what it leaves unexplained.
+
+    Attributes:
+        friction: of the motors.
+        deviation: standard deviation of its Coulomb torques [N m], shape (7,).
+        asymmetry_deviation: of its asymmetries [N m], shape (7,).
+        residual: rms on the held-out way as shares of Coulomb friction, shape (7,).
+        rows: how many rows each motor had, shape (7,).
+    """
+
+    friction: MotorFriction
+    deviation: Array
+    asymmetry_deviation: Array
+    residual: Array
+    rows: tuple[int, ...]
+
+    @property
+    def lower_bound(self) -> Array:
+        """Coulomb torque that the motors surely have [N m], shape (7,)."""
+        return self.friction.coulomb - _SIGMAS * self.deviation
+
+
+@dataclass(frozen=True, slots=True)
+class _MotorFit:
+    """One motor: its nonlinear pair, the linear numbers and their covariance."""
+
+    stribeck: float
+    excess: float
+    load_at: float
+    values: Array
+    covariance: Array
+
+
+def fit_friction(
+    constants: ArmConstants,
+    rows: Sequence[SlidingRows],
+    held_out: Sequence[SlidingRows],
+    gravity_deviation: Array,
+) -> FrictionFit:
+    """Return the friction that explains `rows`, judged on `held_out`.
+
+    Args:
+        constants: of the arm.
+        rows: of the seven motors.
+        held_out: of the seven motors on a way that is not fitted.
+        gravity_deviation: to which first moments are known [kg m], shape (21,).
+
+    Raises:
+        SettingsError: a motor did not slide enough either way.
+    """
+    turns = motor_turns(constants)
+    for motor, shown in enumerate(rows, 1):
+        _check_enough(motor, shown)
+    fits = [
+        _fit_motor(shown, float(scale), gravity_deviation)
+        for shown, scale in zip(rows, turns, strict=True)
+    ]
+    values = np.array([fit.values[:_COLUMNS] for fit in fits])
+    coulomb = values[:, 0]
+    friction = MotorFriction(
+        coulomb=coulomb,
+        asymmetry=values[:, 1],
+        load=np.maximum(values[:, 2], 0.0),
+        load_at=np.array([fit.load_at for fit in fits]),
+        breakaway=1.0 + np.array([fit.excess for fit in fits]),
+        stribeck=np.array([fit.stribeck for fit in fits]),
+        viscous=np.maximum(values[:, 5], 0.0),
+        ripple_sin=values[:, 3] / coulomb,
+        ripple_cos=values[:, 4] / coulomb,
+        presliding=2e-3 * turns,
+    )
+    deviations = np.sqrt([np.diag(fit.covariance)[:2] for fit in fits])
+    return FrictionFit(
+        friction=friction,
+        deviation=deviations[:, 0],
+        asymmetry_deviation=deviations[:, 1],
+        residual=_residuals(friction, fits, held_out),
+        rows=tuple(len(shown) for shown in rows),
+    )
+
+
+def check_friction(fit: FrictionFit) -> None:
+    """Refuse a friction that does not describe the arm.
+
+    Raises:
+        SettingsError: the held-out way contradicts it, or it is hardly known.
+    """
+    hint = "Nobody may touch the arm. Is the gravity calibration of this foot?"
+    worst = int(fit.residual.argmax())
+    if not fit.residual[worst] <= LARGEST_RESIDUAL:
+        raise SettingsError(
+            f"The friction of motor {worst + 1} is not of this form: the way that was "
+            f"kept back deviates by {fit.residual[worst]:.2f} of Coulomb friction rms "
+            f"(limit {LARGEST_RESIDUAL:g}).",
+            hint=hint,
+        )
+    shares = fit.lower_bound / fit.friction.coulomb
+    least = int(shares.argmin())
+    if fit.friction.coulomb.min() <= 0.0 or not shares[least] >= LEAST_BOUND:
+        raise SettingsError(
+            f"The Coulomb friction of motor {least + 1} is hardly known: its lower "
+            f"bound is {shares[least]:.2f} of it (at least {LEAST_BOUND:g}).",
+            hint=hint,
+        )
+
+
+def joint_deviation(constants: ArmConstants, deviation: Array) -> Array:
+    """Return the standard deviation of each joint's Coulomb torque [N m], (7,)."""
+    return np.sqrt((constants.j2mp**2).T @ deviation**2)
+
+
+def joint_asymmetry(constants: ArmConstants, asymmetry: Array) -> Array:
+    """Return half of forwards less backwards at each joint alone [N m], shape (7,)."""
+    return constants.j2mp.T @ asymmetry
+
+
+def speed_curve(
+    constants: ArmConstants, friction: MotorFriction, joint: int, speeds: Array
+) -> Array:
+    """Return the torque against a joint that turns alone [N m], shape (n,).
+
+    Mean of both ways, at the torque at which `coulomb` holds, without the ripple.
+
+    Args:
+        constants: of the arm.
+        friction: of its motors.
+        joint: 0-6.
+        speeds: of the joint [rad/s], shape (n,), above 0.
+    """
+    shares = np.abs(constants.j2mp[:, joint])
+    motors = speeds[:, None] * shares
+    excess = (friction.breakaway - 1.0) / (1.0 + (motors / friction.stribeck) ** 2)
+    torques = friction.coulomb * (1.0 + excess) + friction.viscous * motors
+    return torques @ shares
+
+
+def joint_breakaway(constants: ArmConstants, friction: MotorFriction) -> Array:
+    """Return the torque that breaks each joint away, mean of both ways [N m], (7,)."""
+    return joint_coulomb(constants, friction.coulomb * friction.breakaway)
+
+
+def _check_enough(motor: int, rows: SlidingRows) -> None:
+    forwards = int((rows.sense > 0.0).sum())
+    fewer = min(forwards, len(rows) - forwards)
+    if len(rows) >= FEWEST and fewer >= FEWEST // 4:
+        return
+    raise SettingsError(
+        f"Motor {motor} slid in {len(rows)} rows, {fewer} of them in the rarer sense "
+        f"(at least {FEWEST} and {FEWEST // 4}).",
+        hint="Does the motor turn as it is sent? Clear more space around the arm.",
+    )
+
+
+def _fit_motor(rows: SlidingRows, turns: float, gravity: Array) -> _MotorFit:
+    """Return the best of the grid, refined once around it."""
+    load_at = float(np.abs(rows.borne).mean())
+    scale = float(np.median(np.abs(rows.friction)))
+    best = _search(rows, (turns * _STRIBECK, _EXCESS), load_at, (scale, gravity))
+    finer = (
+        best[0] * np.geomspace(0.8, 1.25, 7),
+        np.maximum(best[1] + np.linspace(-0.05, 0.05, 11), 0.0),
+    )
+    stribeck, excess = _search(rows, finer, load_at, (scale, gravity))
+    A, y, prior = _system(rows, (stribeck, excess), load_at, (scale, gravity))
+    values, normal = _solve(A, y, prior)
+    covariance = _sandwich(A, y - A @ values, rows.block, normal)
+    return _MotorFit(stribeck, excess, load_at, values, covariance)
+
+
+def _search(
+    rows: SlidingRows,
+    grid: tuple[Array, Array],
+    load_at: float,
+    known: tuple[float, Array],
+) -> tuple[float, float]:
+    """Return (w_s, s - 1) of the least weighted squares on `grid`."""
+    best, least = (float(grid[0][0]), float(grid[1][0])), np.inf
+    for stribeck in grid[0].tolist():
+        for excess in grid[1].tolist():
+            A, y, prior = _system(rows, (stribeck, excess), load_at, known)
+            values, _ = _solve(A, y, prior)
+            cost = float(((y - A @ values) ** 2).sum() + (prior * values**2).sum())
+            if cost < least:
+                best, least = (stribeck, excess), cost
+    return best
+
+
+def _system(
+    rows: SlidingRows,
+    pair: tuple[float, float],
+    load_at: float,
+    known: tuple[float, Array],
+) -> tuple[Array, Array, Array]:
+    """Return the weighted columns, the weighted torques and the prior's weights."""
+    scale, gravity = known
+    A = _columns(rows, pair, load_at)
+    weights = 1.0 / np.hypot(_NOISE * scale, _INERTIA * rows.inertia)
+    weights *= np.where(rows.speed == 0.0, _BREAK_AWAY_WEIGHT, 1.0)
+    ripple = 1.0 / (_RIPPLE * scale) ** 2
+    loose = [0.0, 0.0, 1.0 / _LOAD**2, ripple, ripple, 0.0, 1.0 / _INERTIA**2]
+    prior = np.concatenate([loose, 1.0 / np.maximum(gravity, 1e-9) ** 2])
+    return A * weights[:, None], rows.friction * weights, prior
+
+
+def _columns(rows: SlidingRows, pair: tuple[float, float], load_at: float) -> Array:
+    """Return what multiplies the values, shape (n, 28)."""
+    stribeck, excess = pair
+    weakening = 1.0 + excess / (1.0 + (rows.speed / stribeck) ** 2)
+    along = rows.sense * weakening
+    columns = [
+        along,
+        weakening,
+        along * (np.abs(rows.borne) - load_at),
+        along * np.sin(rows.angle),
+        along * np.cos(rows.angle),
+        rows.speed,
+        rows.inertia,
+    ]
+    return np.column_stack([*columns, rows.gravity])
+
+
+def _solve(A: Array, y: Array, prior: Array) -> tuple[Array, Array]:
+    """Return the values and the matrix of the normal equations."""
+    normal = A.T @ A + np.diag(prior + 1e-12)
+    return np.linalg.solve(normal, A.T @ y), normal
+
+
+def _sandwich(A: Array, rest: Array, block: Array, normal: Array) -> Array:
+    """Return the covariance of the values, residuals being alike within a block."""
+    names, which = np.unique(block, return_inverse=True)
+    scores = np.zeros((len(names), A.shape[1]))
+    np.add.at(scores, which, A * rest[:, None])
+    inverse = np.linalg.inv(normal)
+    factor = len(names) / max(len(names) - 1, 1)
+    return factor * inverse @ (scores.T @ scores) @ inverse
+
+
+def _residuals(
+    friction: MotorFriction, fits: Sequence[_MotorFit], rows: Sequence[SlidingRows]
+) -> Array:
+    """Return the rms of what is unexplained on `rows`, shares of Coulomb, shape (7,)."""
+    shares: list[float] = []
+    for coulomb, fit, shown in zip(friction.coulomb, fits, rows, strict=True):
+        A = _columns(shown, (fit.stribeck, fit.excess), fit.load_at)
+        rest = shown.friction - A @ fit.values
+        shares.append(float(np.sqrt(np.mean(rest**2)) / coulomb))
+    return np.array(shares)

@@ -1,0 +1,209 @@
+"""From recorded cycles to what each motor does while it slides, and when it breaks away."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import PERIOD_NS
+from wam.model import ArmModel, Array, motor_turns, regressor
+
+HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
+_PERIOD = PERIOD_NS * 1e-9  # s
+_STRIDE = 10  # samples from one row to the next
+_SLOWEST = 2e-3  # rad/s of the joint: below it nothing is called sliding
+# rad of the joint from a reversal until the bristle is bent as by steady sliding
+_WINDING = np.array([6e-3] * 4 + [10e-3] * 3)
+_BREAKING = np.array([3e-3] * 4 + [5e-3] * 3)  # rad by which a motor has broken away
+BLOCK = 2.0  # s of neighbouring rows whose residuals may be alike
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedLeg:
+    """One leg of the way, cycle by cycle.
+
+    Attributes:
+        q: joint positions [rad], shape (n, 7).
+        tau: joint torques as sent [N m], shape (n, 7).
+        is_slow: it begins slowly enough to show where motors break away.
+    """
+
+    q: NDArray[np.float64]
+    tau: NDArray[np.float64]
+    is_slow: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SlidingRows:
+    """What one motor showed; arrays of shape (n,) at the motor unless stated.
+
+    Attributes:
+        angle: [rad].
+        speed: [rad/s]; 0 where it broke away.
+        sense: of the motion, +1 or -1.
+        borne: torque that the weight puts on it [N m].
+        friction: torque that neither weight nor inertia explains [N m].
+        inertia: torque that accelerates the arm by its model [N m].
+        gravity: torque by first moments of 1 kg m, shape (n, 21).
+        block: number of the stretch of 2 s; residuals within one may be alike.
+    """
+
+    angle: Array
+    speed: Array
+    sense: Array
+    borne: Array
+    friction: Array
+    inertia: Array
+    gravity: Array
+    block: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.angle)
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """A smoothed leg at the motors, shapes (n, 7)."""
+
+    angle: Array
+    speed: Array
+    borne: Array
+    friction: Array
+    inertia: Array
+    q: Array
+
+
+def sliding_rows(
+    models: tuple[ArmModel, ArmModel], legs: Sequence[RecordedLeg]
+) -> list[SlidingRows]:
+    """Return what each of the seven motors showed on `legs`.
+
+    Args:
+        models: the arm with its tool, and as it was weighed.
+        legs: recorded one after the other.
+    """
+    parts: list[list[SlidingRows]] = [[] for _ in range(7)]
+    first = 0
+    for leg in legs:
+        if len(leg.q) < 6 * HALF:
+            continue
+        motion = _motion(models, leg)
+        for motor in range(7):
+            parts[motor].append(_of_motor(models[0], motion, motor, leg, first))
+        first += 1 + int(len(leg.q) * _PERIOD / BLOCK)
+    return [_joined(part) for part in parts]
+
+
+def _motion(models: tuple[ArmModel, ArmModel], leg: RecordedLeg) -> _Motion:
+    """Return the leg with the same smoothing for everything in it."""
+    model, weighed = models
+    j2mp = model.constants.j2mp
+    to_motors = np.linalg.inv(j2mp)
+    q, qd = _line(leg.q)
+    tau, _ = _line(leg.tau)
+    qdd = _line(qd)[1]
+    rows = _every(len(q))
+    inertial, weights = np.zeros_like(q), np.zeros_like(q)
+    for i in rows:
+        inertial[i] = model.mass_matrix(q[i]) @ qdd[i] + model.coriolis(q[i], qd[i])
+        weights[i] = weighed.gravity(q[i])
+    # Weight changes slowly: in between it is a straight line.
+    for joint in range(7):
+        for table in (inertial, weights):
+            table[:, joint] = np.interp(np.arange(len(q)), rows, table[rows, joint])
+    return _Motion(
+        angle=q @ j2mp.T,
+        speed=qd @ j2mp.T,
+        borne=weights @ to_motors,
+        friction=(tau - inertial - weights) @ to_motors,
+        inertia=inertial @ to_motors,
+        q=q,
+    )
+
+
+def _every(count: int) -> NDArray[np.int64]:
+    return np.arange(2 * HALF, count - 2 * HALF, _STRIDE)
+
+
+def _line(values: Array) -> tuple[Array, Array]:
+    """Return value and slope [1/s] of centred line fits, shapes as `values` (n, 7)."""
+    steps = np.arange(-HALF, HALF + 1)
+    mean = np.full(2 * HALF + 1, 1.0 / (2 * HALF + 1))
+    slope = steps / (float(steps @ steps) * _PERIOD)
+    padded = np.pad(values, ((HALF, HALF), (0, 0)), mode="edge")
+    level = [np.convolve(column, mean, "valid") for column in padded.T]
+    rate = [np.correlate(column, slope, "valid") for column in padded.T]
+    return np.stack(level, axis=-1), np.stack(rate, axis=-1)
+
+
+def _of_motor(
+    model: ArmModel, motion: _Motion, motor: int, leg: RecordedLeg, first: int
+) -> SlidingRows:
+    """Return the rows of one motor on one leg; its blocks are counted from `first`."""
+    turns = float(motor_turns(model.constants)[motor])
+    angle, speed = motion.angle[:, motor], motion.speed[:, motor]
+    rows = _every(len(angle))
+    rows = rows[_is_sliding(angle, speed, rows, turns, float(_WINDING[motor]))]
+    v = speed[rows]
+    sense = np.where(v < 0.0, -1.0, 1.0)
+    friction = motion.friction[rows, motor]
+    if leg.is_slow:
+        broken = _break_away(motion, motor, turns)
+        if broken is not None:
+            index, way = broken
+            rows = np.append(rows, index)
+            v, sense = np.append(v, 0.0), np.append(sense, way)
+            friction = np.append(friction, motion.friction[index, motor])
+    to_motors = np.linalg.inv(model.constants.j2mp)[:, motor]
+    weighing = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
+    return SlidingRows(
+        angle=angle[rows],
+        speed=v,
+        sense=sense,
+        borne=motion.borne[rows, motor],
+        friction=friction,
+        inertia=motion.inertia[rows, motor],
+        gravity=np.array(weighing).reshape(-1, 21),
+        block=first + (rows * _PERIOD / BLOCK).astype(np.int64),
+    )
+
+
+def _is_sliding(
+    angle: Array, speed: Array, rows: NDArray[np.int64], turns: float, winding: float
+) -> NDArray[np.bool_]:
+    """Return at which of `rows` the motor has long slid one way."""
+    is_sliding = np.zeros(len(rows), dtype=bool)
+    slowest, far = _SLOWEST * turns, winding * turns
+    way, turned_at, k = 0.0, float(angle[0]), 0
+    fast = np.abs(speed) > slowest
+    for i in range(int(rows[-1]) + 1):
+        now = float(np.sign(speed[i])) if fast[i] else 0.0
+        if now != 0.0 and now != way:
+            way, turned_at = now, float(angle[i])
+        if i == rows[k]:
+            is_far = abs(float(angle[i]) - turned_at) > far
+            window = fast[i - HALF : i + HALF + 1]
+            is_sliding[k] = now == way and is_far and bool(window.all())
+            k += 1
+    return is_sliding
+
+
+def _break_away(
+    motion: _Motion, motor: int, turns: float
+) -> tuple[int, float] | None:
+    """Return (sample, sense) where the motor resisted most before it turned."""
+    moved = motion.angle[:, motor] - motion.angle[0, motor]
+    beyond = np.flatnonzero(np.abs(moved) > float(_BREAKING[motor]) * turns)
+    if not len(beyond) or beyond[0] <= 3 * HALF:
+        return None
+    end = int(beyond[0])
+    way = float(np.sign(moved[end]))
+    resisting = way * motion.friction[2 * HALF : end, motor]
+    return 2 * HALF + int(resisting.argmax()), way
+
+
+def _joined(parts: Sequence[SlidingRows]) -> SlidingRows:
+    names = SlidingRows.__slots__
+    columns = {n: np.concatenate([getattr(part, n) for part in parts]) for n in names}
+    return SlidingRows(**columns)
