@@ -62,6 +62,10 @@ class SimulationControl(Protocol):
         """Return the true parameters of the ground."""
         ...
 
+    def friction(self) -> dict[str, list[float]]:
+        """Return the true friction of the seven motors, by the names of its model."""
+        ...
+
 
 class TruthSource(Protocol):
     """The truth of a simulation in another process, a little at a time."""

@@ -1,4 +1,4 @@
-"""Guided calibrations: gravity, sensor and foot, terrain.
+"""Guided calibrations: gravity, friction, sensor and foot, terrain.
 
 Each module is one; `experiments.run.PoseWalk` moves the arm from pose to pose.
 """

@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from experiments.arguments import FRICTION
+
 if TYPE_CHECKING:
     from experiments.run import ConsoleLoop
     from experiments.settings import Settings, TerrainRow
@@ -23,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "what",
         choices=tuple(_WORK),
-        help="what the arm weighs; how the sensor is mounted and what its foot weighs; "
-        "another foot; where a container stands",
+        help="what the arm weighs; what resists its motors; how the sensor is mounted "
+        "and what its foot weighs; another foot; where a container stands",
     )
     parser.add_argument(
         "--terrain",
@@ -34,6 +36,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fake", action="store_true", help="simulated devices")
     parser.add_argument(
         "--fast", action="store_true", help="stepped time, only with --fake"
+    )
+    parser.add_argument(
+        "--friction",
+        type=float,
+        default=FRICTION,
+        metavar="SHARE",
+        help="of the simulated joints: 1 = as identified on another arm (0.02)",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
     )
     parser.add_argument(
         "--operator-script", metavar="auto", help="who answers, only with --fake"
@@ -68,11 +80,12 @@ def run(args: argparse.Namespace) -> int:
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
     settings, row = _without_old(args.what, settings, row)
     out = args.out or _place(args.what, settings, row, is_fake=args.fake)
-    _check_out(out)
+    for path in _written(args, out):
+        _check_out(path)
     args.chosen = _chosen_poses(args, settings, row)
     console = Console(color=not args.no_color)
     operator = choose_operator(args.operator_script, is_fake=args.fake)
-    fake = FakeOptions(args.fast, seed=1) if args.fake else None
+    fake = FakeOptions(args.fast, args.seed, args.friction) if args.fake else None
     rig = connect_rig(settings, row, fake)
     kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")
@@ -93,6 +106,35 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     result = guide.run(args.poses, args.chosen, is_forced=args.force)
     write_new_text(out, gravity_to_toml(result))
     _say_use(console_loop, out, '[gravity] model = "calibrated"', "rig.toml")
+
+
+def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
+    from experiments.calibrating import FrictionGuide
+    from experiments.session import write_new_text
+    from wam.calibration import friction_to_toml, truth_to_toml
+    from wam.model import friction_of
+
+    rig = console_loop.rig
+    result = FrictionGuide(console_loop).run(is_forced=args.force)
+    write_new_text(out, friction_to_toml(result, rig.model.constants))
+    console_loop.console.say(f"Written: {out}.")
+    if rig.simulation is None:
+        return
+    true = friction_of(rig.simulation.friction())
+    load_at = result.fit.friction.load_at
+    text = truth_to_toml(true, load_at, rig.model.constants)
+    write_new_text(_truth_path(out), text)
+    console_loop.console.say(f"What the simulated arm really has: {_truth_path(out)}.")
+
+
+def _truth_path(out: Path) -> Path:
+    return out.with_name(f"{out.name.split('.')[0]}.truth{out.suffix}")
+
+
+def _written(args: argparse.Namespace, out: Path) -> list[Path]:
+    """Return the files that the calibration will write."""
+    has_truth = args.fake and args.what == "friction"
+    return [out, _truth_path(out)] if has_truth else [out]
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
@@ -136,7 +178,13 @@ def _say_use(console_loop: ConsoleLoop, out: Path, line: str, file: str) -> None
     console_loop.console.say(f"Written: {out}. To use it: {line} of {file}.")
 
 
-_WORK = {"gravity": _gravity, "sensor": _sensor, "foot": _sensor, "terrain": _terrain}
+_WORK = {
+    "gravity": _gravity,
+    "friction": _friction,
+    "sensor": _sensor,
+    "foot": _sensor,
+    "terrain": _terrain,
+}
 _FEWEST = {"gravity": 3, "sensor": 6, "foot": 6}  # poses
 
 
@@ -146,6 +194,8 @@ def _without_old(
     """Return settings and row without the calibration that is made anew."""
     if what == "gravity":
         return settings.by_cad(), row
+    if what == "friction":
+        return settings, row
     if what == "terrain":
         bare = row.model_copy(update={"calibration": None})
         return settings.with_row(bare), bare
@@ -157,6 +207,7 @@ def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> 
     from experiments.rig import gravity_path
 
     names = {
+        "friction": "friction.toml",
         "sensor": "ft_sensor.toml",
         "foot": f"foot_{row.foot}.toml",
         "terrain": f"terrain_{row.name}.toml",
@@ -174,6 +225,11 @@ def _check_arguments(args: argparse.Namespace) -> None:
     if not args.fake and (args.fast or args.operator_script):
         raise SettingsError(
             "--fast and --operator-script work only with --fake.", hint=nothing
+        )
+    if not 0.0 <= args.friction <= 2.0:
+        raise SettingsError(
+            f"--friction {args.friction:g} - expected a number 0..2, e.g. 0.4.",
+            hint=nothing,
         )
     fewest = _FEWEST.get(args.what, 0)
     if not fewest <= args.poses <= _MOST:

@@ -106,7 +106,7 @@ def stepped(
         model.constants,
         tool_of(fields["tool"]),
         clock,
-        options=PlantOptions(friction=fields["friction"]),
+        options=PlantOptions(friction=fields["friction"], seed=world.seed),
     )
     clock.attach(simulation)
     link = build_link(simulation.bus, shared, clock)

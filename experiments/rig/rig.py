@@ -50,6 +50,7 @@ class Rig:
         backend: serves bus, sensor and loop.
         shared: the memory that the processes share.
         model: the arm with its tool.
+        law_model: the same as the control law weighs it.
         payload: what the sensor carries, not tared.
         tared: the same with the bias of the newest tare.
         tared_ns: when that was taken [ns]; 0 = never.
@@ -65,6 +66,7 @@ class Rig:
     backend: RigBackend
     shared: SharedLayout
     model: ArmModel
+    law_model: ArmModel
     payload: Payload
     tared: Payload
     frame: TerrainFrame
@@ -120,6 +122,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         backend=backend,
         shared=shared,
         model=model,
+        law_model=law_model,
         payload=payload,
         tared=payload,
         frame=terrain_frame(row),

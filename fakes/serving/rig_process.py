@@ -177,7 +177,7 @@ def main(station: ChildContext) -> None:
             load_constants(),
             tool_of(settings["tool"]),
             clock,
-            PlantOptions(friction=settings["friction"]),
+            PlantOptions(settings["friction"], seed=settings["scene"]["seed"]),
         )
         simulation = LocalSimulation(rig, PACES[settings["pace"]])
         RigServer(simulation, clock, folder, station.channel).serve()

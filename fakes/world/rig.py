@@ -124,8 +124,7 @@ class FakeRig:
         self._clock = clock
         model = ArmModel(constants, tool)
         q = solve_start(model, scene.frame, scene.start_q, _START_HEIGHT)
-        drawn = replace(options or PlantOptions(), seed=scene.seed)
-        self.plant = ArmPlant(constants, tool, scene.frame, q, drawn)
+        self.plant = ArmPlant(constants, tool, scene.frame, q, options)
         self.plant.t_ns = clock.now_ns() // PERIOD_NS * PERIOD_NS
         chosen = replace(network or NetworkOptions(), mt=constants.mt)
         if scene.sensor.is_on_bus:
@@ -227,8 +226,6 @@ def _place(number: int, travel: float) -> tuple[float, float]:
 class LocalSimulation:
     """What only the simulation can be asked: hand, pendant, bed, faults, truth.
 
-    The drivers never see it; experiments.rig.rig owns it.
-
     Attributes:
         rig: the simulated rig.
     """
@@ -270,8 +267,7 @@ class LocalSimulation:
         points between them.
         """
         x, y = _place(number, self.rig.scene.frame.travel)
-        ground = self.rig.ground.surface(x)
-        self.rig.plant.hand.touch(x, y, ground)
+        self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
 
     def push(self) -> None:
         """Let the hand push the foot across."""
@@ -296,5 +292,8 @@ class LocalSimulation:
 
     def parameters(self) -> dict[str, str]:
         """Return the true parameters of the ground as strings."""
-        values = self.rig.ground.truth()
-        return {name: f"{value:.9g}" for name, value in values.items()}
+        return {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
+
+    def friction(self) -> dict[str, list[float]]:
+        """Return the true friction of the motors, by the names of its model."""
+        return self.rig.plant.friction.metadata()

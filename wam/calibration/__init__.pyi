@@ -1,4 +1,20 @@
+from .excitation import FrictionLeg, LegUse, plan_friction
 from .free_space import FreeSpace, check_poses
+from .friction_file import (
+    FrictionCalibration,
+    friction_from_toml,
+    friction_to_toml,
+    truth_to_toml,
+)
+from .friction_fit import (
+    FrictionFit,
+    check_friction,
+    fit_friction,
+    joint_asymmetry,
+    joint_breakaway,
+    joint_deviation,
+    speed_curve,
+)
 from .gravity_file import (
     GravityCalibration,
     fits_tool,
@@ -14,19 +30,37 @@ from .poses import (
     tilted_pair,
     way_seconds,
 )
+from .sliding import RecordedLeg, SlidingRows, sliding_rows
 
 __all__ = [
     "APPROACH_SPEED",
     "FreeSpace",
+    "FrictionCalibration",
+    "FrictionFit",
+    "FrictionLeg",
     "GravityCalibration",
+    "LegUse",
     "MeasurementPose",
+    "RecordedLeg",
+    "SlidingRows",
+    "check_friction",
     "check_poses",
     "choose_orientations",
     "choose_poses",
+    "fit_friction",
     "fits_tool",
+    "friction_from_toml",
+    "friction_to_toml",
     "gravity_from_toml",
     "gravity_to_toml",
+    "joint_asymmetry",
+    "joint_breakaway",
+    "joint_deviation",
+    "plan_friction",
     "plan_halts",
+    "sliding_rows",
+    "speed_curve",
     "tilted_pair",
+    "truth_to_toml",
     "way_seconds",
 ]

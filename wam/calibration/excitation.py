@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 
@@ -51,11 +52,6 @@ class FrictionLeg:
     halt: MeasurementPose
     use: LegUse
 
-    @property
-    def is_slow(self) -> bool:
-        """Whether it shows where motors break away."""
-        return self.halt.speed <= SLOW
-
 
 def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[FrictionLeg]:
     """Return the legs from `start` [rad], shape (7,), and back to it.
@@ -77,11 +73,14 @@ def plan_friction(model: ArmModel, start: Array, space: FreeSpace) -> list[Frict
     way += _check_way(centres[0])
     way += [(np.array(UPRIGHT), 0.5, LegUse.TRANSIT), (start, 0.5, LegUse.TRANSIT)]
     legs: list[FrictionLeg] = []
-    here = start
-    for number, (goal, speed, use) in enumerate(way):
+    here, pose = start, -1
+    for goal, speed, use in way:
+        was_transit = not legs or legs[-1].use is LegUse.TRANSIT
+        is_transit = use is LegUse.TRANSIT
+        pose += was_transit and not is_transit
         slower = min(speed, leg_speed(model, here, goal))
-        pose = None if use is LegUse.TRANSIT else number
-        legs.append(FrictionLeg(MeasurementPose(goal, slower, pose), use))
+        halt = MeasurementPose(goal, slower, None if is_transit else pose)
+        legs.append(FrictionLeg(halt, use))
         here = goal
     return legs
 
@@ -164,5 +163,4 @@ def _has_room(model: ArmModel, centre: Array, space: FreeSpace) -> bool:
         return False
     if not space.is_clear(model, upright, centre):
         return False
-    pairs = zip(ends[:-1], ends[1:], strict=True)
-    return all(space.is_clear(model, here, goal) for here, goal in pairs)
+    return all(space.is_clear(model, here, goal) for here, goal in pairwise(ends))

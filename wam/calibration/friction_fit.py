@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import SettingsError
 from wam.calibration.sliding import SlidingRows
@@ -32,18 +33,17 @@ FEWEST = 60  # rows of a motor, in each sense a quarter of them
 _STRIBECK = np.geomspace(0.005, 0.08, 13)  # rad/s of the joint
 _EXCESS = np.linspace(0.0, 0.7, 15)  # s - 1
 _SIGMAS = 1.96
-# Priors: standard deviations of what a short way shows badly.
-_LOAD = 0.03  # N m per N m
+_LOAD = 0.03  # N m per N m; this and the next two: deviations of priors
 _RIPPLE = 0.1  # of Coulomb friction
 _INERTIA = 0.1  # of the model's
-_BREAK_AWAY_WEIGHT = 3.0  # of one peak against one row of sliding
+_PEAK_WEIGHT = 3.0  # of one break-away against one row of sliding
 _NOISE = 0.03  # of Coulomb friction: rows are not known better
 _COLUMNS = 7  # F_c, F_a, mu, r_s, r_c, b, inertia; then gravity
 
 
 @dataclass(frozen=True, slots=True)
 class FrictionFit:
-    """Friction as identified, with what it leaves unexplained.
+    """Friction as identified.
 
     Attributes:
         friction: of the motors.
@@ -67,7 +67,7 @@ class FrictionFit:
 
 @dataclass(frozen=True, slots=True)
 class _MotorFit:
-    """One motor: its nonlinear pair, the linear numbers and their covariance."""
+    """One motor."""
 
     stribeck: float
     excess: float
@@ -93,16 +93,33 @@ def fit_friction(
     Raises:
         SettingsError: a motor did not slide enough either way.
     """
-    turns = motor_turns(constants)
     for motor, shown in enumerate(rows, 1):
         _check_enough(motor, shown)
+    turns = motor_turns(constants)
     fits = [
         _fit_motor(shown, float(scale), gravity_deviation)
         for shown, scale in zip(rows, turns, strict=True)
     ]
+    friction = _friction_of(fits, turns)
+    residual = _residuals(friction, fits, held_out)
+    # What another way does not confirm is no noise: it does not average out.
+    doubt = (residual * friction.coulomb)[:, None]
+    random = np.sqrt([np.diag(fit.covariance)[:2] for fit in fits])
+    deviations = np.hypot(random, doubt)
+    return FrictionFit(
+        friction=friction,
+        deviation=deviations[:, 0],
+        asymmetry_deviation=deviations[:, 1],
+        residual=residual,
+        rows=tuple(len(shown) for shown in rows),
+    )
+
+
+def _friction_of(fits: Sequence[_MotorFit], turns: Array) -> MotorFriction:
+    """Return the fits in the form of the model; presliding is ASSUMED, 2 mrad."""
     values = np.array([fit.values[:_COLUMNS] for fit in fits])
     coulomb = values[:, 0]
-    friction = MotorFriction(
+    return MotorFriction(
         coulomb=coulomb,
         asymmetry=values[:, 1],
         load=np.maximum(values[:, 2], 0.0),
@@ -114,14 +131,6 @@ def fit_friction(
         ripple_cos=values[:, 4] / coulomb,
         presliding=2e-3 * turns,
     )
-    deviations = np.sqrt([np.diag(fit.covariance)[:2] for fit in fits])
-    return FrictionFit(
-        friction=friction,
-        deviation=deviations[:, 0],
-        asymmetry_deviation=deviations[:, 1],
-        residual=_residuals(friction, fits, held_out),
-        rows=tuple(len(shown) for shown in rows),
-    )
 
 
 def check_friction(fit: FrictionFit) -> None:
@@ -130,7 +139,7 @@ def check_friction(fit: FrictionFit) -> None:
     Raises:
         SettingsError: the held-out way contradicts it, or it is hardly known.
     """
-    hint = "Nobody may touch the arm. Is the gravity calibration of this foot?"
+    hint = "Nobody may touch the arm. Is its gravity that of this foot?"
     worst = int(fit.residual.argmax())
     if not fit.residual[worst] <= LARGEST_RESIDUAL:
         raise SettingsError(
@@ -185,8 +194,7 @@ def joint_breakaway(constants: ArmConstants, friction: MotorFriction) -> Array:
 
 
 def _check_enough(motor: int, rows: SlidingRows) -> None:
-    forwards = int((rows.sense > 0.0).sum())
-    fewer = min(forwards, len(rows) - forwards)
+    fewer = min(int((rows.sense > 0.0).sum()), int((rows.sense < 0.0).sum()))
     if len(rows) >= FEWEST and fewer >= FEWEST // 4:
         return
     raise SettingsError(
@@ -240,7 +248,7 @@ def _system(
     scale, gravity = known
     A = _columns(rows, pair, load_at)
     weights = 1.0 / np.hypot(_NOISE * scale, _INERTIA * rows.inertia)
-    weights *= np.where(rows.speed == 0.0, _BREAK_AWAY_WEIGHT, 1.0)
+    weights *= np.where(rows.speed == 0.0, _PEAK_WEIGHT, 1.0)
     ripple = 1.0 / (_RIPPLE * scale) ** 2
     loose = [0.0, 0.0, 1.0 / _LOAD**2, ripple, ripple, 0.0, 1.0 / _INERTIA**2]
     prior = np.concatenate([loose, 1.0 / np.maximum(gravity, 1e-9) ** 2])
@@ -267,10 +275,10 @@ def _columns(rows: SlidingRows, pair: tuple[float, float], load_at: float) -> Ar
 def _solve(A: Array, y: Array, prior: Array) -> tuple[Array, Array]:
     """Return the values and the matrix of the normal equations."""
     normal = A.T @ A + np.diag(prior + 1e-12)
-    return np.linalg.solve(normal, A.T @ y), normal
+    return np.asarray(np.linalg.solve(normal, A.T @ y), dtype=np.float64), normal
 
 
-def _sandwich(A: Array, rest: Array, block: Array, normal: Array) -> Array:
+def _sandwich(A: Array, rest: Array, block: NDArray[np.int64], normal: Array) -> Array:
     """Return the covariance of the values, residuals being alike within a block."""
     names, which = np.unique(block, return_inverse=True)
     scores = np.zeros((len(names), A.shape[1]))
@@ -283,7 +291,7 @@ def _sandwich(A: Array, rest: Array, block: Array, normal: Array) -> Array:
 def _residuals(
     friction: MotorFriction, fits: Sequence[_MotorFit], rows: Sequence[SlidingRows]
 ) -> Array:
-    """Return the rms of what is unexplained on `rows`, shares of Coulomb, shape (7,)."""
+    """Return what `rows` leave unexplained, rms as share of Coulomb, shape (7,)."""
     shares: list[float] = []
     for coulomb, fit, shown in zip(friction.coulomb, fits, rows, strict=True):
         A = _columns(shown, (fit.stribeck, fit.excess), fit.load_at)

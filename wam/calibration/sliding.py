@@ -1,4 +1,4 @@
-"""From recorded cycles to what each motor does while it slides, and when it breaks away."""
+"""From recorded cycles to what resists each motor as it slides and breaks away."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import PERIOD_NS
+from wam.calibration.excitation import SLOW
 from wam.model import ArmModel, Array, motor_turns, regressor
 
 HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
@@ -26,12 +27,12 @@ class RecordedLeg:
     Attributes:
         q: joint positions [rad], shape (n, 7).
         tau: joint torques as sent [N m], shape (n, 7).
-        is_slow: it begins slowly enough to show where motors break away.
+        speed: at which the quickest joint was sent [rad/s].
     """
 
     q: NDArray[np.float64]
     tau: NDArray[np.float64]
-    is_slow: bool
+    speed: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +149,7 @@ def _of_motor(
     v = speed[rows]
     sense = np.where(v < 0.0, -1.0, 1.0)
     friction = motion.friction[rows, motor]
-    if leg.is_slow:
+    if leg.speed <= SLOW:
         broken = _break_away(motion, motor, turns)
         if broken is not None:
             index, way = broken
@@ -179,7 +180,7 @@ def _is_sliding(
     fast = np.abs(speed) > slowest
     for i in range(int(rows[-1]) + 1):
         now = float(np.sign(speed[i])) if fast[i] else 0.0
-        if now != 0.0 and now != way:
+        if now not in {0.0, way}:
             way, turned_at = now, float(angle[i])
         if i == rows[k]:
             is_far = abs(float(angle[i]) - turned_at) > far
@@ -189,9 +190,7 @@ def _is_sliding(
     return is_sliding
 
 
-def _break_away(
-    motion: _Motion, motor: int, turns: float
-) -> tuple[int, float] | None:
+def _break_away(motion: _Motion, motor: int, turns: float) -> tuple[int, float] | None:
     """Return (sample, sense) where the motor resisted most before it turned."""
     moved = motion.angle[:, motor] - motion.angle[0, motor]
     beyond = np.flatnonzero(np.abs(moved) > float(_BREAKING[motor]) * turns)

@@ -12,6 +12,7 @@ from .constants import GRAVITY, ArmConstants, Array, Body, load_constants
 from .friction import (
     ELASTIC,
     MotorFriction,
+    friction_of,
     joint_coulomb,
     motor_shares,
     motor_turns,
@@ -53,6 +54,7 @@ __all__ = [
     "compensation",
     "drive_inertia_matrix",
     "fit_moments",
+    "friction_of",
     "gravity_model",
     "joint_coulomb",
     "load_constants",

@@ -12,12 +12,14 @@ elasto-plastic model of Dupont, Hayward, Armstrong and Altpeter: its deflection 
 the motion by 1 - alpha |z|, z in units of the deflection at which it slides.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from wam.model.constants import ArmConstants, Array
 
+_LARGEST = 1e4  # of any parameter
 ELASTIC = 0.7  # share of the sliding deflection below which a bristle only bends
 
 
@@ -49,6 +51,12 @@ class MotorFriction:
     ripple_cos: Array
     presliding: Array
 
+    def metadata(self) -> dict[str, list[float]]:
+        """Return the parameters in plain values, by name."""
+        return {
+            field.name: getattr(self, field.name).tolist() for field in fields(self)
+        }
+
     def dry(self, angle: Array, tau: Array, sense: Array) -> Array:
         """Return the dry friction of fast sliding [N m], shape (..., 7), above 0.
 
@@ -74,6 +82,31 @@ class MotorFriction:
         sense = np.where(speed < 0.0, -1.0, 1.0)
         dry = self.dry(angle, tau, sense) * (1.0 + excess)
         return sense * dry + self.viscous * speed
+
+
+def friction_of(metadata: Mapping[str, object]) -> MotorFriction:
+    """Return the friction that `MotorFriction.metadata` describes.
+
+    Raises:
+        KeyError: a parameter is missing.
+        ValueError: one has not seven finite numbers, or cannot be true.
+    """
+    friction = MotorFriction(
+        **{field.name: _seven(metadata[field.name]) for field in fields(MotorFriction)}
+    )
+    above_0 = (friction.coulomb, friction.stribeck, friction.presliding)
+    if min(float(column.min()) for column in above_0) <= 0.0:
+        raise ValueError("coulomb, stribeck and presliding are above 0")
+    if float(friction.breakaway.min()) < 1.0:
+        raise ValueError("breakaway is 1 or more")
+    return friction
+
+
+def _seven(value: object) -> Array:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != (7,) or not bool((np.abs(array) < _LARGEST).all()):
+        raise ValueError("expected seven finite numbers")
+    return array
 
 
 def plastic_share(deflection: float) -> float:

@@ -1,0 +1,151 @@
+"""A calibration of friction as TOML: what was identified, and how well."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from acquisition import SettingsError, parse_toml
+from wam.calibration.friction_fit import (
+    FrictionFit,
+    joint_asymmetry,
+    joint_breakaway,
+    joint_deviation,
+)
+from wam.model import ArmConstants, Array, MotorFriction, friction_of, joint_coulomb
+
+_LARGEST = 1e4  # of any number in the file
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionCalibration:
+    """Friction of an arm as identified.
+
+    Attributes:
+        fit: friction of the motors and how well it is known.
+        foot: name of the foot that was on.
+        gravity: which gravity was subtracted: cad, shipped or calibrated.
+        measured_utc: when.
+        is_simulated: the arm was a simulated one.
+    """
+
+    fit: FrictionFit
+    foot: str
+    gravity: str
+    measured_utc: str
+    is_simulated: bool
+
+
+def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) -> str:
+    """Return the text of a calibration file."""
+    fit = calibration.fit
+    deviation = joint_deviation(constants, fit.deviation)
+    bound = joint_coulomb(constants, fit.lower_bound)
+    return (
+        "# Friction of this arm as identified. SI units.\n"
+        f'foot = "{calibration.foot}"\n'
+        f'gravity = "{calibration.gravity}"\n'
+        f'measured_utc = "{calibration.measured_utc}"\n'
+        f"is_simulated = {str(calibration.is_simulated).lower()}\n"
+        f"{_joint_lines(constants, fit.friction)}"
+        f"{_line('coulomb_deviation', deviation)}"
+        f"{_line('coulomb_lower_bound', bound)}"
+        "\n# At the motors 1 to 7.\n[motors]\n"
+        f"{_motor_lines(fit.friction)}"
+        "\n# How well the motors are known; residuals are shares of Coulomb friction.\n"
+        "[fit]\n"
+        f"{_line('deviation', fit.deviation)}"
+        f"{_line('asymmetry_deviation', fit.asymmetry_deviation)}"
+        f"{_line('residual', fit.residual)}"
+        f"rows = {list(fit.rows)}\n"
+    )
+
+
+def truth_to_toml(
+    friction: MotorFriction, load_at: Array, constants: ArmConstants
+) -> str:
+    """Return what a simulated arm really has, in the layout of a calibration.
+
+    Args:
+        friction: of the simulated motors.
+        load_at: torques at which a calibration states Coulomb friction [N m], (7,).
+        constants: of the arm.
+    """
+    moved = friction.load * (load_at - friction.load_at)
+    there = replace(friction, coulomb=friction.coulomb + moved, load_at=load_at)
+    return (
+        "# Friction that the simulated arm really has. SI units.\n"
+        "is_simulated = true\n"
+        f"{_joint_lines(constants, there)}"
+        "\n# At the motors 1 to 7.\n[motors]\n"
+        f"{_motor_lines(there)}"
+    )
+
+
+def friction_from_toml(text: str, name: str) -> FrictionCalibration:
+    """Return the calibration of a file called `name`.
+
+    Raises:
+        SettingsError: the text is no calibration of friction.
+    """
+    try:
+        table = parse_toml(text)
+        if not isinstance(table["is_simulated"], bool):
+            raise TypeError("is_simulated is neither true nor false")
+        return FrictionCalibration(
+            fit=_fit(table["motors"], table["fit"]),
+            foot=str(table["foot"]),
+            gravity=str(table["gravity"]),
+            measured_utc=str(table["measured_utc"]),
+            is_simulated=table["is_simulated"],
+        )
+    except KeyError as error:
+        raise _wrong(name, f"{error.args[0]} is missing") from error
+    except (TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise _wrong(name, str(error)) from error
+
+
+def _fit(motors: dict[str, Any], quality: dict[str, Any]) -> FrictionFit:
+    friction = friction_of(motors)
+    rows = _seven(quality["rows"])
+    return FrictionFit(
+        friction=friction,
+        deviation=_seven(quality["deviation"]),
+        asymmetry_deviation=_seven(quality["asymmetry_deviation"]),
+        residual=_seven(quality["residual"]),
+        rows=tuple(int(count) for count in rows.tolist()),
+    )
+
+
+def _joint_lines(constants: ArmConstants, friction: MotorFriction) -> str:
+    """Return what a joint that turns alone meets [N m], joints 1 to 7."""
+    lines = {
+        "coulomb": joint_coulomb(constants, friction.coulomb),
+        "asymmetry": joint_asymmetry(constants, friction.asymmetry),
+        "breakaway": joint_breakaway(constants, friction),
+    }
+    text = "".join(_line(name, values) for name, values in lines.items())
+    return f"# At the joints 1 to 7, each turning alone [N m].\n{text}"
+
+
+def _motor_lines(friction: MotorFriction) -> str:
+    values = friction.metadata()
+    return "".join(f"{name} = {numbers}\n" for name, numbers in values.items())
+
+
+def _line(name: str, values: Array) -> str:
+    return f"{name} = {values.tolist()}\n"
+
+
+def _seven(value: object) -> Array:
+    array = np.array(value, dtype=np.float64)
+    if array.shape != (7,) or not bool((np.abs(array) < _LARGEST).all()):
+        raise ValueError("expected seven finite numbers")
+    return array
+
+
+def _wrong(name: str, what: str) -> SettingsError:
+    return SettingsError(
+        f"{name} is no calibration of friction: {what}.",
+        hint="Make one with: traction calibrate friction. Nothing was started.",
+    )
