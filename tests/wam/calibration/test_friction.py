@@ -1,0 +1,300 @@
+"""Identification of friction: the way, the reduction, the fit, the file."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from acquisition.errors import SettingsError
+from tests.wam.model.test_friction import example
+from wam.calibration.excitation import LegUse, plan_friction
+from wam.calibration.free_space import UPRIGHT, FreeSpace
+from wam.calibration.friction_file import (
+    FrictionCalibration,
+    friction_from_toml,
+    friction_to_toml,
+    truth_to_toml,
+)
+from wam.calibration.friction_fit import (
+    check_friction,
+    fit_friction,
+    joint_asymmetry,
+    joint_breakaway,
+    speed_curve,
+)
+from wam.calibration.poses import POINT_SPEED
+from wam.calibration.sliding import RecordedLeg, SlidingRows, sliding_rows
+from wam.control.position_control import JointMove
+from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
+from wam.model.friction import MotorFriction, joint_coulomb, motor_turns
+
+CONSTANTS = load_constants()
+TURNS = motor_turns(CONSTANTS)
+SPACE = FreeSpace(0.33)
+IN_CONTAINER = np.array([0.0, 0.7, 0.0, 1.25, 0.0, 1.15, 0.0])
+KNOWN = np.full(21, 0.02)  # kg m
+HEAVIER = np.random.default_rng(0).normal(0.0, 0.01, 21)  # than the model [kg m]
+BLOCK = 100  # rows whose residuals are alike
+
+
+@pytest.fixture(scope="module")
+def model(example_tool):
+    return ArmModel(load_constants(), example_tool)
+
+
+@pytest.fixture(scope="module")
+def legs(model):
+    return plan_friction(model, IN_CONTAINER, SPACE)
+
+
+def truth():
+    return replace(
+        example(),
+        coulomb=np.array([0.06, 0.045, 0.044, 0.06, 0.02, 0.021, 0.0067]),
+        asymmetry=np.array([0.004, -0.002, 0.003, 0.0, 0.001, -0.001, 0.0003]),
+        stribeck=0.02 * TURNS,
+        breakaway=np.array([1.2, 1.1, 1.3, 1.25, 1.15, 1.35, 1.2]),
+        presliding=2e-3 * TURNS,
+    )
+
+
+def rows_of(friction, seed, *, noise=0.02, correlated=False, count=2000):
+    """Return rows as the motors would show them; noise as a share of Coulomb."""
+    rng = np.random.default_rng(seed)
+    speed = (
+        rng.choice([-1.0, 1.0], (count, 7)) * rng.uniform(0.004, 0.5, (count, 7)) ** 2
+    )
+    speed = np.where(rng.random((count, 7)) < 0.03, 1e-9 * speed, speed * TURNS)
+    angle = rng.uniform(-20.0, 20.0, (count, 7))
+    borne = rng.uniform(-0.4, 0.4, (count, 7))
+    inertia = 0.05 * friction.coulomb * rng.standard_normal((count, 7))
+    gravity = rng.standard_normal((count, 7, 21)) / TURNS[:, None]
+    error = rng.standard_normal((count, 7))
+    if correlated:
+        error = np.repeat(error[:: BLOCK // 2], BLOCK // 2, axis=0)
+    shown = friction.steady(angle, borne, speed) + gravity @ HEAVIER
+    shown += noise * friction.coulomb * error
+    return [
+        SlidingRows(
+            angle=angle[:, i],
+            speed=np.where(np.abs(speed[:, i]) < 1e-6, 0.0, speed[:, i]),
+            sense=np.where(speed[:, i] < 0.0, -1.0, 1.0),
+            borne=borne[:, i],
+            friction=shown[:, i],
+            inertia=inertia[:, i],
+            gravity=gravity[:, i],
+            block=np.arange(count) // BLOCK,
+        )
+        for i in range(7)
+    ]
+
+
+@pytest.fixture(scope="module")
+def fit():
+    return fit_friction(CONSTANTS, rows_of(truth(), 1), rows_of(truth(), 2), KNOWN)
+
+
+def at_load(friction, load_at):
+    growth = friction.load * (load_at - friction.load_at)
+    return replace(friction, coulomb=friction.coulomb + growth, load_at=load_at)
+
+
+def test_friction_is_recovered_from_rows(fit):
+    found, wanted = fit.friction, at_load(truth(), fit.friction.load_at)
+    assert found.coulomb == pytest.approx(wanted.coulomb, rel=0.02)
+    error = np.abs(found.asymmetry - wanted.asymmetry)
+    assert (error < 0.02 * wanted.coulomb).all()
+    assert found.load == pytest.approx(wanted.load, abs=0.01)
+    ripple = np.hypot(
+        found.ripple_sin - wanted.ripple_sin, found.ripple_cos - wanted.ripple_cos
+    )
+    assert ripple.max() < 0.01
+    assert joint_breakaway(CONSTANTS, found) == pytest.approx(
+        joint_breakaway(CONSTANTS, wanted), rel=0.03
+    )
+    speeds = np.geomspace(0.01, 0.4, 20)
+    for joint in range(7):
+        curves = [speed_curve(CONSTANTS, f, joint, speeds) for f in (found, wanted)]
+        assert curves[0] == pytest.approx(curves[1], rel=0.04)
+    check_friction(fit)
+
+
+def test_intervals_hold_the_true_coulomb_friction(fit):
+    error = np.abs(
+        fit.friction.coulomb - at_load(truth(), fit.friction.load_at).coulomb
+    )
+    assert (error < 3.0 * fit.deviation).all()
+    assert (fit.lower_bound < fit.friction.coulomb).all()
+
+
+def test_residuals_that_are_alike_within_a_block_widen_the_interval():
+    quiet = rows_of(truth(), 4, noise=1e-4)
+    wide, narrow = (
+        fit_friction(
+            CONSTANTS, rows_of(truth(), 3, noise=0.1, correlated=alike), quiet, KNOWN
+        )
+        for alike in (True, False)
+    )
+    # fifty rows that are alike tell as much as one
+    assert np.median(wide.asymmetry_deviation / narrow.asymmetry_deviation) > 1.3
+
+
+def test_a_friction_of_another_form_is_refused():
+    held_out = rows_of(truth(), 2)
+    other = [
+        replace(r, friction=r.friction * (1 + 0.5 * np.sin(r.borne * 9)))
+        for r in held_out
+    ]
+    with pytest.raises(SettingsError, match="not of this form"):
+        check_friction(fit_friction(CONSTANTS, rows_of(truth(), 1), other, KNOWN))
+
+
+def test_a_motor_that_did_not_slide_both_ways_is_named():
+    rows = rows_of(truth(), 1)
+    forwards = rows[3].sense > 0.0
+    columns = {n: getattr(rows[3], n)[forwards] for n in SlidingRows.__slots__}
+    rows[3] = SlidingRows(**columns)
+    with pytest.raises(SettingsError, match="Motor 4"):
+        fit_friction(CONSTANTS, rows, rows_of(truth(), 2), KNOWN)
+
+
+def test_the_way_takes_less_than_six_minutes(legs):
+    here, seconds = IN_CONTAINER, 0.0
+    for leg in legs:
+        move = JointMove(here, leg.halt.q, leg.halt.speed)
+        seconds += move.duration + 0.54  # the arm settles after each move
+        here = leg.halt.q
+    assert 120.0 < seconds < 360.0
+
+
+def test_the_way_begins_and_ends_where_the_arm_stands_and_rises_first(legs):
+    assert (legs[-1].halt.q == IN_CONTAINER).all()
+    assert (legs[0].halt.q == UPRIGHT).all()
+
+
+def test_no_leg_is_too_fast_or_comes_too_low(model, legs):
+    ends = [IN_CONTAINER, *(leg.halt.q for leg in legs)]
+    for (here, goal), leg in zip(pairwise(ends), legs, strict=True):
+        move = JointMove(here, goal, leg.halt.speed)
+        steps = [move.at(t)[0] for t in np.arange(0.0, move.duration, 0.1)]
+        sole = model.sole_path(np.array([*steps, goal])).position
+        speed = np.linalg.norm(np.diff(sole, axis=0), axis=1) / 0.1
+        assert (speed < 1.1 * POINT_SPEED).all()
+        if leg.use is not LegUse.TRANSIT:
+            assert SPACE.is_clear(model, here, goal)
+            assert sole[:, 2].min() > SPACE.floor
+
+
+def test_every_motor_turns_both_ways_slowly_and_fast(legs):
+    turned = {}
+    for before, leg in pairwise(legs):
+        if leg.use is LegUse.TRANSIT:
+            continue
+        way = CONSTANTS.j2mp @ (leg.halt.q - before.halt.q) / TURNS
+        rate = leg.halt.speed * way / np.abs(leg.halt.q - before.halt.q).max()
+        for motor in np.flatnonzero(np.abs(rate) > 1e-9):
+            turned.setdefault(int(motor), []).append(float(rate[motor]))
+    for motor in range(7):
+        rates = np.array(turned[motor])
+        for side in (rates[rates > 0.0], -rates[rates < 0.0]):
+            assert side.min() < 0.01
+            assert side.max() > 0.1
+
+
+def test_a_held_out_way_is_none_of_those_that_are_fitted(legs):
+    ways = {use: set() for use in LegUse}
+    for before, leg in pairwise(legs):
+        ways[leg.use].add(tuple(np.round(leg.halt.q - before.halt.q, 6)))
+    assert ways[LegUse.HELD_OUT]
+    assert not ways[LegUse.HELD_OUT] & ways[LegUse.FIT]
+
+
+def test_no_room_around_the_arm_is_refused(model):
+    with pytest.raises(SettingsError, match="poses"):
+        plan_friction(model, np.array(UPRIGHT), FreeSpace(0.62))
+
+
+def leg_of(model, motor_torque, way):
+    """Return a leg at 0.1 rad/s of joint 4 to one side and back."""
+    t = np.arange(2000) * 0.002
+    shift = 0.1 * np.where(t < 2.0, t, 4.0 - t)
+    q = np.array(UPRIGHT) + shift[:, None] * np.eye(7)[3]
+    sense = np.where(t < 2.0, 1.0, -1.0)
+    tau = np.array([model.gravity(row) for row in q])
+    tau[:, 3] += 18.0 * motor_torque * sense * way
+    return RecordedLeg(q, tau, 0.1)
+
+
+def test_rows_show_what_weight_does_not_explain_at_the_motor(model):
+    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])[3]
+    away = np.abs(np.abs(rows.friction) - 0.05)
+    assert np.abs(rows.speed) == pytest.approx(1.8, abs=0.02)
+    assert away.max() < 0.001
+    assert (np.sign(rows.friction) == rows.sense).all()
+    assert {-1.0, 1.0} == set(rows.sense)  # motor 4 turns against its joint
+
+
+def test_no_row_is_taken_before_the_bristle_is_bent_again(model):
+    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])[3]
+    turning = -18.0 * (UPRIGHT[3] + 0.2)
+    back = rows.angle[rows.sense > 0.0]
+    assert np.abs(back - turning).min() > 18.0 * 6e-3
+
+
+def test_a_motor_that_stands_shows_nothing(model):
+    rows = sliding_rows((model, model), [leg_of(model, 0.05, 1.0)])
+    assert [len(shown) for shown in rows] == [0, 0, 0, len(rows[3]), 0, 0, 0]
+
+
+def calibration(fit):
+    return FrictionCalibration(fit, "tread", "cad", "2027-01-15T08:00:00Z", True)
+
+
+def test_a_calibration_survives_its_file_bit_for_bit(fit):
+    before = calibration(fit)
+    after = friction_from_toml(friction_to_toml(before, CONSTANTS), "friction.toml")
+    assert after.fit.rows == before.fit.rows
+    for name in MotorFriction.__slots__:
+        pair = [getattr(c.fit.friction, name) for c in (before, after)]
+        assert (pair[0] == pair[1]).all()
+    names = ("foot", "gravity", "measured_utc", "is_simulated")
+    assert [getattr(after, n) for n in names] == [getattr(before, n) for n in names]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("is_simulated = true", "is_simulated = 1"),
+        ("foot =", "hand ="),
+        ("[motors]", "[other]"),
+        ("breakaway = [1", "breakaway = [-1"),
+    ],
+)
+def test_a_file_that_is_no_calibration_is_refused_by_name(fit, old, new):
+    text = friction_to_toml(calibration(fit), CONSTANTS)
+    broken = text.replace(old, new) if old != "breakaway = [1" else _worse(text)
+    assert broken != text
+    with pytest.raises(SettingsError, match=r"friction\.toml"):
+        friction_from_toml(broken, "friction.toml")
+
+
+def _worse(text):
+    head, motors = text.split("[motors]")
+    return head + "[motors]" + motors.replace("breakaway = [1", "breakaway = [-1")
+
+
+def test_truth_and_calibration_list_the_same_figures_of_the_joints(fit):
+    import tomllib
+
+    load_at = fit.friction.load_at
+    true = tomllib.loads(truth_to_toml(truth(), load_at, CONSTANTS))
+    found = tomllib.loads(friction_to_toml(calibration(fit), CONSTANTS))
+    wanted = at_load(truth(), load_at)
+    assert true["coulomb"] == pytest.approx(joint_coulomb(CONSTANTS, wanted.coulomb))
+    assert found["coulomb"] == pytest.approx(true["coulomb"], rel=0.02)
+    assert true["asymmetry"] == pytest.approx(
+        joint_asymmetry(CONSTANTS, truth().asymmetry)
+    )
+    assert true["motors"]["load_at"] == pytest.approx(load_at)
