@@ -76,7 +76,7 @@ _LEAST = 1e-9  # N m at a motor: an arm without friction has almost none
 
 
 def draw_friction(
-    constants: ArmConstants, share: float, seed: int | None
+    constants: ArmConstants, share: float, seed: int | None, load_at: Array
 ) -> MotorFriction:
     """Return the friction of a simulated arm.
 
@@ -84,6 +84,7 @@ def draw_friction(
         constants: of the arm; its figures were identified on another one.
         share: of these figures.
         seed: of the parameters that are drawn; None = the nominal ones.
+        load_at: torques that the motors bear where the figures hold [N m], shape (7,).
     """
     random = None if seed is None else friction_generator(seed)
     drawn = {row.name: row.values(random) for row in FRICTION_TABLE}
@@ -98,7 +99,7 @@ def draw_friction(
         coulomb=np.maximum(coulomb, _LEAST),
         asymmetry=coulomb * drawn["asymmetry"],
         load=share * drawn["load"],
-        load_at=np.zeros(7),
+        load_at=load_at,
         breakaway=np.minimum(drawn["breakaway"], _LARGEST_BREAKAWAY / one_way),
         stribeck=turns * drawn["stribeck"],
         viscous=viscous * drawn["viscous"],

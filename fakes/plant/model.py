@@ -45,6 +45,12 @@ def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
     return 1.0 / np.einsum("ij,jk,ik->i", constants.j2mp, inverse, constants.j2mp)
 
 
+def motor_weights(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
+    """Return what the weight puts on each motor, without sign [N m], shape (7,)."""
+    weight = pin.computeGeneralizedGravity(model, model.createData(), q)
+    return np.abs(np.linalg.solve(constants.j2mp.T, weight))
+
+
 def _stand_in(model: "pin.Model", frame: TerrainFrame) -> None:
     """Let the terrain frame be the world of the model: nothing is to be turned."""
     axes = frame.axes()

@@ -8,11 +8,10 @@ nle at q and qd + dt qdd / 2, M with drive inertia, w_s the ground's wrench at t
 w_h the hand's at the forearm, T the transmission, f the friction of the motors at qd.
 D is the diagonal of the damping of friction and stops, which is an addition to the
 armature, so one articulated-body pass solves it. What a differential adds beside the
-diagonal is taken explicitly: it is smaller than the diagonal, so steps stay stable.
+diagonal is smaller and taken explicitly: steps stay stable.
 
-Ground and dynamics go on in substeps. What changes more slowly is taken anew once in a
-cycle of 2 ms: the Jacobians, D unless a motor is fast, and the force of the hand, which
-has 10 Hz at most.
+Ground and dynamics go on in substeps. Once in a cycle of 2 ms are taken anew: the
+Jacobians, D unless a motor is fast, and the force of the hand, of 10 Hz at most.
 """
 
 from collections.abc import Sequence
@@ -28,7 +27,12 @@ from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
 from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives, JointLoads, JointState
-from fakes.plant.model import FOREARM_MASS, arm_and_hand, motor_inertia
+from fakes.plant.model import (
+    FOREARM_MASS,
+    arm_and_hand,
+    motor_inertia,
+    motor_weights,
+)
 from fakes.plant.push import HandView
 from fakes.truth import Truth
 from ft_sensor import TerrainFrame
@@ -47,8 +51,7 @@ class PlantOptions:
 
     Attributes:
         friction: share of the joint friction identified on another arm (1 = all of
-            it). A real arm's is unknown; with 0.05 of it a fifth of the slips bounce
-            back, with more than about 0.1 hardly any.
+            it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
         substeps: steps per 2 ms cycle.
         seed: draws the parameters of friction; None = the nominal ones.
     """
@@ -68,8 +71,7 @@ class ArmPlant:
         finger: force of a person who touches the foot, terrain frame [N].
         t_ns: how far the world has gone on [ns].
         truth: what really happened; None = not written down.
-        friction: of the motors.
-        stops: of the joints.
+        friction, stops: of the motors, of the joints.
     """
 
     def __init__(
@@ -88,7 +90,8 @@ class ArmPlant:
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
-        self.friction = draw_friction(constants, options.friction, options.seed)
+        borne = motor_weights(self._model, constants, q)
+        self.friction = draw_friction(constants, options.friction, options.seed, borne)
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]

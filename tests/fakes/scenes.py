@@ -20,10 +20,12 @@ MODEL = ArmModel(CONSTANTS, TOOL)
 CYCLE_NS = 2_000_000
 
 
-def make_plant(height=0.05, *, friction=0.0, substeps=4, constants=CONSTANTS):
+def make_plant(
+    height=0.05, *, friction=0.0, substeps=4, constants=CONSTANTS, seed=None
+):
     """Return a braked arm with the sole `height` [m] above the far end."""
     q = solve_start(MODEL, FRAME, START_Q, height)
-    options = PlantOptions(friction, substeps)
+    options = PlantOptions(friction, substeps, seed)
     return ArmPlant(constants, TOOL, FRAME, q, options)
 
 

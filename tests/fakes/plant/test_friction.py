@@ -14,7 +14,6 @@ from tests.fakes.scenes import (
     CYCLE_NS,
     MODEL,
     make_plant,
-    make_rig,
     release,
     send,
 )
@@ -50,11 +49,11 @@ class Motors:
 
 
 def nominal(share=1.0):
-    return draw_friction(CONSTANTS, share, None)
+    return draw_friction(CONSTANTS, share, None, np.zeros(7))
 
 
 def drawn(seed, share=1.0):
-    return draw_friction(CONSTANTS, share, seed)
+    return draw_friction(CONSTANTS, share, seed, np.zeros(7))
 
 
 def stored(friction):
@@ -84,13 +83,19 @@ def test_drawn_parameters_lie_within_the_table_and_are_those_of_the_seed():
         assert (drawn(seed + 1).coulomb != friction.coulomb).all()
 
 
-def test_the_arm_of_a_seed_is_the_same_in_every_trial_and_another_for_another_seed():
+def test_the_arm_of_a_seed_is_always_the_same_and_another_for_another_seed():
     frictions = []
     for seed in (1, 1, 2):
-        rig, _ = make_rig(seed=seed)
-        frictions.append(rig.plant.friction.coulomb.tolist())
-        rig.bus.shutdown()
+        frictions.append(make_plant(friction=1.0, seed=seed).friction.coulomb.tolist())
     assert frictions[0] == frictions[1] != frictions[2]
+
+
+def test_the_figures_of_the_share_hold_under_the_weight_of_the_arm():
+    plant = make_plant(friction=1.0, seed=3)
+    weight = np.linalg.solve(CONSTANTS.j2mp.T, MODEL.gravity(plant.q))
+    # the person's forearm hangs on the simulated arm, too
+    assert plant.friction.load_at[1:4] == pytest.approx(np.abs(weight[1:4]), rel=0.5)
+    assert plant.friction.load_at[1] > 0.1
 
 
 def test_a_joint_that_turns_alone_rubs_with_the_figures_of_the_share():
