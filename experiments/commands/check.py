@@ -92,7 +92,7 @@ def _listen(
         LinkError: the bus cannot be opened, or broke.
     """
     from acquisition import SettingsError, SystemClock
-    from wam.bus import BusTraffic, CanLink, open_bus
+    from wam.bus import BusTraffic, CanLink, open_door
 
     if is_fake:
         raise SettingsError(
@@ -105,7 +105,8 @@ def _listen(
         f"traction check --bus        {can.interface}:{can.channel} for {seconds:g} s, "
         "nothing is sent"
     )
-    link = CanLink(open_bus(can.interface, can.channel, can.bitrate), traffic)
+    door = open_door(can.interface, can.channel, can.bitrate, clock)
+    link = CanLink(door, traffic)
     try:
         deadline_ns = clock.now_ns() + round(seconds * 1e9)
         while clock.now_ns() < deadline_ns:

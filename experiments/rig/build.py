@@ -22,7 +22,7 @@ from experiments.settings import FootSection, RigSettings, TerrainRow, build_dev
 from ft_sensor import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
 from ft_sensor.vendors import BarrettSensor
-from wam.bus import CanBus, CanLink, FrameTap
+from wam.bus import CanLink, Door, FrameTap
 from wam.control import FootController, LockGains, SoftWalls, Walls
 from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
 from wam.model import ArmConstants, ArmModel, Body, Tool, sensor_body
@@ -85,9 +85,9 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
 
 
-def build_link(bus: CanBus, shared: SharedLayout, clock: Clock) -> CanLink:
-    """Return the link to a bus; every frame goes into the shared memory too."""
-    return CanLink(bus, FrameTap(FrameTape(shared.frames), clock))
+def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
+    """Return the link through a door; every frame goes into the shared memory too."""
+    return CanLink(door, FrameTap(FrameTape(shared.frames), clock))
 
 
 def build_arm(

@@ -26,6 +26,7 @@ from experiments.rig.build import (
 from experiments.settings import RigSettings, Settings, TerrainRow
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
+from wam.bus import PythonCanDoor
 from wam.model import ArmModel, tool_metadata, tool_of
 
 if TYPE_CHECKING:
@@ -109,7 +110,7 @@ def stepped(
         options=PlantOptions(friction=fields["friction"]),
     )
     clock.attach(simulation)
-    link = build_link(simulation.bus, shared, clock)
+    link = build_link(PythonCanDoor(simulation.bus, clock), shared, clock)
     arm = build_arm(settings.rig, model.constants, link, clock)
 
     def sensor() -> WrenchSensor:

@@ -1,4 +1,5 @@
 from .decoder import BusReader, describe_id
+from .doors import PythonCanDoor, open_bus, open_door
 from .error_frames import BusErrors, error_names
 from .frames import (
     GROUP_BIT,
@@ -31,7 +32,8 @@ from .frames import (
     property_reply_id,
     wrap_position,
 )
-from .link import CanBus, CanLink, FrameTap, Link, open_bus
+from .kernel_door import interface_state
+from .link import CanBus, CanLink, Door, FrameTap, Link
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -78,6 +80,7 @@ __all__ = [
     "CanLog",
     "DecodedLine",
     "Device",
+    "Door",
     "FrameError",
     "FrameTap",
     "Group",
@@ -88,6 +91,7 @@ __all__ = [
     "PuckMode",
     "PuckRole",
     "PuckStatus",
+    "PythonCanDoor",
     "Triple",
     "compose_id",
     "decode_force",
@@ -108,9 +112,11 @@ __all__ = [
     "encode_torques",
     "error_names",
     "group_id",
+    "interface_state",
     "is_wide",
     "names",
     "open_bus",
+    "open_door",
     "parse_log",
     "position_reply_id",
     "property_number",

@@ -108,7 +108,12 @@ class WamArm:
         self._begin_at_rest()
         dated = zip(info.pucks, self.health(), strict=True)
         pucks = tuple(replace(puck, health=health) for puck, health in dated)
-        return replace(info, pucks=pucks, late_replies=self._properties.late_replies)
+        return replace(
+            info,
+            pucks=pucks,
+            late_replies=self._properties.late_replies,
+            door=self._link.metadata()["link:door"],
+        )
 
     def read(self, now_ns: int) -> ArmReading:
         """Ask for the joint positions at `now_ns` and return them.
@@ -138,6 +143,7 @@ class WamArm:
         return ArmReading(
             host_ns=now_ns,
             arm_ns=traffic.arm_ns,
+            bus_ns=traffic.bus_ns,
             counts=list(motion.counts),
             q=motion.q,
             qd=motion.qd,

@@ -111,6 +111,7 @@ class ArmInfo:
         pendant: what the pendant shows.
         is_zeroed: positions have been defined since power-up.
         late_replies: replies that came after their question was given up.
+        door: how the bus was reached, for people.
     """
 
     pucks: tuple[PuckInfo, ...]
@@ -120,6 +121,7 @@ class ArmInfo:
     pendant: PendantWord
     is_zeroed: bool
     late_replies: int
+    door: str = ""
 
 
 class StartUp:
