@@ -28,6 +28,7 @@ _GET_FLAGS, _GET_QUEUE = 0x8913, 0x8942
 _REQUEST = struct.Struct("@16sI20x")  # struct ifreq
 _NAME_AT_MOST = 15  # characters
 _UP, _RUNNING = 0x1, 0x40
+_as_frame = Frame._make  # without the words of a call
 
 
 class InterfaceState(NamedTuple):
@@ -103,7 +104,6 @@ class KernelDoor:
         self._adapter = AdapterClock()
         self._buffer = bytearray(_FRAME.size)
         self._targets = [self._buffer]
-        self._offset_ns = 0  # from the host's monotonic clock to UTC
         self._error: OSError | None = None  # it came behind frames
         opened.setblocking(False)
         for option, value in (
@@ -136,23 +136,21 @@ class KernelDoor:
             error, self._error = self._error, None
             raise broken_link(self._channel, error) from error
         frames: list[Frame] = []
-        receive, unpack, targets = (
-            self._socket.recvmsg_into,
-            _FRAME.unpack_from,
-            self._targets,
-        )
+        receive, targets = self._socket.recvmsg_into, self._targets
+        unpack, buffer = _FRAME.unpack_from, self._buffer
+        offset_ns = 0
         try:
             for _ in range(DRAIN_AT_MOST):
                 size, ancillary, _, _ = receive(targets, _ANCILLARY)
                 if size != _FRAME.size:
                     continue
-                can_id, length, data = unpack(self._buffer)
-                if not frames:
-                    self._offset_ns = self._clock.utc_ns() - self._clock.now_ns()
-                t_ns = self._host_ns(ancillary)
-                frames.append(
-                    Frame(can_id, data if length == 8 else data[:length], t_ns)
-                )
+                can_id, length, data = unpack(buffer)
+                if length < 8:
+                    data = data[:length]
+                if not offset_ns:
+                    offset_ns = self._clock.utc_ns() - self._clock.now_ns()
+                utc_ns = self._utc_ns(ancillary) if ancillary else 0
+                frames.append(_as_frame((can_id, data, max(0, utc_ns - offset_ns))))
         except BlockingIOError:
             pass
         except OSError as error:
@@ -165,21 +163,20 @@ class KernelDoor:
         """Close the socket; what is queued leaves all the same."""
         self._socket.close()
 
-    def _host_ns(self, ancillary: list[tuple[int, int, bytes]]) -> int:
+    def _utc_ns(self, ancillary: list[tuple[int, int, bytes]]) -> int:
         """Return when a frame was on the bus [ns], 0 = not known."""
-        t_ns = 0
+        utc_ns = 0
         for _, kind, data in ancillary:
             if kind == _TIMESTAMPING and len(data) == _STAMPS.size:
                 seconds, rest, _, _, own_seconds, own_rest = _STAMPS.unpack(data)
                 utc_ns = seconds * NS_PER_S + rest
-                own_ns = own_seconds * NS_PER_S + own_rest
-                if own_ns:
+                if own_seconds or own_rest:
                     self.name = "kernel socket, time of the adapter"
+                    own_ns = own_seconds * NS_PER_S + own_rest
                     utc_ns = self._adapter.utc_ns(utc_ns, own_ns)
-                t_ns = utc_ns - self._offset_ns if utc_ns else 0
             elif kind == _LOST and len(data) == _TOTAL.size:
                 self.lost = _TOTAL.unpack(data)[0]
-        return t_ns if t_ns > 0 else 0
+        return utc_ns
 
 
 class AdapterClock:
