@@ -1,9 +1,9 @@
 """What the 13 frames of a cycle cost through each door to the bus, side by side.
 
-Four frames leave and nine arrive in every cycle of 2 ms. Both doors do so in each cycle,
-in turns, and pause in between, so that neither finds warm caches. Linux's CAN needs an
-interface; here datagrams on the loopback device carry the same 16 bytes, stamped by the
-kernel, and the sockets' options are the same. Processor time of this thread is measured.
+Four frames leave and nine arrive in every cycle of 2 ms. Each door does so in turns and
+pauses in between, so that neither finds warm caches. Linux's CAN needs an interface;
+here datagrams on the loopback device carry the same 16 bytes, stamped by the kernel,
+and the sockets' options are the same. Processor time of this thread is measured.
 """
 
 import argparse

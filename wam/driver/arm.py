@@ -245,7 +245,7 @@ class WamArm:
             self._properties.pause(_MS)
         # The module must see the new positions while it still ignores speed.
         self._begin_at_rest()
-        self._check_taken(counts, motion.counts)
+        _check_taken(counts, motion.counts)
         self._safety.mark_zeroed()
 
     def _look_at_pendant(self) -> None:
@@ -258,14 +258,6 @@ class WamArm:
             self.counters.link_errors += 1
         except DeviceFaultError:
             self.counters.malformed += 1
-
-    def _check_taken(self, wanted: Sequence[int], reported: Sequence[int]) -> None:
-        worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
-        if worst > _ZEROED_WITHIN:
-            raise DeviceFaultError(
-                f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
-                hint="The arm must not move while it is zeroed. Zero it again.",
-            )
 
     def _started(self) -> JointEstimator:
         if self._motion is None:
@@ -288,4 +280,14 @@ class WamArm:
         raise LinkTimeoutError(
             f"{pucks_verb(silent)} not report a position.",
             hint="Check the cable, or a puck in reset.",
+        )
+
+
+def _check_taken(wanted: Sequence[int], reported: Sequence[int]) -> None:
+    """Raise DeviceFaultError unless the pucks report the counts that were set."""
+    worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
+    if worst > _ZEROED_WITHIN:
+        raise DeviceFaultError(
+            f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
+            hint="The arm must not move while it is zeroed. Zero it again.",
         )
