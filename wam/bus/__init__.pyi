@@ -41,9 +41,10 @@ from .log import (
     parse_log,
 )
 from .properties import (
+    FIRST_RELEASED,
     MAGNETIC_ENCODER,
     MODERN,
-    OLDEST_DRIVEN,
+    NEWEST_DOCUMENTED,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
     Device,
@@ -53,17 +54,19 @@ from .properties import (
     device_of,
     is_wide,
     names,
+    nearest_documented,
     property_number,
 )
 from .property_client import PropertyClient
 
 __all__ = [
+    "FIRST_RELEASED",
     "GROUP_BIT",
     "LONGEST_LINE",
     "MAGNETIC_ENCODER",
     "MODERN",
     "MOTOR_NODES",
-    "OLDEST_DRIVEN",
+    "NEWEST_DOCUMENTED",
     "POLES_OF_GIMBALS",
     "POLES_OF_WRIST",
     "SAFETY_NODE",
@@ -110,6 +113,7 @@ __all__ = [
     "group_id",
     "is_wide",
     "names",
+    "nearest_documented",
     "open_bus",
     "parse_log",
     "position_reply_id",

@@ -1,5 +1,6 @@
 from .arm import WamArm
 from .health import complaints, health_metadata, temperature_range
+from .home import HOME_LIMIT, check_home, check_zero, home_error, zero_error
 from .safety_module import (
     COUNTS_PER_SPEED,
     MONITORS,
@@ -11,14 +12,7 @@ from .safety_module import (
     encode_pendant,
 )
 from .settings import ArmSettings
-from .startup import (
-    HOME_LIMIT,
-    ArmInfo,
-    check_home,
-    check_zero,
-    home_error,
-    zero_error,
-)
+from .startup import ArmInfo
 
 __all__ = [
     "COUNTS_PER_SPEED",

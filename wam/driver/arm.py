@@ -96,8 +96,9 @@ class WamArm:
         self._poller.is_lowering = False
         self._poller.note_pendant(info.pendant)
         health = [puck.health for puck in info.pucks]
-        self._poller.health.begin(health, self._clock.now_ns())
-        self._traffic.set_firmware(info.pucks[0].vers)
+        firmware = [puck.vers for puck in info.pucks]
+        self._poller.health.begin(health, firmware, self._clock.now_ns())
+        self._traffic.set_firmware(firmware[0])  # P and T are the same in all seven
         transmission = Transmission(
             self._settings.j2mp,
             tuple(puck.cts for puck in info.pucks),

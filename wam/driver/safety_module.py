@@ -7,7 +7,13 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from acquisition import Clock, DeviceFaultError, LinkError, SafetyMode
-from wam.bus import SAFETY_NODE, Device, PropertyClient, property_number
+from wam.bus import (
+    SAFETY_NODE,
+    Device,
+    PropertyClient,
+    nearest_documented,
+    property_number,
+)
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
 WARNING_SHARE = 0.9  # of the fault's value, where no warning is given
@@ -137,7 +143,7 @@ class SafetyModule:
     def __init__(self, properties: PropertyClient, clock: Clock, vers: int) -> None:
         self._properties = properties
         self._clock = clock
-        self._vers = vers
+        self._vers = nearest_documented(vers)
 
     def mode(self) -> SafetyMode:
         """Return the mode.

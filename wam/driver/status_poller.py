@@ -17,6 +17,7 @@ from wam.bus import (
     decode_reply,
     encode_get,
     encode_set,
+    nearest_documented,
     property_number,
     property_reply_id,
 )
@@ -69,7 +70,7 @@ class StatusPoller:
 
     def set_firmware(self, vers: int) -> None:
         """Use the property numbers of safety firmware `vers`."""
-        self._pen = property_number(Device.SAFETY, "PEN", vers)
+        self._pen = property_number(Device.SAFETY, "PEN", nearest_documented(vers))
 
     def begin_cycle(self, now_ns: int) -> None:
         """Let the cycle of `now_ns` begin; its question may be asked."""
