@@ -121,7 +121,7 @@ def run_preflight(
     add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
     _check_stream(rig, add_result)
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
-    return Preflight(tuple(checks), {**devices, **grants})
+    return Preflight(tuple(checks), {**devices, **info.metadata(), **grants})
 
 
 def _check_arm(rig: Rig, add: Add) -> ArmInfo:
@@ -139,6 +139,8 @@ def _check_arm(rig: Rig, add: Add) -> ArmInfo:
     ill = complaints(health, now_ns)
     parts += [temperature_range(health, now_ns), *ill]
     add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
+    for text in info.warnings:
+        add(WARNING, "start-up", text)
     if not info.is_zeroed:
         add(BAD, "zero", "not zeroed")
         raise preflight_error("not-zeroed")
@@ -197,18 +199,19 @@ def _check_stream(rig: Rig, add_result: Callable[[CheckResult], None]) -> None:
         raise preflight_error("ft-lost", why=fields["trouble"].rstrip("."))
 
 
-def start_devices(rig: Rig) -> None:
-    """Start arm, sensor and loop without a page of checks.
+def start_devices(rig: Rig) -> ArmInfo:
+    """Start arm, sensor and loop without a page; return what the arm says.
 
     Raises:
         PreflightError: the arm or the sensor is not fit.
     """
     try:
-        rig.backend.start_arm()
+        info = rig.backend.start_arm()
         rig.backend.open_sensor()
     except TractionError as error:
         raise _as_preflight(error, "not touched") from error
     rig.backend.begin()
+    return info
 
 
 def _check_exchange(rig: Rig, add: Add) -> None:
@@ -270,11 +273,8 @@ def check_disk(rig: Rig, data: Path, add: Add, probe: DiskProbe = free_bytes) ->
     Raises:
         PreflightError: less than the limit is free.
     """
-    folder = data
-    while not folder.exists():
-        folder = folder.parent
-    free = probe(folder) / 1e9
-    limit = rig.settings.rig.limits.free_disk_gb
+    folder = next(path for path in (data, *data.parents) if path.exists())
+    free, limit = probe(folder) / 1e9, rig.settings.rig.limits.free_disk_gb
     if free < max(limit, SESSION_GB):
         add(BAD, "disk", f"{free:.1f} GB free")
         raise preflight_error("disk-full", free=free, need=SESSION_GB, limit=limit)

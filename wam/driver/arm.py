@@ -94,7 +94,7 @@ class WamArm:
         self._poller.set_firmware(info.safety_vers)
         self._poller.note_mode(info.safety_mode, self._clock.now_ns())
         self._poller.is_lowering = False
-        self._poller.note_pendant(info.pendant)
+        self._poller.begin(info.pendant)
         health = [puck.health for puck in info.pucks]
         firmware = [puck.vers for puck in info.pucks]
         self._poller.health.begin(health, firmware, self._clock.now_ns())
@@ -248,7 +248,7 @@ class WamArm:
         if self._motion is None:
             return
         try:
-            self._poller.note_pendant(self._safety.pendant())
+            self._poller.note_pendant(self._safety.pendant(self._poller.excused))
         except LinkError:
             self.counters.link_errors += 1
         except DeviceFaultError:

@@ -29,7 +29,8 @@ from wam.bus import (
 )
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
-from wam.driver.safety_module import PendantWord, SafetyModule
+from wam.driver.pendant import PendantWord
+from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
 
 _VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
@@ -87,6 +88,14 @@ class ArmInfo:
     late_replies: int
     warnings: tuple[str, ...] = ()
 
+    def metadata(self) -> dict[str, str]:
+        """Return firmware and warnings as text for a recording."""
+        return {
+            "arm:firmware": " ".join(str(puck.vers) for puck in self.pucks),
+            "arm:safety_firmware": str(self.safety_vers),
+            "arm:warnings": " ".join(self.warnings) or "none",
+        }
+
 
 class StartUp:
     """The questions to a WAM before it is driven.
@@ -119,7 +128,7 @@ class StartUp:
         self._note_firmware("the safety module", safety_vers)
         safety = SafetyModule(self._properties, self._clock, safety_vers)
         mode = safety.mode()
-        safety.set_limits(self._limits)
+        self._warnings += safety.set_limits(self._limits)
         asleep = [node for node, stat in stats.items() if stat == PuckStatus.RESET]
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
@@ -129,12 +138,14 @@ class StartUp:
             safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
             self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
+        pendant, doubt = safety.doubted_pendant()
+        self._warnings += [doubt] if doubt else []
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
             safety_vers=safety_vers,
             safety_mode=safety.mode(),
-            pendant=safety.pendant(),
+            pendant=pendant,
             is_zeroed=safety.is_zeroed(),
             late_replies=self._properties.late_replies,
             warnings=tuple(self._warnings),
@@ -176,7 +187,12 @@ class StartUp:
             )
         mech = None
         if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
-            mech = self._get(node, "MECH", vers)
+            mech = self._properties.get(node, _number(node, "MECH", vers))
+            if mech is None:
+                self._warnings.append(
+                    f"Puck {node} does not answer GET MECH: where it was zeroed is not "
+                    "checked."
+                )
         health = ask_health(lambda number: self._properties.get(node, number), vers)
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
 
