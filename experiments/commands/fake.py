@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     if served is None:
         return _serve_sensor(settings, args, console)
     with (
-        handle_signals(stop),
+        handle_signals(stop, is_service=True),
         open_bus_log(args.can_log, clock, "fake0", console) as log,
         closing(build_server(settings, served)) as server,
     ):
@@ -178,7 +178,7 @@ def _serve_sensor(
         )
     stop = StopFlag()
     sensor = build_sensor_server(settings, line, _tool(args))
-    with handle_signals(stop), closing(sensor) as server:
+    with handle_signals(stop, is_service=True), closing(sensor) as server:
         console.say(f"ready: {server.name}")
         while not stop.count:
             server.wait()
