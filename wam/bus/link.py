@@ -216,10 +216,25 @@ class CanLink:
                     self.foreign_id = can_id
 
 
+_QUEUE, _RESTART_MS = 16, 100
+
+
+def setup_command(channel: str, bitrate: int) -> str:
+    """Return what sets a SocketCAN interface up, `bitrate` in bit/s.
+
+    A queue of one cycle holds no stale torques, and a controller that has left the bus
+    comes back by itself.
+    """
+    return (
+        f"ip link set {channel} up txqueuelen {_QUEUE} "
+        f"type can bitrate {bitrate} restart-ms {_RESTART_MS}"
+    )
+
+
 def _cannot_open(
     interface: str, channel: str, bitrate: int, error: Exception
 ) -> LinkError:
-    up = f"Fix: ip link set {channel} up type can bitrate {bitrate}. Arm not touched."
+    up = f"Fix: {setup_command(channel, bitrate)}. Arm not touched."
     if interface == "socketcan" and _number_of(error) == errno.ENETDOWN:
         return LinkError(f"{channel} is down.", hint=up)
     if interface == "socketcan" and _number_of(error) == errno.ENODEV:

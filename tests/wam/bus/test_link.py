@@ -7,7 +7,7 @@ from acquisition.clock import Readable
 from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import Rig
 from wam.bus import link as can_link
-from wam.bus.link import CanLink, open_bus
+from wam.bus.link import CanLink, open_bus, setup_command
 
 
 class ScriptedBus(can.BusABC):
@@ -62,7 +62,7 @@ def test_an_interface_that_is_down_says_how_to_raise_it(opened):
     with pytest.raises(LinkError) as caught:
         opened(bus)()
     assert caught.value.message == "can0 is down."
-    assert "ip link set can0 up type can bitrate 1000000" in caught.value.hint
+    assert setup_command("can0", 1_000_000) in caught.value.hint
     assert bus.shutdowns == 1
 
 
@@ -218,3 +218,14 @@ def test_the_first_frame_of_another_master_is_kept():
     assert link.foreign_id == 0x404
     assert link.foreign_ids == {0x404, 0x00A}
     link.close()
+
+
+def test_an_interface_is_set_up_to_come_back_and_to_hold_one_cycle():
+    words = setup_command("can1", 500_000).split()
+    assert words[:5] == ["ip", "link", "set", "can1", "up"]
+    kind = words.index("type")  # all that follows is of the controller
+    assert words[5:kind] == ["txqueuelen", "16"]
+    assert words[kind:] == [
+        *("type", "can", "bitrate", "500000"),
+        *("restart-ms", "100"),
+    ]
