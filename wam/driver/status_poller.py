@@ -140,7 +140,8 @@ class StatusPoller:
             self.is_lowering = False
 
     def begin(self, pendant: PendantWord) -> None:
-        """Take the word of the start; what makes no sense in it is left out later."""
+        """Take the word of a start; what makes no sense in it is left out later."""
+        self.is_lowering = False
         self.excused = pendant.unclear
         self.note_pendant(pendant)
 

@@ -7,7 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError, LinkTimeoutError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import decode_reply, encode_reply
+from wam.bus.frames import decode_reply, encode_reply, position_reply_id
 from wam.driver.arm import WamArm
 from wam.driver.pendant import MONITORS, SafetyLevel, decode_pendant
 
@@ -153,3 +153,34 @@ def test_firmware_and_warnings_are_recorded():
     assert told["arm:safety_firmware"] == "200"
     assert "velocity, torque, voltage, heartbeat, other" in told["arm:warnings"]
     assert Bench().arm.start().metadata()["arm:warnings"] == "none"
+
+
+@pytest.mark.parametrize("lost", [3, 30, 150])
+def test_first_positions_are_waited_for_as_long_as_the_library_does(lost):
+    bench = Bench()
+    bench.rig.network.faults.drop(position_reply_id(5), count=lost)
+    bench.arm.start()
+    assert bench.arm.read(bench.rig.clock.t_ns).is_complete
+
+
+def test_positions_that_never_come_are_an_error_after_a_second():
+    bench = Bench()
+    bench.rig.network.faults.drop(position_reply_id(5), count=None)
+    before_ns = bench.rig.clock.t_ns
+    with pytest.raises(LinkTimeoutError, match="Puck 5 does not report a position"):
+        bench.arm.start()
+    assert bench.rig.clock.t_ns - before_ns > 1_000_000_000
+
+
+def test_a_bus_that_breaks_before_the_first_positions_is_no_endless_wait():
+    bench = Bench()
+    receive = bench.rig.network.receive
+
+    def break_at_first_question(t_ns, can_id, data):
+        if can_id == 0x404 and bytes(data) == b"\x30":
+            bench.rig.network.faults.go_down()
+        receive(t_ns, can_id, data)
+
+    bench.rig.network.receive = break_at_first_question
+    with pytest.raises(LinkTimeoutError, match="Pucks 1,2,3,4,5,6,7"):
+        bench.arm.start()
