@@ -283,7 +283,7 @@ TABLE: dict[str, Row] = {
         "Nobody on the CAN bus acknowledges; no reply",
         _UNKNOWN,
         "can-silence",
-        preflight=_refused("CAN fake bus: the send queue is full"),
+        preflight=_refused("Nobody on the CAN bus acknowledges."),
         idle=_not_ready("Nobody on the CAN bus acknowledges"),
     ),
     "bus-flooded": _row(OK),
