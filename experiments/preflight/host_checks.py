@@ -12,11 +12,10 @@ from experiments.operator import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
 from ft_sensor import axis_names, largest_traction
 from ft_sensor.serial_line import BURSTY
-from wam.bus import interface_state
+from wam.bus import LONGEST_QUEUE, interface_state
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
-LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
 SESSION_GB = 0.9
 NOISY = 0.5  # N, several times what a quiet sensor shows
 

@@ -114,7 +114,7 @@ def run_preflight(
     page.attempt(lambda: _check_stream(rig, page))
     page.require_fit()
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
-    return Preflight(tuple(page.checks), {**devices, **grants})
+    return Preflight(tuple(page.checks), {**devices, **info.metadata(), **grants})
 
 
 def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> None:
@@ -149,6 +149,8 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     ill = complaints(health, now_ns)
     parts += [temperature_range(health, now_ns), *ill]
     page.add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
+    for text in info.warnings:
+        page.add(WARNING, "start-up", text)
     if not info.is_zeroed:
         page.add(BAD, "zero", "not zeroed")
         page.fail(preflight_error("not-zeroed"))
@@ -205,18 +207,19 @@ def _check_stream(rig: Rig, page: ChecksPage) -> None:
         raise preflight_error("ft-lost", why=fields["trouble"].rstrip("."))
 
 
-def start_devices(rig: Rig) -> None:
-    """Start arm, sensor and loop without a page of checks.
+def start_devices(rig: Rig) -> ArmInfo:
+    """Start arm, sensor and loop without a page; return what the arm says.
 
     Raises:
         PreflightError: the arm or the sensor is not fit.
     """
     try:
-        rig.backend.start_arm()
+        info = rig.backend.start_arm()
         rig.backend.open_sensor()
     except TractionError as error:
         raise _as_preflight(error, "not touched") from error
     rig.backend.begin()
+    return info
 
 
 def _check_exchange(rig: Rig, add: Add) -> None:

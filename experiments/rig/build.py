@@ -40,7 +40,11 @@ def terrain_frame(row: TerrainRow) -> TerrainFrame:
 
 def build_tool(rig: RigSettings, foot: str) -> Tool:
     """Return sensor and foot as rig.toml describes them."""
-    section: FootSection = rig.feet.tread if foot == "tread" else rig.feet.bare
+    return tool_with(rig, rig.feet.tread if foot == "tread" else rig.feet.bare)
+
+
+def tool_with(rig: RigSettings, section: FootSection) -> Tool:
+    """Return the sensor of rig.toml with the foot that `section` describes."""
     sensor = rig.ft_sensor
     body = sensor_body()
     return Tool(

@@ -40,14 +40,15 @@ class PlantOptions:
     """How the simulated arm differs from an ideal one.
 
     Attributes:
-        friction: share of the joint friction identified on another arm (1 = all of
-            it). A real arm's is unknown; with 0.05 of it a fifth of the slips bounce
-            back, with more than about 0.1 hardly any.
+        friction: share of the joint friction identified on another arm. A real arm's
+            is unknown; with 0.05 a fifth of the slips bounce back, with 0.1 hardly any.
         substeps: steps per 2 ms cycle.
+        has_hand: a person holds the arm by its forearm, from the beginning.
     """
 
     friction: float = 0.02
     substeps: int = 4
+    has_hand: bool = True
 
 
 class ArmPlant:
@@ -72,17 +73,19 @@ class ArmPlant:
     ) -> None:
         options = options or PlantOptions()
         self._constants = constants
-        self._model, self._sole, self._hand = arm_and_hand(constants, tool, frame)
+        forearm = FOREARM_MASS if options.has_hand else 0.0
+        parts = arm_and_hand(constants, tool, frame, forearm)
+        self._model, self._sole, self._hand = parts
         self._data = self._model.createData()
         self._wrist = WristGauges(tool, frame.axes()[:, 2], PERIOD_NS * 1e-9)
         self._substeps = options.substeps
         self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
         self.resistance = JointResistance(constants, options.friction, self._dt)
-        # Forces act at the beginning of each substep, on average here in a cycle [s].
+        # Forces act at the beginning of each substep, on average here [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
-        self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
+        self._up: list[float] = (up * forearm * GRAVITY).tolist()
         # counts of the encoders per joint angle, joint torque per puck unit
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
@@ -93,14 +96,14 @@ class ArmPlant:
         self._is_held = True
         self.disturbance = np.zeros(7)
         self.terrain: Terrain | None = None
-        self.hand = Hand(PERIOD_NS * 1e-9)
+        self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
         self._sum = _NOTHING  # of the ground's wrench over a cycle
         self._ground = [0.0] * 6  # its mean
-        self._push = (0.0, 0.0, 0.0)
-        self._held = (0.0, 0.0, 0.0)  # that and the weight the person carries
+        # Force of the hand, and with it the weight that the person carries.
+        self._push = self._held = (0.0, 0.0, 0.0)
         self._joints = JointState(q, self._dt)
         self._prepare()
 

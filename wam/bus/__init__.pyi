@@ -32,7 +32,7 @@ from .frames import (
     property_reply_id,
     wrap_position,
 )
-from .kernel_door import interface_state
+from .kernel_door import LONGEST_QUEUE, interface_state
 from .link import CanBus, CanLink, Door, FrameTap, Link
 from .log import (
     LONGEST_LINE,
@@ -43,9 +43,10 @@ from .log import (
     parse_log,
 )
 from .properties import (
+    FIRST_RELEASED,
     MAGNETIC_ENCODER,
     MODERN,
-    OLDEST_DRIVEN,
+    NEWEST_DOCUMENTED,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
     Device,
@@ -55,17 +56,20 @@ from .properties import (
     device_of,
     is_wide,
     names,
+    nearest_documented,
     property_number,
 )
 from .property_client import PropertyClient
 
 __all__ = [
+    "FIRST_RELEASED",
     "GROUP_BIT",
     "LONGEST_LINE",
+    "LONGEST_QUEUE",
     "MAGNETIC_ENCODER",
     "MODERN",
     "MOTOR_NODES",
-    "OLDEST_DRIVEN",
+    "NEWEST_DOCUMENTED",
     "POLES_OF_GIMBALS",
     "POLES_OF_WRIST",
     "SAFETY_NODE",
@@ -115,6 +119,7 @@ __all__ = [
     "interface_state",
     "is_wide",
     "names",
+    "nearest_documented",
     "open_bus",
     "open_door",
     "parse_log",

@@ -11,7 +11,12 @@ import can
 
 from acquisition import NS_PER_S, Clock, LinkError
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
-from wam.bus.kernel_door import KernelDoor, interface_state, open_socket
+from wam.bus.kernel_door import (
+    KernelDoor,
+    interface_state,
+    open_socket,
+    setup_command,
+)
 from wam.bus.link import DRAIN_AT_MOST, CanBus, Door, Frame, broken_link, error_number
 
 SOCKETCAN: Final = "socketcan"
@@ -150,7 +155,7 @@ def _require_up(channel: str) -> None:
 def _cannot_open(
     interface: str, channel: str, bitrate: int, error: Exception
 ) -> LinkError:
-    up = f"Fix: ip link set {channel} up type can bitrate {bitrate}. Arm not touched."
+    up = f"Fix: {setup_command(channel, bitrate)}. Arm not touched."
     if interface == SOCKETCAN and error_number(error) == errno.ENETDOWN:
         return LinkError(f"{channel} is down.", hint=up)
     if interface == SOCKETCAN and error_number(error) == errno.ENODEV:

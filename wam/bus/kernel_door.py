@@ -15,6 +15,8 @@ from acquisition import NS_PER_S, Clock
 from wam.bus.error_frames import ERROR_MASK
 from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link
 
+LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
+_RESTART_MS = 100
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame
 _ERROR_FILTER = 2  # of SOL_CAN_RAW
 _TIMESTAMPING, _LOST, _MEMORY = 37, 40, 55  # of SOL_SOCKET: also SO_RXQ_OVFL, MEMINFO
@@ -43,6 +45,18 @@ class InterfaceState(NamedTuple):
     is_up: bool
     has_carrier: bool
     queue_length: int
+
+
+def setup_command(channel: str, bitrate: int) -> str:
+    """Return what sets a SocketCAN interface up, `bitrate` in bit/s.
+
+    A queue of one cycle holds no stale torques, and a controller that has left the bus
+    comes back by itself.
+    """
+    return (
+        f"ip link set {channel} up txqueuelen {LONGEST_QUEUE} "
+        f"type can bitrate {bitrate} restart-ms {_RESTART_MS}"
+    )
 
 
 def interface_state(channel: str) -> InterfaceState:

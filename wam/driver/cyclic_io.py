@@ -24,6 +24,7 @@ from wam.bus import (
     encode_get,
     encode_torques,
     group_id,
+    nearest_documented,
     position_reply_id,
     property_number,
 )
@@ -126,6 +127,7 @@ class CycleTraffic:
 
     def set_firmware(self, vers: int) -> None:
         """Use the property numbers of puck firmware `vers`."""
+        vers = nearest_documented(vers)
         self.p_number = property_number(Device.MOTOR, "P", vers)
         self._get_p = encode_get(self.p_number)
         self._t_number = property_number(Device.MOTOR, "T", vers)

@@ -6,6 +6,7 @@ from acquisition import (
     BusCondition,
     Clock,
     DeviceFaultError,
+    LinkFullError,
     PreflightError,
     SafetyMode,
 )
@@ -35,7 +36,11 @@ def discover_pucks(
         DeviceFaultError: a puck says that it does not work.
         LinkError: the bus is down.
     """
-    stats = _ask(properties, range(1, 32), _MS)
+    try:
+        stats = _ask(properties, range(1, 32), _MS)
+    except LinkFullError:
+        _check_bus(properties.bus_condition)
+        raise
     mode = _mode(properties, clock, stats)
     for _ in range(_SECOND_LOOKS):
         silent = [node for node in _EXPECTED if node not in stats]

@@ -4,9 +4,9 @@ import pytest
 
 from experiments.operator.console import BAD, GOOD, WARNING
 from experiments.preflight import host_checks
-from experiments.preflight.host_checks import LONGEST_QUEUE, check_interface
+from experiments.preflight.host_checks import check_interface
 from tests.experiments.program import run_short, write_config
-from wam.bus.kernel_door import InterfaceState
+from wam.bus.kernel_door import LONGEST_QUEUE, InterfaceState
 
 
 def marks(done):

@@ -13,7 +13,7 @@ from fakes.world.faults import clear_network_faults, network_faults
 from tests.fakes.stepped import Rig
 from wam.bus.error_frames import error_names
 from wam.bus.frames import decode_position, position_reply_id
-from wam.driver.safety_module import SafetyLevel
+from wam.driver.pendant import SafetyLevel
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -9,7 +9,7 @@ from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import Rig, SteppedClock
 from wam.bus import doors
 from wam.bus.doors import PythonCanDoor, open_bus
-from wam.bus.kernel_door import InterfaceState
+from wam.bus.kernel_door import InterfaceState, setup_command
 from wam.bus.link import CanLink
 
 
@@ -70,7 +70,7 @@ def test_an_interface_that_is_down_says_how_to_raise_it(opened):
     with pytest.raises(LinkError) as caught:
         opened(RuntimeError("opened all the same"), is_up=False)()
     assert caught.value.message == "can0 is down."
-    assert "ip link set can0 up type can bitrate 1000000" in caught.value.hint
+    assert setup_command("can0", 1_000_000) in caught.value.hint
 
 
 def test_an_interface_that_is_missing_is_named(opened):
@@ -240,3 +240,14 @@ def test_the_first_frame_of_another_master_is_kept():
     assert link.foreign_id == 0x404
     assert link.foreign_ids == {0x404, 0x00A}
     link.close()
+
+
+def test_an_interface_is_set_up_to_come_back_and_to_hold_one_cycle():
+    words = setup_command("can1", 500_000).split()
+    assert words[:5] == ["ip", "link", "set", "can1", "up"]
+    kind = words.index("type")  # all that follows is of the controller
+    assert words[5:kind] == ["txqueuelen", "16"]
+    assert words[kind:] == [
+        *("type", "can", "bitrate", "500000"),
+        *("restart-ms", "100"),
+    ]
