@@ -91,8 +91,8 @@ def _check_bus(condition: BusCondition) -> None:
     if condition is BusCondition.OFF:
         raise PreflightError(
             "The CAN controller has left the bus after too many errors (bus-off).",
-            hint="Check cable and bit rate, then restart it: ip link set can0 type can "
-            "restart, or down and up.",
+            hint="Check cable and bit rate. Set up with restart-ms it comes back by "
+            "itself, otherwise: ip link set can0 down, then up.",
         )
     if condition is BusCondition.UNHEARD:
         raise PreflightError(
