@@ -140,7 +140,7 @@ def check_interface(channel: str) -> CheckResult | None:
     if not state.is_up:
         return CheckResult(WARNING, name, f"{channel} is down")
     if not state.has_carrier:
-        text = f"{channel} has left the bus: ip link set {channel} type can restart"
+        text = f"{channel} has left the bus: ip link set {channel} down, then up"
         return CheckResult(WARNING, name, text)
     if state.queue_length > LONGEST_QUEUE:
         text = (

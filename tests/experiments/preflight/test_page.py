@@ -52,7 +52,7 @@ def test_the_bus_is_named_with_its_door(tmp_path):
         (InterfaceState(True, True, 10), GOOD, "10 frames"),
         (InterfaceState(True, True, LONGEST_QUEUE), GOOD, "is up"),
         (InterfaceState(True, True, 1000), WARNING, "txqueuelen 16"),
-        (InterfaceState(True, False, 10), WARNING, "type can restart"),
+        (InterfaceState(True, False, 10), WARNING, "down, then up"),
         (InterfaceState(False, False, 10), WARNING, "is down"),
     ],
 )
