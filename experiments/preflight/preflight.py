@@ -39,7 +39,6 @@ from wam.driver import (
     zero_error,
 )
 
-LOOP_TEST = 5.0  # s
 STEPPED_TEST = 0.3  # s
 Add = Callable[[str, str, str], None]
 SESSION_GB = 0.9
@@ -77,7 +76,7 @@ def run_preflight(
     rig: Rig,
     data: Path,
     console: Console,
-    seconds: float = LOOP_TEST,
+    seconds: float | None = None,
     probe: DiskProbe = free_bytes,
 ) -> Preflight:
     """Check configuration, arm, sensor, loop and disk; print one line each.
@@ -88,7 +87,7 @@ def run_preflight(
         rig: with its bus open.
         data: the data folder.
         console: where the page is printed.
-        seconds: how long the loop is tested [s].
+        seconds: how long the loop is tested [s]; None = `[loop] test_time`.
         probe: tells how much room is left on the disk.
 
     Raises:
@@ -115,7 +114,7 @@ def run_preflight(
     grants = _check_rights(rig, add)
     wrenches = rig.shared.wrenches.reader()
     rig.backend.begin()
-    _check_loop(rig, seconds, add)
+    _check_loop(rig, seconds or rig.settings.rig.loop.test_time, add)
     _check_zero(rig, info, add)
     stale_ms = rig.settings.rig.limits.ft_stale_ms
     add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
