@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lab.guest.machine_room import MachineRoom
-from lab.guest.scenarios import bus, recording, serial_line
+from lab.guest.scenarios import bus, calibration, losses, recording, serial_line
 
 Run = Callable[[MachineRoom], dict[str, str]]
 
@@ -36,18 +36,16 @@ ALL = (
     Scenario("link down at start", bus.link_down_at_start, is_short=True),
     Scenario("second host", bus.second_host),
     Scenario("full queue", bus.full_queue),
-    Scenario("slow and lossy adapter", bus.disturbed_adapter),
+    Scenario("slow and lossy adapter", recording.bad_adapter),
     Scenario("serial low latency", serial_line.low_latency, is_short=True),
     Scenario("serial makes", serial_line.three_makes),
     Scenario("serial no rights", serial_line.no_rights),
     Scenario("serial unplugged", serial_line.unplugged),
     Scenario("serial check", serial_line.check_with_serial_sensor),
     Scenario("session", recording.three_trials),
-    Scenario("console killed", recording.killed_console),
-    Scenario("link down recording", recording.link_down),
-    Scenario("link down ready", recording.link_down_while_ready),
-    Scenario("link down idle", recording.link_down_before_activation),
-    Scenario("card out recording", recording.card_out),
+    Scenario("link down in every phase", losses.link_down_in_every_phase),
+    Scenario("lost in a trial", losses.lost_in_a_trial),
+    Scenario("calibrate gravity", calibration.gravity),
 )
 
 
