@@ -140,9 +140,15 @@ def verify_kept(room: MachineRoom, wanted: int) -> list[Path]:
     return kept
 
 
-def rejected(room: MachineRoom) -> int:
-    """Return how many attempts were put away."""
-    return len(list((session_folder(room) / "rejected").glob("T???.mcap")))
+def require_rejected(room: MachineRoom, wanted: int) -> int:
+    """Return how many attempts were put away.
+
+    Raises:
+        ScenarioError: it is not `wanted`.
+    """
+    count = len(list((session_folder(room) / "rejected").glob("T???.mcap")))
+    require(count == wanted, f"{count} attempts put away in place of {wanted}")
+    return count
 
 
 def cycle_figures(room: MachineRoom) -> dict[str, str]:

@@ -8,7 +8,6 @@ import signal
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from lab.guest.commands import require
 from lab.guest.machine_room import CAN, MachineRoom
 from lab.guest.monitor import CARD, Monitor
 from lab.guest.network import NET, set_up
@@ -19,7 +18,7 @@ from lab.guest.sessions import (
     LedSession,
     begin,
     cycle_figures,
-    rejected,
+    require_rejected,
     resume,
     verify_kept,
 )
@@ -73,7 +72,7 @@ def link_down_in_every_phase(room: MachineRoom) -> Figures:
     code = session.program.wait(PATIENCE)
     hold_to(promise(_DOWN, "end"), code)
     _bring_up(room)
-    require(rejected(room) == _REJECTED, f"{rejected(room)} attempts put away")
+    require_rejected(room, _REJECTED)
     verify_kept(room, 1)
     return {"exit codes": _codes({**figures, "end": str(code)}), **cycle_figures(room)}
 
@@ -143,7 +142,6 @@ def _lose(room: MachineRoom, losses: tuple[Loss, ...]) -> Figures:
         session = resume(room, arm)
     session.whole_trial()
     verify_kept(room, 1)
-    put_away = rejected(room)
-    require(put_away == len(losses), f"{put_away} attempts put away")
+    put_away = require_rejected(room, len(losses))
     said = figure(output, r"(?m)^((?!.*floating).*ARM: .*)$")
     return {"said": said, "rejected": str(put_away), **cycle_figures(room)}

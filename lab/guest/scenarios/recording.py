@@ -5,7 +5,7 @@ from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
 from lab.guest.network import clear, disturb, queue_length, set_up_both
 from lab.guest.promises import hold_to, promise
 from lab.guest.scenarios.bus import Figures, figure
-from lab.guest.sessions import begin, cycle_figures, rejected, verify_kept
+from lab.guest.sessions import begin, cycle_figures, require_rejected, verify_kept
 from lab.guest.ways import farthest, way_of
 
 PATIENCE = 60.0  # s of guest time for the end of a session
@@ -66,6 +66,6 @@ def bad_adapter(room: MachineRoom) -> Figures:
     for fault in ("reply-late", "reply-lost-some"):
         hold_to(promise(fault, "recording"), code)
     verify_kept(room, 2)
-    require(rejected(room) == 0, "a trial was rejected")
+    require_rejected(room, 0)
     slow = figure(page, r"7 positions after ([^,]+, \d+ incomplete)")
     return {"queue": str(queue), "slow exchange": slow, **cycle_figures(room)}

@@ -4,7 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lab.guest.machine_room import MachineRoom
-from lab.guest.scenarios import bus, calibration, losses, recording, serial_line
+from lab.guest.scenarios import (
+    bus,
+    calibration,
+    losses,
+    recording,
+    sensor_losses,
+    serial_line,
+)
 
 Run = Callable[[MachineRoom], dict[str, str]]
 
@@ -45,6 +52,7 @@ ALL = (
     Scenario("session", recording.three_trials),
     Scenario("link down in every phase", losses.link_down_in_every_phase),
     Scenario("lost in a trial", losses.lost_in_a_trial),
+    Scenario("sensor lost and back", sensor_losses.lost_and_back),
     Scenario("calibrate gravity", calibration.gravity),
 )
 
