@@ -43,10 +43,10 @@ class Make:
     dropped: tuple[str, ...] = ("sinc =",)
 
 
-# Each at both speeds of the adapters in use, the OptoForce at its own one, too.
+# At both speeds of the adapters in use, where their protocols know them; the Bota's
+# ends at 460800, the OptoForce has one of its own.
 MAKES = (
     Make("bota", 460_800, dropped=()),
-    Make("bota", 921_600, dropped=()),
     Make("robotous", 460_800, ("rate = 500",)),
     Make("robotous", 921_600),
     Make("optoforce", 460_800, _OPTOFORCE),
