@@ -8,6 +8,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Protocol
 
@@ -127,9 +128,14 @@ def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
 
 
 def shares(scenarios: Sequence[Scenario], count: int) -> list[list[Scenario]]:
-    """Return what each of at most `count` machines runs, in turn; none is empty."""
-    parts = [list(scenarios[first::count]) for first in range(count)]
-    return [part for part in parts if part]
+    """Return what each of at most `count` machines runs; none is empty.
+
+    The heaviest goes first, each to the machine that has the least until then.
+    """
+    parts: list[list[Scenario]] = [[] for _ in range(min(count, len(scenarios)))]
+    for one in sorted(scenarios, key=lambda scenario: -scenario.weight):
+        min(parts, key=lambda part: sum(other.weight for other in part)).append(one)
+    return parts
 
 
 def run_machines(
@@ -180,6 +186,10 @@ def run_machine(
 class ReadConsole(Protocol):
     """What is read of a machine."""
 
+    def processor_seconds(self) -> float:
+        """Return the processor time of the host that it has taken [s]."""
+        ...
+
     def line(self, until_ns: int) -> str | None:
         """Return the next line; None at its end, TimeoutError after `until_ns`."""
         ...
@@ -195,6 +205,7 @@ class Follower:
         self._running = "boot"
         self._is_over = False
         self._until_ns = 0
+        self._taken_before = 0.0
         self._own: list[str] = []  # what the machine says beside messages
 
     def follow(
@@ -204,7 +215,7 @@ class Follower:
         self._allow(BOOT_LIMIT)
         try:
             while (line := machine.line(self._until_ns)) is not None:
-                self._take(line)
+                self._take(line, machine)
         except TimeoutError:
             self._own.append("[the time limit ended the machine]")
         done = {result.name for result in self._results}
@@ -215,17 +226,19 @@ class Follower:
             self._add(lost)
         return self._results
 
-    def _take(self, line: str) -> None:
+    def _take(self, line: str, machine: ReadConsole) -> None:
         match from_line(line):
             case Begun(name):
                 self._running = name
+                self._taken_before = machine.processor_seconds()
                 self._allow(LIMIT)
             case TimerAddresses(offsets, events):
                 timer_rate.correct(self._debugger, offsets, events, SLOWNESS)
             case Finished():
                 self._is_over = True
             case ScenarioResult() as result:
-                self._add(result)
+                taken = machine.processor_seconds() - self._taken_before
+                self._add(replace(result, processor=round(taken, 1)))
             case None:
                 self._own.append(line)
                 if self._is_shown:

@@ -1,5 +1,6 @@
 """The emulated machine: its command line, its console, a limit on its time."""
 
+import os
 import queue
 import subprocess
 import threading
@@ -114,6 +115,7 @@ class Machine:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
         )
+        self._taken = 0.0
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -132,6 +134,17 @@ class Machine:
             return self._lines.get(timeout=max(0.0, left))
         except queue.Empty:
             raise TimeoutError from None
+
+    def processor_seconds(self) -> float:
+        """Return the processor time that it has taken so far [s]."""
+        try:
+            stat = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii")
+        except OSError:
+            return self._taken
+        # The name in parentheses may hold anything.
+        user, system = stat.rpartition(")")[2].split()[11:13]
+        self._taken = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+        return self._taken
 
     def close(self) -> None:
         """Switch it off; safe to repeat."""

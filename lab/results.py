@@ -38,6 +38,7 @@ class ScenarioResult:
         figures: what was measured, in words with units, by name.
         reason: why it is not simply passed.
         output: of the commands that it ran; kept where it failed.
+        processor: time of the host that the emulation took [s], as the host adds it.
     """
 
     name: str
@@ -46,6 +47,7 @@ class ScenarioResult:
     figures: dict[str, str] = field(default_factory=dict[str, str])
     reason: str = ""
     output: str = ""
+    processor: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

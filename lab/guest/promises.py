@@ -5,11 +5,12 @@ from pathlib import Path
 from lab.guest.commands import ScenarioError, require
 
 PAGE = Path(__file__).parents[2] / "docs" / "faults.md"
-# Exit codes by how a cell ends; with -9 where the console itself was killed.
+# Exit codes by how a cell ends; -9 where the console itself was killed. A session that
+# is not activated ends with 3 when the arm is to become active, with 4 at the prompt.
 _CODES = {
     "nothing happens": {0},
     "refused, nothing created": {3},
-    "not activated, resumed": {3},
+    "not activated, resumed": {3, 4},
     "trial interrupted and redone": {0},
     "session ends, resumed": {4},
     "ends; the arm is braked without it, resumed": {-9},
