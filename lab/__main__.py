@@ -16,7 +16,14 @@ from acquisition import NS_PER_S, SystemClock
 from lab import initramfs, report, timer_rate
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import fetch_kernel
-from lab.machine import SLOWNESS, Machine, Sockets, command
+from lab.machine import (
+    SLOWNESS,
+    Machine,
+    Sockets,
+    command,
+    emulator_version,
+    processor_name,
+)
 from lab.requirements import LabError, install_line, missing_packages, program
 from lab.results import (
     Begun,
@@ -116,14 +123,21 @@ def _run_if_ready(scenarios: Sequence[Scenario], options: argparse.Namespace) ->
 
 def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     start_ns = _CLOCK.now_ns()
-    results = run_machines(
-        shares(scenarios, options.machines), options.cache, is_shown=options.console
-    )
+    parts = shares(scenarios, options.machines)
+    results = run_machines(parts, options.cache, is_shown=options.console)
     wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
     print(report.summary(results, wall))
     if options.write:
         what = {scenario.name: scenario.what for scenario in scenarios}
-        options.write.write_text(report.page(results, what, wall), encoding="utf-8")
+        conditions = report.Conditions(
+            fetch_kernel(options.cache).release,
+            emulator_version(),
+            processor_name(),
+            len(parts),
+            wall,
+        )
+        page = report.page(results, what, conditions)
+        options.write.write_text(page, encoding="utf-8")
     return 0 if all(result.verdict.is_fine for result in results) else 1
 
 

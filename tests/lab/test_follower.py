@@ -1,11 +1,14 @@
 """What the host makes of a machine's console: results, silence, a sudden end."""
 
+from dataclasses import replace
+
 import pytest
 
 from lab.__main__ import Follower
 from lab.results import Begun, Finished, ScenarioResult, Verdict, to_line
 
-PASSED = ScenarioResult("bench", Verdict.PASSED, 1.0)
+SENT = ScenarioResult("bench", Verdict.PASSED, 1.0)
+PASSED = replace(SENT, processor=1.0)  # as the host completes it
 FINISHED = to_line(Finished(2.0))
 
 
@@ -14,7 +17,13 @@ class Tape:
 
     def __init__(self, *lines, is_hanging=False):
         self._lines = list(lines)
+        self._taken = 0.0
         self._is_hanging = is_hanging
+
+    def processor_seconds(self):
+        """Each look at it finds a second more."""
+        self._taken += 1.0
+        return self._taken
 
     def line(self, until_ns):
         assert until_ns > 0
@@ -30,13 +39,13 @@ def follow(tape, *names):
 
 
 def test_results_come_out_in_the_order_in_which_they_came():
-    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(PASSED), FINISHED]
+    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
     assert follow(Tape(*lines), "bench") == [PASSED]
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])
 def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
-    lines = [to_line(Begun("bench")), to_line(PASSED), to_line(Begun("session"))]
+    lines = [to_line(Begun("bench")), to_line(SENT), to_line(Begun("session"))]
     tape = Tape(*lines, "Oops: 0002", is_hanging=is_hanging)
     passed, lost = follow(tape, "bench", "session", "never begun")
     assert passed == PASSED
@@ -51,6 +60,6 @@ def test_a_machine_that_never_boots_is_lost_in_its_boot():
 
 
 def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
-    lines = [to_line(Begun("bench")), to_line(PASSED), FINISHED]
+    lines = [to_line(Begun("bench")), to_line(SENT), FINISHED]
     results = follow(Tape(*lines), "bench", "session")
     assert results[-1].verdict is Verdict.HUNG

@@ -43,7 +43,7 @@ def _to_review(session: LedSession) -> None:
 
 
 # How to come to each phase of docs/faults.md, in the order in which they are visited.
-_PHASES: dict[str, Callable[[LedSession], None]] = {
+PHASES: dict[str, Callable[[LedSession], None]] = {
     "idle": LedSession.wait_idle,
     "tare": _to_tare,
     "ready": LedSession.await_ready,
@@ -58,7 +58,7 @@ def link_down_in_every_phase(room: MachineRoom) -> Figures:
     arm = served_arm(room)
     session = begin(room, arm, 1)
     figures: Figures = {}
-    for phase, come_to in _PHASES.items():
+    for phase, come_to in PHASES.items():
         come_to(session)
         _take_down(room)
         code = session.program.wait(PATIENCE)
