@@ -64,6 +64,7 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
         *_monitor(sockets.monitor),
         *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
         *("-gdb", "chardev:debug"),
+        *(["-S"] if kernel.timer.exists() else []),  # it waits for its timer's rate
     ]
 
 

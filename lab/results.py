@@ -64,10 +64,14 @@ class TimerAddresses:
     Attributes:
         offsets: of the processors' parts of the memory.
         events: the timer within such a part.
+        period: its ticks between two of the kernel's, 0 until it is measured.
+        setup: of the function that measures it.
     """
 
     offsets: int
     events: int
+    period: int
+    setup: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,6 +42,12 @@ _GIT = {
     "GIT_CONFIG_KEY_2": "safe.directory",
     "GIT_CONFIG_VALUE_2": "*",
 }
+_SYMBOLS = (
+    "__per_cpu_offset",
+    "lapic_events",
+    "lapic_timer_period",
+    "setup_boot_APIC_clock",
+)
 _PAUSE = 0.2  # s
 _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
@@ -68,12 +74,12 @@ def main(names: list[str]) -> None:
 
 
 def _timer_addresses() -> TimerAddresses:
-    found: dict[str, int] = {}
+    symbols: dict[str, int] = {}
     with Path("/proc/kallsyms").open(encoding="ascii") as lines:
         for line in lines:
             address, _, name, *_ = line.split()
-            found[name] = int(address, 16)
-    return TimerAddresses(found["__per_cpu_offset"], found["lapic_events"])
+            symbols[name] = int(address, 16)
+    return TimerAddresses(*(symbols[name] for name in _SYMBOLS))
 
 
 def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:

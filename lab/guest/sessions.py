@@ -31,11 +31,17 @@ class LedSession:
         self.program.expect("Press Shift-activate", _START)
 
     def tare(self) -> None:
-        """Support the arm, press the pendant; lift the foot, which is tared then."""
+        """Activate the arm; lift the foot, which is tared then."""
         self.wait_idle()
-        self.hand("lift", "activate")
-        self._press(" ")
+        self.activate()
         self.lift()
+
+    def activate(self) -> None:
+        """Support the arm, press the pendant, confirm it."""
+        self.hand("lift")
+        self.program.run_on(_REACTION)  # an arm that is held is silent for no cycle
+        self.hand("activate")
+        self._press(" ")
 
     def lift(self) -> None:
         """Lift the foot as asked; it is tared while it is still."""
