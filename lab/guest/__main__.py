@@ -30,6 +30,8 @@ _WARM = (
     "experiments.commands.run",
     "experiments.rig.processes",
     "experiments.run.session",
+    "experiments.trial.quality",
+    "scipy.signal",
     "fakes.serving.puck_server",
 )
 # The files' owner and time of change are others in here: git would read them all.

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lab.follower import Follower
+from lab.follower import LIMIT, Follower
 from lab.results import (
     Begun,
     Finished,
@@ -84,3 +84,39 @@ def test_a_timer_that_is_corrected_is_known_from_then_on(tmp_path, monkeypatch):
         Follower(tmp_path, timer, is_shown=False).follow(Tape(line), [])
     assert corrected == [(1, 2)]
     assert timer.read_text() == line
+
+
+class Starved(Tape):
+    """A machine of a busy host: silent for so many limits, each with a tenth of it."""
+
+    def __init__(self, *lines, silences, share=0.1):
+        super().__init__(*lines)
+        self._silences = silences
+        self._share = share
+
+    def processor_seconds(self):
+        return self._taken
+
+    def line(self, until_ns):
+        if len(self._lines) == 2 and self._silences:  # before the result
+            self._silences -= 1
+            self._taken += self._share * LIMIT
+            raise TimeoutError
+        return super().line(until_ns)
+
+
+def starved(**how):
+    tape = Starved(to_line(Begun("bench")), to_line(SENT), FINISHED, **how)
+    return follow(tape, "bench")[0].verdict
+
+
+def test_a_machine_that_a_busy_host_gives_little_time_has_not_hung():
+    assert starved(silences=8) is Verdict.PASSED
+
+
+def test_a_machine_has_hung_once_it_had_its_time():
+    assert starved(silences=12) is Verdict.HUNG
+
+
+def test_a_machine_that_wants_no_time_has_hung():
+    assert starved(silences=2, share=0.001) is Verdict.HUNG
