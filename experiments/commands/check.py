@@ -28,9 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--loop-test",
         type=number_within(0.1, 3600, "seconds, e.g. 5"),
-        default=5.0,
         metavar="SECONDS",
-        help="how long the loop is measured (5)",
+        help="how long the loop is measured (test_time of rig.toml)",
     )
     parser.add_argument(
         "--bus",

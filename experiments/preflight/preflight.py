@@ -40,7 +40,6 @@ from wam.driver import (
     zero_error,
 )
 
-LOOP_TEST = 5.0  # s
 STEPPED_TEST = 0.3  # s
 
 
@@ -76,7 +75,7 @@ def run_preflight(
     rig: Rig,
     data: Path,
     console: Console,
-    seconds: float = LOOP_TEST,
+    seconds: float | None = None,
     probe: DiskProbe = free_bytes,
 ) -> Preflight:
     """Check configuration, arm, sensor, loop and disk; print one line each.
@@ -87,7 +86,7 @@ def run_preflight(
         rig: with its bus open.
         data: the data folder.
         console: where the page is printed.
-        seconds: how long the loop is tested [s].
+        seconds: how long the loop is tested [s]; None = `[loop] test_time`.
         probe: tells how much room is left on the disk.
 
     Raises:
@@ -107,7 +106,7 @@ def run_preflight(
     assert sensor is not None
     wrenches = rig.shared.wrenches.reader()
     rig.backend.begin()
-    _check_loop(rig, seconds, page.add)
+    _check_loop(rig, seconds or rig.settings.rig.loop.test_time, page.add)
     page.attempt(lambda: _check_zero(rig, info, page.add))
     stale_ms = rig.settings.rig.limits.ft_stale_ms
     page.add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
