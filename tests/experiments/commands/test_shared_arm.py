@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import pytest
 
@@ -66,8 +67,9 @@ def active_arm(tmp_path):
             server.step(lambda can_id, data: server.frames.append((can_id, data)))
             while other.recv(0) is not None:
                 pass
-            if server.has_master:
+            if server.has_master:  # at 1 kHz: this thread must not spin
                 other.send(message(0x404, b"\x30"))
+                time.sleep(0.001)
 
     thread = threading.Thread(target=serve)
     thread.start()
