@@ -7,11 +7,19 @@ from tests.experiments.other_arms import firmware, serve
 from tests.experiments.program import only_session, run_short, traction
 from tests.wam.driver.test_generations import DOCUMENTED
 
+SHORT = {min(DOCUMENTED), 60, 61, 64, 65, 200, 250}
 QUESTION = {vers: "1A" if vers < 61 else "30" for vers in DOCUMENTED}
 
 
+def generations():
+    """Return every firmware; those beside the great changes belong to the short form."""
+    for vers in [*DOCUMENTED, 250]:
+        marks = () if vers in SHORT else pytest.mark.long
+        yield pytest.param(vers, marks=marks)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("vers", [*DOCUMENTED, 250])
+@pytest.mark.parametrize("vers", generations())
 def test_an_arm_of_every_generation_is_zeroed_and_records_a_trial(
     monkeypatch, config, tmp_path, vers
 ):
