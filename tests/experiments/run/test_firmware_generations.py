@@ -11,15 +11,15 @@ SHORT = {min(DOCUMENTED), 60, 61, 64, 65, 200, 250}
 QUESTION = {vers: "1A" if vers < 61 else "30" for vers in DOCUMENTED}
 
 
-def generations():
-    """Return every firmware; those beside the great changes belong to the short form."""
-    for vers in [*DOCUMENTED, 250]:
-        marks = () if vers in SHORT else pytest.mark.long
-        yield pytest.param(vers, marks=marks)
+# Those beside the great changes are the short form.
+GENERATIONS = [
+    pytest.param(vers, marks=() if vers in SHORT else pytest.mark.long)
+    for vers in [*DOCUMENTED, 250]
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vers", generations())
+@pytest.mark.parametrize("vers", GENERATIONS)
 def test_an_arm_of_every_generation_is_zeroed_and_records_a_trial(
     monkeypatch, config, tmp_path, vers
 ):
