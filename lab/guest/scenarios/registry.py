@@ -45,7 +45,7 @@ ALL = (
     Scenario("link down at start", bus.link_down_at_start, is_short=True),
     Scenario("second host", bus.second_host),
     Scenario("full queue", bus.full_queue),
-    Scenario("slow and lossy adapter", recording.bad_adapter, is_short=True, weight=4),
+    Scenario("slow and lossy adapter", recording.bad_adapter, weight=4),
     Scenario("serial low latency", serial_line.low_latency, is_short=True),
     Scenario("serial makes", serial_line.three_makes),
     Scenario("serial no rights", serial_line.no_rights),
