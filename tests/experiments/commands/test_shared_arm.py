@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 
 import pytest
 
@@ -69,7 +68,7 @@ def active_arm(tmp_path):
                 pass
             if server.has_master:  # at 1 kHz: this thread must not spin
                 other.send(message(0x404, b"\x30"))
-                time.sleep(0.001)
+                clock.sleep_until(clock.now_ns() + 1_000_000)
 
     thread = threading.Thread(target=serve)
     thread.start()
