@@ -33,7 +33,7 @@ from .frames import (
     wrap_position,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
-from .link import CanBus, CanLink, Door, FrameTap, Link
+from .link import CanLink, Door, FrameTap, Link
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -79,7 +79,6 @@ __all__ = [
     "BusReader",
     "BusSummary",
     "BusTraffic",
-    "CanBus",
     "CanLink",
     "CanLog",
     "DecodedLine",

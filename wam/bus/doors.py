@@ -17,8 +17,9 @@ from wam.bus.kernel_door import (
     open_socket,
     setup_command,
 )
-from wam.bus.link import DRAIN_AT_MOST, CanBus, Door, Frame, broken_link, error_number
+from wam.bus.link import DRAIN_AT_MOST, Door, Frame, broken_link, error_number
 
+CanBus = can.BusABC
 SOCKETCAN: Final = "socketcan"
 _PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
 

@@ -4,8 +4,6 @@ import errno
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-import can
-
 from acquisition import Clock, LinkError, LinkFullError
 from acquisition.ipc import FrameTape
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
@@ -117,9 +115,6 @@ class Link(Protocol):
     def close(self) -> None:
         """Give the bus back."""
         ...
-
-
-CanBus = can.BusABC  # for modules that may not know python-can
 
 
 class CanLink:
