@@ -138,7 +138,11 @@ class RecordedTrial:
         origin = np.array([0.0, 0.0, self.sensor_height or 0.0])  # of the sensor
         from_sole = origin + self.payload.rotation @ self.payload.com - self.sole_point
         com = self.sole + self.rotation @ from_sole
-        return inertial_force(self.t, com, self.payload.mass)
+        try:
+            return inertial_force(self.t, com, self.payload.mass)
+        except SettingsError as error:
+            text = f"{self.name}: {error.message}"
+            raise SettingsError(text, hint=error.hint) from error
 
     def without_inertia(self) -> "RecordedTrial":
         """Return the trial with the ground's force alone; raises SettingsError."""

@@ -97,7 +97,8 @@ def run_preflight(
     info = page.attempt(lambda: _check_arm(rig, page))
     sensor = None
     if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
-        sensor = page.attempt(lambda: _check_sensor(rig, page.add))
+        arm_state = "not touched" if info is None else "idle"
+        sensor = page.attempt(lambda: _check_sensor(rig, arm_state, page.add))
     if info is not None:
         page.attempt(lambda: _check_exchange(rig, page.add))
     grants = _check_rights(rig, page.add)
@@ -179,12 +180,12 @@ def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
     check_zero(error)
 
 
-def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
+def _check_sensor(rig: Rig, arm_state: str, add: Add) -> dict[str, str]:
     try:
         fields = rig.backend.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
-        raise _as_preflight(error, "idle") from error
+        raise _as_preflight(error, arm_state) from error
     name = f"{fields['model']}, {fields['measured_rate']}"
     add(GOOD, "F/T sensor", f"{name}, {reach_words(fields, _lever(rig))}")
     return fields

@@ -17,11 +17,17 @@ from wam.bus.kernel_door import (
     open_socket,
     setup_command,
 )
-from wam.bus.link import DRAIN_AT_MOST, Door, Frame, broken_link, error_number
+from wam.bus.link import (
+    DRAIN_AT_MOST,
+    Door,
+    Frame,
+    broken_link,
+    error_number,
+    is_plausible,
+)
 
 CanBus = can.BusABC
 SOCKETCAN: Final = "socketcan"
-_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
 
 
 def open_bus(interface: str, channel: str, bitrate: int) -> CanBus:
@@ -141,10 +147,10 @@ class PythonCanDoor:
         if not stamp:
             return 0
         now_ns, t_ns = self._clock.now_ns(), round(stamp * NS_PER_S)
-        if 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
+        if is_plausible(t_ns, now_ns):
             return t_ns
         t_ns -= self._clock.utc_ns() - now_ns
-        return t_ns if 0 <= now_ns - t_ns < _PLAUSIBLE_NS else 0
+        return t_ns if is_plausible(t_ns, now_ns) else 0
 
 
 def _require_up(channel: str) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from acquisition import NS_PER_S, Clock
 from wam.bus.error_frames import ERROR_MASK
-from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link
+from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link, is_plausible
 
 LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
 _RESTART_MS = 100
@@ -133,8 +133,11 @@ class KernelDoor:
         return self._socket.fileno()
 
     def has_unsent(self) -> bool:
-        """Return whether frames of this socket wait to be sent."""
-        memory = self._socket.getsockopt(socket.SOL_SOCKET, _MEMORY, _MEMORY_BYTES)
+        """Return whether frames wait to be sent; False if the kernel does not tell."""
+        try:
+            memory = self._socket.getsockopt(socket.SOL_SOCKET, _MEMORY, _MEMORY_BYTES)
+        except OSError:  # of a kernel before 4.12, or a closed socket
+            return False
         return _TOTAL.unpack_from(memory, _WAITING_AT)[0] > 0
 
     def send(self, can_id: int, data: bytes) -> None:
@@ -152,7 +155,7 @@ class KernelDoor:
         frames: list[Frame] = []
         receive, targets = self._socket.recvmsg_into, self._targets
         unpack, buffer = _FRAME.unpack_from, self._buffer
-        offset_ns = 0
+        now_ns = offset_ns = 0
         try:
             for _ in range(DRAIN_AT_MOST):
                 size, ancillary, _, _ = receive(targets, _ANCILLARY)
@@ -161,10 +164,13 @@ class KernelDoor:
                 can_id, length, data = unpack(buffer)
                 if length < 8:
                     data = data[:length]
-                if not offset_ns:
-                    offset_ns = self._clock.utc_ns() - self._clock.now_ns()
-                utc_ns = self._utc_ns(ancillary) if ancillary else 0
-                frames.append(_as_frame((can_id, data, max(0, utc_ns - offset_ns))))
+                if not frames:
+                    now_ns = self._clock.now_ns()
+                    offset_ns = self._clock.utc_ns() - now_ns
+                t_ns = self._utc_ns(ancillary) - offset_ns if ancillary else 0
+                if t_ns and not is_plausible(t_ns, now_ns):
+                    t_ns = 0
+                frames.append(_as_frame((can_id, data, t_ns)))
         except BlockingIOError:
             pass
         except OSError as error:

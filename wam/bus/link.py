@@ -4,7 +4,7 @@ import errno
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-from acquisition import Clock, LinkError, LinkFullError
+from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
 from acquisition.ipc import FrameTape
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
@@ -12,6 +12,8 @@ from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
 DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
+_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
+_AHEAD_NS = 5_000_000  # frames go on arriving while a bus is drained
 _LARGEST_ID = 0x7FF  # of a frame that a WAM uses
 
 
@@ -212,11 +214,11 @@ class CanLink:
 
     def _sort(self, arrived: list[Frame]) -> None:
         """Show plain frames to the tap and keep those of devices."""
-        plain = arrived
+        is_plain = True
         for frame in arrived:
             can_id = frame[0]
             if can_id > _LARGEST_ID:
-                plain = [each for each in arrived if each[0] <= _LARGEST_ID]
+                is_plain = False
                 if can_id & ERROR_FLAG:
                     self.errors.add(can_id, frame[1])
             elif can_id == MODE_BROADCAST_ID:
@@ -227,8 +229,17 @@ class CanLink:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id
-        if self._tap is not None and plain:
-            self._tap(plain)
+        if self._tap is None:
+            return
+        if not is_plain:
+            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
+        if arrived:
+            self._tap(arrived)
+
+
+def is_plausible(t_ns: int, now_ns: int) -> bool:
+    """Return whether a frame that is at hand now can be of `t_ns` [monotonic ns]."""
+    return -_AHEAD_NS <= now_ns - t_ns < _PLAUSIBLE_NS
 
 
 def broken_link(channel: str, error: Exception) -> LinkError:

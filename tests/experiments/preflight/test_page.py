@@ -27,6 +27,7 @@ def test_disk_arm_and_sensor_are_all_graded(tmp_path):
     assert [graded[name] for name in ("disk", "arm", "F/T")] == [BAD, BAD, BAD]
     assert "GB free, a session needs" in done.err  # the first of them
     assert done.out.count("Also: ") == 2
+    assert "idle" not in done.out + done.err  # nobody knows of a silent arm
 
 
 def test_an_arm_without_zero_is_asked_the_rest(tmp_path):

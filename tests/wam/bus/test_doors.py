@@ -1,6 +1,7 @@
 import errno
 import socket
 import struct
+from pathlib import Path
 
 import can
 import pytest
@@ -66,6 +67,9 @@ class ScriptedSocket:
     def setsockopt(self, *option):
         raise OSError(errno.ENOPROTOOPT, "of an old kernel")
 
+    def getsockopt(self, *option):
+        raise OSError(errno.ENOPROTOOPT, "of an old kernel")
+
     def recvmsg_into(self, buffers, room):
         if not self.script:
             raise BlockingIOError(errno.EAGAIN, "nothing")
@@ -127,6 +131,15 @@ def test_a_link_sorts_what_the_kernel_hands_out(pair):
     )
 
 
+def test_a_flood_of_error_frames_is_sorted_once_and_hides_no_frame():
+    heard = []
+    flood = [(can_frame(0x20000088, bytes(8)), [])] * 200
+    link = CanLink(scripted(*flood, (can_frame(0x426, b"\x07"), [])), heard.append)
+    assert [frame.can_id for frame in link.receive()] == [0x426]
+    assert link.errors.frames == 200
+    assert [[can_id for can_id, _, _ in frames] for frames in heard] == [[0x426]]
+
+
 @pytest.mark.parametrize("size", [0, 1, 15])
 def test_a_datagram_that_is_no_frame_is_dropped(pair, size):
     door, far = pair
@@ -148,6 +161,10 @@ def test_frames_that_have_not_left_are_known(pair):
     assert door.has_unsent()
     far.recv(99)
     assert not door.has_unsent()
+
+
+def test_a_kernel_that_does_not_tell_what_has_left_stops_no_torque():
+    assert not scripted().has_unsent()
 
 
 def test_a_queue_that_is_full_is_told_from_a_bus_that_broke(pair):
@@ -211,9 +228,11 @@ def test_the_kernels_stamp_is_of_the_hosts_clock():
         (can_frame(2), []),
         (can_frame(3), [stamps()]),
         (can_frame(4), [(1, 37, b"short")]),
+        (can_frame(5), [stamps(clock.utc_ns() + NS_PER_S)]),  # the future
+        (can_frame(6), [stamps(clock.utc_ns() - 60 * NS_PER_S)]),
         clock=clock,
     )
-    assert [f.t_ns for f in door.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0]
+    assert [f.t_ns for f in door.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0, 0, 0]
     assert door.name == "kernel socket"
 
 
@@ -283,9 +302,12 @@ def test_an_interface_that_is_not_there_is_refused(channel):
 
 
 def test_an_interface_that_is_there_has_a_state():
-    state = interface_state(socket.if_nameindex()[0][1])
-    assert isinstance(state.is_up, bool)
-    assert state.queue_length >= 0
+    name = socket.if_nameindex()[0][1]
+    told = Path("/sys/class/net", name)
+    flags = int((told / "flags").read_text(), 16)
+    state = interface_state(name)
+    assert state.is_up == bool(flags & 1)
+    assert state.queue_length == int((told / "tx_queue_len").read_text())
 
 
 def test_an_interface_that_is_down_is_not_opened(monkeypatch):
