@@ -180,7 +180,6 @@ class ControlWorker:
 
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, an arm that got torques is braked."""
-        self._context.shared.memory.touch()
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:
