@@ -31,8 +31,7 @@ class ProcessUse:
     Attributes:
         name: of the process.
         cpu: share of one core.
-        growth_kb: most resident memory up to the end less the most until warm [KiB]; what
-            is taken and given back with every trial is in both.
+        growth_kb: peak of resident memory at the end less the peak when warm [KiB].
         page_faults: pages it had to wait for since it was warm.
     """
 
