@@ -61,6 +61,8 @@ class ArmReading:
         jump: a position that was not believed in this cycle; None = all were.
         foreign_id: identifier of a frame that another master sent; None = none ever.
         has_bus_error: the bus's controller reported an error since the last reading.
+        bus_ns: monotonic time at which the bus had the last reply [ns], 0 = it does
+            not tell.
     """
 
     host_ns: int
@@ -75,6 +77,7 @@ class ArmReading:
     jump: PositionJump | None = None
     foreign_id: int | None = None
     has_bus_error: bool = False
+    bus_ns: int = 0
 
 
 @dataclass(slots=True)

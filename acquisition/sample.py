@@ -52,6 +52,12 @@ CHANNELS = (
         "cycle.arm_ns", "ns", "host clock", "last joint reply arrived, 0 = none"
     ),
     ChannelMeaning(
+        "cycle.bus_ns",
+        "ns",
+        "host clock",
+        "the bus had the last joint reply, 0 = not known",
+    ),
+    ChannelMeaning(
         "cycle.ft_ns", "ns", "host clock", "used F/T sample taken, 0 = none"
     ),
     ChannelMeaning("cycle.ft_counter", "us or count", "sensor clock", "as received"),
@@ -96,6 +102,7 @@ class Sample:
     __slots__ = (
         "_bytes",
         "arm_ns",
+        "bus_ns",
         "counts",
         "cycle",
         "data",
@@ -119,6 +126,7 @@ class Sample:
     flags: NDArray[np.uint32]
     host_ns: NDArray[np.uint64]
     arm_ns: NDArray[np.uint64]
+    bus_ns: NDArray[np.uint64]
     ft_ns: NDArray[np.uint64]
     ft_counter: NDArray[np.uint32]
     counts: NDArray[np.int32]

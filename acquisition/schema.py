@@ -27,7 +27,8 @@ float64[6] wrench_raw  # N, N m at ft_sensor, calibrated but not tared
 float64[3] foot_position  # m, foot sole in wam_base
 float64[4] foot_orientation  # quaternion x y z w, foot in wam_base
 float64[6] foot_velocity  # m/s, rad/s in wam_base: linear x y z, angular x y z
-float64[3] traction  # terrain frame: v_t m/s, F_t N, F_n N (live values)"""
+float64[3] traction  # terrain frame: v_t m/s, F_t N, F_n N (live values)
+uint64 bus_ns  # CLOCK_MONOTONIC, the bus had the last joint reply; 0 = not known"""
 
 TRUTH_TEXT = """\
 std_msgs/Header header  # stamp as in Cycle
@@ -115,7 +116,11 @@ ENCAPSULATION = b"\x00\x01\x00\x00"  # CDR, little endian
 
 def schema_text(type_name: str) -> str:
     """Return the complete ros2msg definition of `type_name` with what it uses."""
-    text = _TEXTS[type_name]
+    return _complete(_TEXTS[type_name])
+
+
+def _complete(text: str) -> str:
+    """Return a definition with those of everything that it uses."""
     blocks = [text]
     seen: set[str] = set()
     queue = _used_types(text)
@@ -156,11 +161,13 @@ class Layout:
             fields too (`padding_28` ends at byte 28), or a copy would fill them with
             whatever is in memory and two equal runs would differ.
         template: a payload with header and frame_id set and zeros elsewhere.
+        definition: the complete ros2msg definition.
     """
 
     type_name: str
     dtype: np.dtype[np.void]
     template: bytes
+    definition: str
 
     @property
     def size(self) -> int:
@@ -168,18 +175,20 @@ class Layout:
         return self.dtype.itemsize
 
 
-def fixed_layout(type_name: str, frame_id: str) -> Layout:
+def fixed_layout(type_name: str, frame_id: str, text: str = "") -> Layout:
     """Derive the CDR layout of `type_name` from its definition.
 
     Every field is aligned to its own size, counted from after the four bytes of
     encapsulation (DDS-XTypes, plain CDR). `frame_id` has a constant length, so the
-    message has a fixed size.
+    message has a fixed size. `text`: the definition, where it is that of an earlier
+    version.
     """
+    text = text or _TEXTS[type_name]
     names = ["encapsulation", "sec", "nanosec", "frame_id_length", "frame_id"]
     frame = frame_id.encode() + b"\0"
     formats: list[object] = ["S4", "<i4", "<u4", "<u4", f"S{len(frame)}"]
     end = 16 + len(frame)
-    for type_code, count, name in _fields(_TEXTS[type_name])[1:]:
+    for type_code, count, name in _fields(text)[1:]:
         code, size = _SCALARS[type_code]
         gap = -(end - 4) % size
         if gap:
@@ -194,8 +203,14 @@ def fixed_layout(type_name: str, frame_id: str) -> Layout:
     template[0:4] = ENCAPSULATION
     struct.pack_into("<I", template, 12, len(frame))
     template[16 : 16 + len(frame)] = frame
-    return Layout(type_name, dtype, bytes(template))
+    return Layout(type_name, dtype, bytes(template), _complete(text))
 
 
 CYCLE = fixed_layout("traction_msgs/msg/Cycle", "wam_base")
+# Of earlier versions, newest first; what they lack is zero when it is read.
+EARLIER_CYCLES = (
+    fixed_layout(
+        CYCLE.type_name, "wam_base", CYCLE_TEXT.partition("\nuint64 bus_ns")[0]
+    ),
+)
 TRUTH = fixed_layout("traction_msgs/msg/Truth", "wam_base")

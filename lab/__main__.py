@@ -1,6 +1,7 @@
 """Boots the machine and runs scenarios: python -m lab [--short] [--only NAME] ..."""
 
 import argparse
+import compileall
 import os
 import shlex
 import sys
@@ -8,29 +9,41 @@ import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Protocol
 
 from acquisition import NS_PER_S, SystemClock
 from lab import initramfs, report, timer_rate
+from lab.follower import Follower
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
-from lab.kernel import fetch_kernel
-from lab.machine import SLOWNESS, Machine, Sockets, command
+from lab.kernel import Kernel, fetch_kernel
+from lab.machine import (
+    SLOWNESS,
+    Machine,
+    Sockets,
+    command,
+    emulator_version,
+    processor_name,
+)
 from lab.requirements import LabError, install_line, missing_packages, program
 from lab.results import (
-    Begun,
-    Finished,
     ScenarioResult,
     TimerAddresses,
-    Verdict,
     from_line,
 )
 
 ROOT = Path(__file__).parents[1]
+_PROGRAM = (
+    "acquisition",
+    "analysis",
+    "experiments",
+    "fakes",
+    "ft_sensor",
+    "wam",
+    "lab",
+)
 CACHE = ROOT / ".lab"
 NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
 _MOST_MACHINES = 2  # unless more are asked for
-BOOT_LIMIT = 300.0  # s of wall time until the first scenario begins
-LIMIT = 1500.0  # s of wall time for one scenario on a busy host
+_STARTED = 30.0  # s until the emulator has its sockets
 _CLOCK = SystemClock()
 _JOB = """\
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
@@ -105,21 +118,33 @@ def _run_if_ready(scenarios: Sequence[Scenario], options: argparse.Namespace) ->
 
 def _run(scenarios: Sequence[Scenario], options: argparse.Namespace) -> int:
     start_ns = _CLOCK.now_ns()
-    results = run_machines(
-        shares(scenarios, options.machines), options.cache, is_shown=options.console
-    )
+    parts = shares(scenarios, options.machines)
+    results = run_machines(parts, options.cache, is_shown=options.console)
     wall = (_CLOCK.now_ns() - start_ns) / NS_PER_S
     print(report.summary(results, wall))
     if options.write:
         what = {scenario.name: scenario.what for scenario in scenarios}
-        options.write.write_text(report.page(results, what, wall), encoding="utf-8")
+        conditions = report.Conditions(
+            fetch_kernel(options.cache).release,
+            emulator_version(),
+            processor_name(),
+            len(parts),
+            wall,
+        )
+        page = report.page(results, what, conditions)
+        options.write.write_text(page, encoding="utf-8")
     return 0 if all(result.verdict.is_fine for result in results) else 1
 
 
 def shares(scenarios: Sequence[Scenario], count: int) -> list[list[Scenario]]:
-    """Return what each of at most `count` machines runs, in turn; none is empty."""
-    parts = [list(scenarios[first::count]) for first in range(count)]
-    return [part for part in parts if part]
+    """Return what each of at most `count` machines runs; none is empty.
+
+    The heaviest goes first, each to the machine that has the least until then.
+    """
+    parts: list[list[Scenario]] = [[] for _ in range(min(count, len(scenarios)))]
+    for one in sorted(scenarios, key=lambda scenario: -scenario.weight):
+        min(parts, key=lambda part: sum(other.weight for other in part)).append(one)
+    return parts
 
 
 def run_machines(
@@ -127,6 +152,8 @@ def run_machines(
 ) -> list[ScenarioResult]:
     """Run a machine for each part, all at once; return results in ALL's order."""
     fetch_kernel(cache)  # once, before they all want it
+    for package in _PROGRAM:  # the emulated processor is many times slower at it
+        compileall.compile_dir(ROOT / package, quiet=1)
     with ThreadPoolExecutor(max(1, len(parts))) as pool:
         runs = [
             pool.submit(run_machine, part, cache, is_shown=is_shown) for part in parts
@@ -157,79 +184,36 @@ def run_machine(
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
         sockets = Sockets(folder / "line", folder / "monitor", folder / "debug")
+        addresses = known_timer(kernel)
         machine = Machine(command(kernel, first_root, sockets))
         try:
-            run = Follower(sockets.debugger, is_shown=is_shown)
+            if addresses is not None:
+                wait_for(sockets.debugger)
+                timer_rate.preset(sockets.debugger, addresses, SLOWNESS)
+            run = Follower(sockets.debugger, kernel.timer, is_shown=is_shown)
             return run.follow(machine, [one.name for one in scenarios])
         finally:
             machine.close()
 
 
-class ReadConsole(Protocol):
-    """What is read of a machine."""
+def known_timer(kernel: Kernel) -> TimerAddresses | None:
+    """Return where an earlier start of the kernel had its timer, if there was one."""
+    if not kernel.timer.exists():
+        return None
+    message = from_line(kernel.timer.read_text(encoding="utf-8"))
+    if isinstance(message, TimerAddresses):
+        return message
+    kernel.timer.unlink()  # of another version of this program
+    return None
 
-    def line(self, until_ns: int) -> str | None:
-        """Return the next line; None at its end, TimeoutError after `until_ns`."""
-        ...
 
-
-class Follower:
-    """Reads a machine's console to its end; what has not come then has hung."""
-
-    def __init__(self, debugger: Path, *, is_shown: bool) -> None:
-        self._debugger = debugger
-        self._is_shown = is_shown
-        self._results: list[ScenarioResult] = []
-        self._running = "boot"
-        self._is_over = False
-        self._until_ns = 0
-        self._own: list[str] = []  # what the machine says beside messages
-
-    def follow(
-        self, machine: ReadConsole, names: Sequence[str]
-    ) -> list[ScenarioResult]:
-        """Return a result for each of the scenarios `names` that has begun."""
-        self._allow(BOOT_LIMIT)
-        try:
-            while (line := machine.line(self._until_ns)) is not None:
-                self._take(line)
-        except TimeoutError:
-            self._own.append("[the time limit ended the machine]")
-        done = {result.name for result in self._results}
-        if not (self._is_over and done >= set(names)):
-            words = "\n".join(self._own[-40:])
-            reason = "the machine ended or hung in it"
-            lost = ScenarioResult(self._running, Verdict.HUNG, 0.0, {}, reason, words)
-            self._add(lost)
-        return self._results
-
-    def _take(self, line: str) -> None:
-        match from_line(line):
-            case Begun(name):
-                self._running = name
-                self._allow(LIMIT)
-            case TimerAddresses(offsets, events):
-                timer_rate.correct(self._debugger, offsets, events, SLOWNESS)
-            case Finished():
-                self._is_over = True
-            case ScenarioResult() as result:
-                self._add(result)
-            case None:
-                self._own.append(line)
-                if self._is_shown:
-                    print(line, flush=True)
-
-    def _allow(self, wall: float) -> None:
-        """Begin a time limit [s] anew."""
-        self._until_ns = _CLOCK.now_ns() + int(wall * NS_PER_S)
-
-    def _add(self, result: ScenarioResult) -> None:
-        self._results.append(result)
-        print(report.result_line(result), flush=True)
-        if not result.verdict.is_fine:
-            print("\n".join(f"    {line}" for line in result.output.splitlines()))
-            if "\n" in result.reason:
-                print(result.reason)
+def wait_for(path: Path) -> None:
+    """Wait until a machine that was started has made a socket."""
+    end_ns = _CLOCK.now_ns() + int(_STARTED * NS_PER_S)
+    while not path.exists():
+        if _CLOCK.now_ns() > end_ns:
+            raise LabError(f"the emulator has not made {path}.")
+        _CLOCK.sleep_until(_CLOCK.now_ns() + NS_PER_S // 100)
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 """The emulated machine: its command line, its console, a limit on its time."""
 
+import os
 import queue
 import subprocess
 import threading
@@ -63,7 +64,26 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
         *_monitor(sockets.monitor),
         *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
         *("-gdb", "chardev:debug"),
+        *(["-S"] if kernel.timer.exists() else []),  # it waits for its timer's rate
     ]
+
+
+def emulator_version() -> str:
+    """Return the name and version of the emulator."""
+    line = subprocess.run(
+        [program("qemu-system-x86_64"), "--version"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.partition("(")[0]
+    return line.replace("emulator version", "").strip()
+
+
+def processor_name() -> str:
+    """Return what the host's processor calls itself, and how many there are."""
+    lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    names = [line.partition(":")[2] for line in lines if line.startswith("model name")]
+    return f"{os.cpu_count()} x {next(iter(names), ' unknown').strip()}"
 
 
 def _host_files() -> list[str]:
@@ -114,6 +134,7 @@ class Machine:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
         )
+        self._taken = 0.0
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -132,6 +153,17 @@ class Machine:
             return self._lines.get(timeout=max(0.0, left))
         except queue.Empty:
             raise TimeoutError from None
+
+    def processor_seconds(self) -> float:
+        """Return the processor time that it has taken so far [s]."""
+        try:
+            stat = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii")
+        except OSError:
+            return self._taken
+        # The name in parentheses may hold anything.
+        user, system = stat.rpartition(")")[2].split()[11:13]
+        self._taken = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
+        return self._taken
 
     def close(self) -> None:
         """Switch it off; safe to repeat."""

@@ -1,6 +1,7 @@
 """The table of verdicts: on the terminal, and as docs/lab.md."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from lab.results import ScenarioResult, Verdict
 
@@ -11,12 +12,52 @@ unmodified program in an emulated machine: Debian's kernel, its `kvaser_pci` (SJ
 and `ftdi_sio` drivers, `can0` and `/dev/ttyUSB0` as on the rig; the simulated arm is on
 `can1`, the simulated sensor at the far end of the serial adapter. All times are guest
 time: the machine's clock follows the instructions it executes, so a busy host changes
-none of them. Bit time, arbitration, missing acknowledgement and bus-off are not in this
-emulated bus.
+none of them. `processor s` is what the emulation of a scenario took of the host.
 
-| scenario | verdict | guest time s | figures |
-|---|---|---|---|
+| scenario | verdict | guest s | processor s | figures |
+|---|---|---|---|---|
 """
+_FIGURES = """
+## The figures
+
+`exchange`: from the request to the seventh position, median and 99th percentile, with
+how many of 100 exchanges were incomplete. `cycles`, `missed`, `gap`: cycles of the kept
+trials, those whose time passed without one, the longest time between two. A trial is
+counted only where `traction verify` accepts it. Where a fault of docs/faults.md is
+raised, the exit code is the one that this page promises for the phase.
+"""
+_NOT_SHOWN = """
+## What is not shown
+
+- Bit time, arbitration, missing acknowledgement, error frames and bus-off: the emulated
+  bus has none of them. Their handling is tested against `slcan` and simulated buses.
+- How late a real host wakes: guest time does not pass while the host does other things.
+- The time that an adapter on USB needs: both cards are PCI cards without a delay.
+- Hardware time stamps: `kvaser_pci` has software time stamps only.
+- The start of a process: programs begin forked, their libraries loaded, but for the
+  `check` of "home arm", which is executed. The preflight tests the loop for 0.5 s
+  (`[loop] test_time`), there for 2 s.
+"""
+_CONFIDENT = 3.0  # events that 95 % of all runs would show, where none was seen
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """What a run was made with.
+
+    Attributes:
+        kernel: the guest's, by its release.
+        emulator: QEMU's version.
+        processor: the host's.
+        machines: so many at once.
+        wall: time of the run on the host [s].
+    """
+
+    kernel: str
+    emulator: str
+    processor: str
+    machines: int
+    wall: float
 
 
 def figure_words(figures: Mapping[str, str]) -> str:
@@ -29,7 +70,7 @@ def result_line(result: ScenarioResult) -> str:
     words = result.reason or figure_words(result.figures)
     # A traceback says what it is in its last line.
     last = words.strip().splitlines()[-1:] or [""]
-    seconds = f"{result.seconds:8.2f} s"
+    seconds = f"{result.seconds:8.2f} s {result.processor:7.1f} s"
     return f"{result.verdict.value:<10} {result.name:<28} {seconds}  {last[0]}"
 
 
@@ -43,24 +84,46 @@ def summary(results: Sequence[ScenarioResult], wall: float) -> str:
     return f"{', '.join(parts) or 'nothing ran'} in {wall:.0f} s of wall time"
 
 
+def cycle_words(results: Sequence[ScenarioResult]) -> str:
+    """Return the cycles of all kept trials, and what their number lets one say."""
+    rows = [result.figures for result in results if "cycles" in result.figures]
+    cycles = sum(int(row["cycles"]) for row in rows)
+    missed = sum(int(row["missed"]) for row in rows)
+    if not cycles:
+        return "No trial was kept."
+    words = f"{missed} of {cycles} cycles of kept trials were missed"
+    if missed:
+        return f"{words}: {missed / cycles * 1e6:.0f} ppm."
+    bound = _CONFIDENT / cycles * 1e6
+    return f"{words}: below {bound:.0f} ppm with 95 % confidence."
+
+
 def page(
-    results: Sequence[ScenarioResult], what: Mapping[str, str], wall: float
+    results: Sequence[ScenarioResult], what: Mapping[str, str], conditions: Conditions
 ) -> str:
     """Return docs/lab.md.
 
     Args:
         results: of a full run.
         what: a sentence for each scenario.
-        wall: time of the run on the host [s].
+        conditions: what it was made with.
     """
     rows = [
         f"| {result.name} | {result.verdict.value} | {result.seconds:.1f} | "
-        f"{_cell(result)} |\n"
+        f"{result.processor:.0f} | {_cell(result)} |\n"
         for result in results
     ]
     sentences = [f"- **{name}**: {sentence}\n" for name, sentence in what.items()]
-    end = ["\n", *sentences, f"\n{summary(results, wall).capitalize()}.\n"]
-    return "".join([_TITLE, _HEAD, *rows, *end])
+    taken = sum(result.processor for result in results)
+    verdicts = summary(results, conditions.wall).capitalize()
+    made = (
+        f"\n{verdicts}, with {conditions.machines} machines at once and "
+        f"{taken:.0f} s of processor time beside their starts. Kernel "
+        f"{conditions.kernel}, {conditions.emulator}, {conditions.processor}.\n\n"
+        f"{cycle_words(results)}\n"
+    )
+    ends = [made, _FIGURES, "\n", *sentences, _NOT_SHOWN]
+    return "".join([_TITLE, _HEAD, *rows, *ends])
 
 
 def _cell(result: ScenarioResult) -> str:

@@ -38,6 +38,7 @@ class ScenarioResult:
         figures: what was measured, in words with units, by name.
         reason: why it is not simply passed.
         output: of the commands that it ran; kept where it failed.
+        processor: time of the host that the emulation took [s], as the host adds it.
     """
 
     name: str
@@ -46,6 +47,7 @@ class ScenarioResult:
     figures: dict[str, str] = field(default_factory=dict[str, str])
     reason: str = ""
     output: str = ""
+    processor: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +64,14 @@ class TimerAddresses:
     Attributes:
         offsets: of the processors' parts of the memory.
         events: the timer within such a part.
+        period: its ticks between two of the kernel's, 0 until it is measured.
+        setup: of the function that measures it.
     """
 
     offsets: int
     events: int
+    period: int
+    setup: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -67,14 +67,22 @@ TESTS = {
     ),
     f"{_DRIVER}/startup.py": (
         f"{_DRIVER_TESTS}/test_startup.py",
+        f"{_DRIVER_TESTS}/test_generations.py",
+        f"{_DRIVER_TESTS}/test_lenient_start.py",
+        f"{_DRIVER_TESTS}/test_safety_limits.py",
+    ),
+    f"{_DRIVER}/home.py": (
         f"{_DRIVER_TESTS}/test_home_check.py",
         "tests/experiments/preflight/test_zero_check.py",
-        f"{_DRIVER_TESTS}/test_generations.py",
-        f"{_DRIVER_TESTS}/test_safety_limits.py",
+    ),
+    f"{_DRIVER}/pendant.py": (
+        f"{_DRIVER_TESTS}/test_safety_module.py",
+        f"{_DRIVER_TESTS}/test_lenient_start.py",
     ),
     f"{_DRIVER}/safety_module.py": (
         f"{_DRIVER_TESTS}/test_safety_module.py",
         f"{_DRIVER_TESTS}/test_safety_limits.py",
+        f"{_DRIVER_TESTS}/test_lenient_start.py",
         f"{_DRIVER_TESTS}/test_arm.py",
         "tests/experiments/rig/test_build_limits.py",
     ),

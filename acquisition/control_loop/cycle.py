@@ -285,6 +285,7 @@ class Cycle:
         sample.flags[0] = bits
         sample.host_ns[0] = reading.host_ns
         sample.arm_ns[0] = reading.arm_ns
+        sample.bus_ns[0] = reading.bus_ns
         sample.counts[...] = reading.counts
         sample.position[...] = reading.q
         sample.velocity[...] = reading.qd

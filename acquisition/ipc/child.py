@@ -169,9 +169,11 @@ def main(arguments: list[str]) -> None:
         importlib.import_module(module), function
     )
     link = Channel.adopt(int(channel))
+    layout = SharedLayout(SharedMemory(int(shared)))
+    layout.memory.touch()
     try:
         settings = link.receive()
-        run(ChildContext(SharedLayout(SharedMemory(int(shared))), link, settings))
+        run(ChildContext(layout, link, settings))
     except ChannelClosedError:
         return  # the console has gone; the process with the arm has braked it
 

@@ -1,6 +1,7 @@
 """TrialReader: whole chunks into numpy arrays, damaged and hostile files refused."""
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
 from acquisition.sample import Record
-from acquisition.schema import CYCLE, TRUTH, Layout, schema_text
+from acquisition.schema import CYCLE, EARLIER_CYCLES, TRUTH, Layout
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
 
@@ -84,7 +85,7 @@ class TrialReader:
 
     def cycles(self) -> TopicRows:
         """Return all records of `/cycle` in order."""
-        return self._rows("/cycle", CYCLE)
+        return self._rows("/cycle", CYCLE, *EARLIER_CYCLES)
 
     def truth(self) -> TopicRows:
         """Return all records of `/truth` in order (truth files of simulations)."""
@@ -96,9 +97,9 @@ class TrialReader:
         counts = self.summary.statistics.channel_message_counts
         return {c.topic: counts.get(i, 0) for i, c in self.summary.channels.items()}
 
-    def _rows(self, topic: str, layout: Layout) -> TopicRows:
+    def _rows(self, topic: str, newest: Layout, *earlier: Layout) -> TopicRows:
         with as_trial_file_error(self.path):
-            channel = self._channel(topic, layout.type_name)
+            channel, layout = self._channel(topic, (newest, *earlier))
             chunks = [
                 index
                 for index in self.summary.chunk_indexes
@@ -118,6 +119,7 @@ class TrialReader:
                     self.path, f"{topic}: {filled} messages, {count} announced"
                 )
             self._check_rows(heads, data, layout, channel)
+            data = data if layout is newest else _widened(data, newest)
             return TopicRows(data, heads["log_time"].copy(), heads["sequence"].copy())
 
     def _copy(self, index: ChunkIndex, channel: int, heads: Record, out: Record) -> int:
@@ -170,16 +172,28 @@ class TrialReader:
             raise TrialFileError(self.path, "has a damaged message index")
         return np.frombuffer(body, "<u8", size // 8, _INDEX.size)[1::2]
 
-    def _channel(self, topic: str, type_name: str) -> int:
+    def _channel(self, topic: str, layouts: Sequence[Layout]) -> tuple[int, Layout]:
+        """Return the channel of a topic and which of `layouts` its messages have."""
+        type_name = layouts[0].type_name
         for number, channel in self.summary.channels.items():
             if channel.topic == topic:
                 schema = self.summary.schemas.get(channel.schema_id)
                 if schema is None or schema.name != type_name:
                     raise TrialFileError(self.path, f"{topic} is not a {type_name}")
-                if _fields(schema.data.decode()) != _fields(schema_text(type_name)):
-                    raise TrialFileError(self.path, f"{topic} has other fields")
-                return number
+                fields = _fields(schema.data.decode())
+                for layout in layouts:
+                    if fields == _fields(layout.definition):
+                        return number, layout
+                raise TrialFileError(self.path, f"{topic} has other fields")
         raise TrialFileError(self.path, f"has no topic {topic}")
+
+
+def _widened(data: Record, newest: Layout) -> Record:
+    """Return messages of an earlier layout in the newest, zero where they lack it."""
+    out = np.zeros(len(data), newest.dtype)
+    for name in data.dtype.names or ():
+        out[name] = data[name]
+    return out
 
 
 def _gather(data: bytes, start: int, offsets: NDArray[np.intp], out: Record) -> None:

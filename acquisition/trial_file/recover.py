@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from acquisition.errors import TrialFileError
 from acquisition.sample import Flag
-from acquisition.schema import CYCLE
+from acquisition.schema import CYCLE, EARLIER_CYCLES
 from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
 from acquisition.trial_file.publishing import publish_file
@@ -23,6 +23,7 @@ from acquisition.trial_file.salvage import Salvaged, SoundRecords
 from acquisition.trial_file.verify import VerifiedFile, verify_file
 from acquisition.trial_file.writer import CHUNK_BYTES
 
+_CYCLES = {layout.size: layout for layout in (CYCLE, *EARLIER_CYCLES)}
 ROOM = ".recover"  # begins the name of a folder in which a copy grows
 
 
@@ -133,8 +134,9 @@ class TrialCopy:
         )
         self.messages += 1
         is_cycle = record.channel_id == self._cycle_channel
-        if is_cycle and len(record.data) == CYCLE.size:  # others fail to verify
-            cycle = np.frombuffer(record.data, CYCLE.dtype, 1)[0]
+        layout = _CYCLES.get(len(record.data)) if is_cycle else None
+        if layout is not None:  # others fail to verify
+            cycle = np.frombuffer(record.data, layout.dtype, 1)[0]
             self._numbers.append(int(cycle["cycle"]))
             self._late += bool(cycle["flags"] & Flag.DEADLINE_MISSED)
 

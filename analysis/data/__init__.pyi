@@ -1,5 +1,6 @@
 from .columns import parse_columns, parse_units
 from .events import Slip, find_slips
+from .inertia import WINDOW
 from .lag import ForceLag, force_lag
 from .load import Frame, RecordedTrial, load_trial
 from .plausibility import LATEST_MS, Doubt, doubts_of, doubts_of_record, summed_up
@@ -48,6 +49,7 @@ __all__ = [
     "PULLED_WARNING",
     "SENSOR_ERROR",
     "SMALL",
+    "WINDOW",
     "Array",
     "CoverageGrid",
     "Doubt",

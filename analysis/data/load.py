@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from acquisition import Flag, Record, SettingsError, TrialFileError, parse_toml
 from acquisition.trial_file import TrialReader
+from analysis.data.inertia import InertialForce, inertial_force
 from analysis.data.prepare import foot_velocity
 from analysis.data.series import TractionSeries
 from analysis.data.tare_bracket import TareBracket, read_bracket
@@ -127,7 +128,27 @@ class RecordedTrial:
         if self.bracket is None:
             return self
         drift = self.payload.sign * self.bracket.drift(self.t)
-        force = self.force - self.payload.to_base(drift, self.rotation)
+        return self._with_force(self.force - self.payload.to_base(drift, self.rotation))
+
+    def inertial_force(self) -> InertialForce:
+        """Return the force that accelerates the foot, base frame; raises SettingsError.
+
+        The centre of mass is that of the payload, everything below the gauges.
+        """
+        origin = np.array([0.0, 0.0, self.sensor_height or 0.0])  # of the sensor
+        from_sole = origin + self.payload.rotation @ self.payload.com - self.sole_point
+        com = self.sole + self.rotation @ from_sole
+        try:
+            return inertial_force(self.t, com, self.payload.mass)
+        except SettingsError as error:
+            text = f"{self.name}: {error.message}"
+            raise SettingsError(text, hint=error.hint) from error
+
+    def without_inertia(self) -> "RecordedTrial":
+        """Return the trial with the ground's force alone; raises SettingsError."""
+        return self._with_force(self.force + self.inertial_force().force)
+
+    def _with_force(self, force: Array) -> "RecordedTrial":
         axes = self.frame.axes()
         return replace(
             self,

@@ -1,12 +1,7 @@
 from .page import ReportContext, write_report
 from .page_model import ReportTable
-from .what_if import (
-    StudyVariant,
-    parse_choice,
-    parse_window,
-    plain_choice,
-    side_by_side,
-)
+from .what_if import StudyVariant, parse_choice, parse_window
+from .what_if_tables import plain_choice, side_by_side
 
 __all__ = [
     "ReportContext",

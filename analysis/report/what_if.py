@@ -1,27 +1,20 @@
-"""A study repeated under a choice that the paper leaves open, and both side by side."""
+"""A choice that the paper leaves open, made otherwise: what it changes in a study."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+
+import numpy as np
 
 from acquisition import SettingsError
-from analysis.data import Frame, PrepareOptions, RecordedTrial, TractionSeries
-from analysis.figures import ReportSection
-from analysis.report.further_tables import paired_cell
-from analysis.report.page_model import ReportTable
+from analysis.data import WINDOW, Frame, PrepareOptions, RecordedTrial, TractionSeries
 from analysis.study import (
     FITTERS,
     GP_NN,
     GP_NN_TUSTIN,
     GP_SE_TUSTIN,
-    TITLES,
     TUSTIN,
-    PairedComparison,
-    Study,
     StudyOptions,
-    compare,
-    mean_of,
 )
 from analysis.tustin import TustinForm
 
@@ -30,12 +23,12 @@ VALUES = {
     "window": "slowest:fastest in m/s, e.g. window=0.01:0.2",
     "lag": "-50 to 50 ms that the force is late, e.g. lag=20",
     "frame": "sole or terrain",
+    "inertia": "removed (the force that accelerates the foot) or kept",
     "drift": "interpolated (between the tares) or first (the tare before the trial)",
     "kernel": "as_printed (eq. 5 without 1 +) or default",
     "static_friction": "proportional (F_s = f_s F_n) or constant",
 }
 _LATEST_MS = 50.0
-_MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +43,8 @@ class StudyVariant:
         lag: how late the forces are taken to be [s].
         change: from the options of the study to those of the repeated one.
         is_interpolated: the sensor's zero lies on a line between two tares.
+        is_massless: the force that accelerates the foot is taken out.
+        remark: what it did to the trials, for people.
     """
 
     key: str
@@ -59,6 +54,8 @@ class StudyVariant:
     frame: Frame = "terrain"
     lag: float = 0.0
     is_interpolated: bool = False
+    is_massless: bool = False
+    remark: str = ""
 
     @property
     def text(self) -> str:
@@ -73,15 +70,33 @@ class StudyVariant:
         """
         if isinstance(trial, RecordedTrial):
             chosen = trial.interpolated() if self.is_interpolated else trial
+            chosen = chosen.without_inertia() if self.is_massless else chosen
             series = chosen.series(self.frame)
-        elif self.frame == "terrain" and not self.is_interpolated:
+        elif self.frame == "terrain" and not (self.is_interpolated or self.is_massless):
             series = trial
         else:
             raise SettingsError(
-                f"--what-if {self.text}: tables have no frame and no tares.",
+                f"--what-if {self.text}: tables have no frame, tares or mass.",
                 hint="It is a choice of recorded trials: traction report.",
             )
         return series.with_forces_from(self.lag) if self.lag else series
+
+    def remarked(
+        self, trials: Iterable[RecordedTrial | TractionSeries]
+    ) -> "StudyVariant":
+        """Return the choice with a remark on what it does to trials."""
+        if not self.is_massless:
+            return self
+        forces = [t.inertial_force() for t in trials if isinstance(t, RecordedTrial)]
+        largest = np.median([np.linalg.norm(f.force, axis=1).max() for f in forces])
+        noise = np.median([f.uncertainty for f in forces])
+        return replace(
+            self,
+            remark=f" The foot's inertia took {largest:.2f} N at most (median of "
+            f"trials), known to {noise:.2f} N (standard uncertainty of a component by "
+            f"the scatter of the positions); changes within {WINDOW * 1e3:.0f} ms are "
+            "not seen.",
+        )
 
     def options(self, before: StudyOptions) -> StudyOptions:
         """Return the options of the repeated study, only of the models it touches."""
@@ -107,86 +122,6 @@ def parse_choice(text: str) -> StudyVariant:
             f"--what-if {text[:60]!r}: {value[:30]!r} is no value of {key}.",
             hint=f"Give {VALUES[key]}.",
         ) from error
-
-
-def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTable:
-    """Return errors of both studies per terrain and model, trial by trial."""
-    rows = [
-        [
-            terrain,
-            TITLES[model],
-            *(
-                cell
-                for key, _ in _MEASURES
-                for cell in _cells(before, after, (terrain, model, key))
-            ),
-        ]
-        for terrain in before.terrains
-        for model in choice.models
-        if terrain in after.terrains
-    ]
-    heads = [
-        head
-        for key, unit in _MEASURES
-        for head in (f"{key.upper()} [{unit}]", choice.text, "difference")
-    ]
-    return ReportTable(
-        name=f"What if {choice.text}?",
-        header=("terrain", "model", *heads),
-        rows=rows,
-        note="The study as it is, then repeated under the choice, with the same points "
-        "and the same trials left out. Means over trials; difference ± its standard "
-        "error over the trials that both have, below zero is better under the choice; "
-        "p by all patterns of signs. Smoothing and window change what models are "
-        "fitted to; they are tested on the samples of the study as it is. Frame and "
-        "lag change the data themselves, and with them what is tested.",
-        section=ReportSection.CHANGED,
-    )
-
-
-def plain_choice(choice: StudyVariant, before: Study, after: Study) -> dict[str, Any]:
-    """Return the comparison as plain values for fits.json."""
-    return {
-        "choice": choice.text,
-        "terrains": {
-            terrain: {
-                model: {
-                    key: _numbers(before, after, (terrain, model, key))
-                    for key, _ in _MEASURES
-                }
-                for model in choice.models
-            }
-            for terrain in before.terrains
-            if terrain in after.terrains
-        },
-        "units": dict(_MEASURES),
-    }
-
-
-Place = tuple[str, str, str]  # terrain, model, measure
-
-
-def _pair(before: Study, after: Study, place: Place) -> PairedComparison | None:
-    terrain, model, key = place
-    first, second = (s.terrains[terrain].scores(model, key) for s in (before, after))
-    return compare(first, second)
-
-
-def _numbers(before: Study, after: Study, place: Place) -> dict[str, Any]:
-    terrain, model, key = place
-    paired = _pair(before, after, place)
-    return {
-        "before": mean_of(before.terrains[terrain].scores(model, key)),
-        "after": mean_of(after.terrains[terrain].scores(model, key)),
-        "paired": None if paired is None else paired._asdict(),
-    }
-
-
-def _cells(before: Study, after: Study, place: Place) -> list[str]:
-    numbers = _numbers(before, after, place)
-    means = [numbers["before"], numbers["after"]]
-    texts = ["–" if mean is None else f"{mean:.3f}" for mean in means]
-    return [*texts, paired_cell(_pair(before, after, place))]
 
 
 def _listed() -> str:
@@ -256,6 +191,11 @@ def _drift(value: str) -> StudyVariant:
     )
 
 
+def _inertia(value: str) -> StudyVariant:
+    is_massless = _one_of(value, "removed", "kept")
+    return StudyVariant("inertia", value, tuple(FITTERS), is_massless=is_massless)
+
+
 def _kernel(value: str) -> StudyVariant:
     printed = _one_of(value, "as_printed", "default")
     return StudyVariant(
@@ -291,6 +231,7 @@ _PARSERS: Mapping[str, Callable[[str], StudyVariant]] = {
     "window": _window,
     "lag": _lag,
     "frame": _frame,
+    "inertia": _inertia,
     "drift": _drift,
     "kernel": _kernel,
     "static_friction": _static_friction,

@@ -50,7 +50,8 @@ def run(args: argparse.Namespace) -> int:
     backend = rig.backend
     assert isinstance(backend, MultiProcessBackend)
     with closing(backend):
-        start_devices(rig)
+        for text in start_devices(rig).warnings:
+            console.problem(text)
         processes = {**backend.processes(), "console": os.getpid()}
         report = run_bench(rig, processes, args.seconds)
     if args.json:

@@ -28,9 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--loop-test",
         type=number_within(0.1, 3600, "seconds, e.g. 5"),
-        default=5.0,
         metavar="SECONDS",
-        help="how long the loop is measured (5)",
+        help="how long the loop is measured (test_time of rig.toml)",
     )
     parser.add_argument(
         "--bus",
@@ -92,7 +91,7 @@ def _listen(
         LinkError: the bus cannot be opened, or broke.
     """
     from acquisition import SettingsError, SystemClock
-    from wam.bus import BusTraffic, CanLink, open_bus
+    from wam.bus import BusTraffic, CanLink, open_door
 
     if is_fake:
         raise SettingsError(
@@ -105,7 +104,8 @@ def _listen(
         f"traction check --bus        {can.interface}:{can.channel} for {seconds:g} s, "
         "nothing is sent"
     )
-    link = CanLink(open_bus(can.interface, can.channel, can.bitrate), traffic)
+    door = open_door(can.interface, can.channel, can.bitrate, clock)
+    link = CanLink(door, traffic)
     try:
         deadline_ns = clock.now_ns() + round(seconds * 1e9)
         while clock.now_ns() < deadline_ns:

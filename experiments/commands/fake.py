@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from experiments.operator import Console
+    from experiments.rig import ServedArm
     from experiments.settings import Settings
     from experiments.tools import Press, Pressable
 
 EXAMPLES = """\
   traction fake --can traction-fake:/tmp/wam.sock --idle-first
-  traction fake --serial /tmp/sensor --sensor optoforce"""
+  traction fake --can traction-fake:/tmp/wam.sock --idle-first --bare"""
+
+_NEWEST, _LARGEST = 200, 0x7FFF  # VERS is a word of 16 bits, signed
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="begin powered and idle, pucks asleep; otherwise in E-STOP",
     )
+    _add_arm(parser)
     parser.add_argument(
         "--script",
         type=Path,
@@ -53,6 +57,36 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_arm(parser: argparse.ArgumentParser) -> None:
+    """Declare how the arm is found, and who holds it."""
+    parser.add_argument(
+        "--bare",
+        action="store_true",
+        help="the arm by itself, as a program that moves it expects it: short for "
+        "--hand none --tool none",
+    )
+    parser.add_argument(
+        "--hand",
+        choices=("carry", "none"),
+        help="carry (default): a person holds the foot where it is, and the joints "
+        "hardly rub; none: nobody, with the friction of a real arm",
+    )
+    parser.add_argument(
+        "--tool",
+        metavar="tread|bare|none|FILE",
+        help="what hangs on the tool plate: a foot of rig.toml below the wrist sensor "
+        "(default: that of the first terrain), nothing and no sensor, or the foot of a "
+        "TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",
+    )
+    parser.add_argument(
+        "--firmware",
+        type=_firmware,
+        default=(_NEWEST, _NEWEST),
+        metavar="MOTORS[,SAFETY]",
+        help=f"what the pucks and the safety module say they run ({_NEWEST})",
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Serve until a signal ends it and return the exit code."""
     from acquisition import SystemClock
@@ -62,18 +96,17 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings import load_settings
     from experiments.tools import PRESSES, Lines, Pendant, read_script
 
-    bus = _split(args.can) if args.can else None
+    served = _served(args)
     script = None if args.script is None else read_script(args.script)
     settings = load_settings(args.config)
     console = Console(color=not args.no_color)
     clock, stop = SystemClock(), StopFlag()
-    line = (args.serial, args.sensor) if args.serial else None
-    if bus is None:
-        return _serve_sensor(settings, line, console)
+    if served is None:
+        return _serve_sensor(settings, args, console)
     with (
-        handle_signals(stop),
+        handle_signals(stop, is_service=True),
         open_bus_log(args.can_log, clock, "fake0", console) as log,
-        closing(build_server(settings, bus, line, is_idle=args.idle_first)) as server,
+        closing(build_server(settings, served)) as server,
     ):
         console.say(f"ready: {server.name}, safety module in {server.state}")
         pendant = Pendant(script, Lines(_stdin()), clock.now_ns())
@@ -90,21 +123,62 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _served(args: argparse.Namespace) -> ServedArm | None:
+    """Return the arm that is to be served; None = none."""
+    from experiments.rig import ServedArm
+
+    if not args.can:
+        return None
+    return ServedArm(
+        bus=_split(args.can),
+        line=_line(args),
+        is_idle_first=args.idle_first,
+        tool=_tool(args),
+        has_hand=(args.hand or ("none" if args.bare else "carry")) == "carry",
+        firmware=args.firmware,
+    )
+
+
+def _line(args: argparse.Namespace) -> tuple[Path, str] | None:
+    return (args.serial, args.sensor) if args.serial else None
+
+
+def _tool(args: argparse.Namespace) -> str:
+    """Return what hangs on the plate; --tool counts more than --bare."""
+    return args.tool or ("none" if args.bare else "")
+
+
+def _firmware(text: str) -> tuple[int, int]:
+    """Return the firmware of the pucks and of the safety module.
+
+    Raises:
+        ArgumentTypeError: neither one number nor two.
+    """
+    parts = text.split(",")
+    is_number = all(part.isascii() and part.isdigit() for part in parts)
+    numbers = [int(part) for part in parts] if is_number and len(text) < 12 else []
+    if len(numbers) not in (1, 2) or max(numbers) > _LARGEST:
+        raise argparse.ArgumentTypeError(f"{text!r} - expected e.g. 200 or 60,61")
+    return numbers[0], numbers[-1]
+
+
 def _serve_sensor(
-    settings: Settings, line: tuple[Path, str] | None, console: Console
+    settings: Settings, args: argparse.Namespace, console: Console
 ) -> int:
     """Serve a sensor without an arm until a signal ends it."""
     from acquisition import SettingsError
     from experiments.rig import build_sensor_server
     from experiments.run import StopFlag, handle_signals
 
+    line = _line(args)
     if line is None:
         raise SettingsError(
             "There is nothing to serve.",
             hint="Name --can INTERFACE:CHANNEL, --serial PATH, or both.",
         )
     stop = StopFlag()
-    with handle_signals(stop), closing(build_sensor_server(settings, line)) as server:
+    sensor = build_sensor_server(settings, line, _tool(args))
+    with handle_signals(stop, is_service=True), closing(sensor) as server:
         console.say(f"ready: {server.name}")
         while not stop.count:
             server.wait()

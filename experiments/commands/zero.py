@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Define the home position after confirmation and return the exit code."""
-    from experiments.operator import GOOD, Console
+    from experiments.operator import GOOD, WARNING, Console
     from experiments.preflight import connect_rig
     from experiments.rig import FakeOptions
     from experiments.settings import load_settings
@@ -42,6 +42,8 @@ def run(args: argparse.Namespace) -> int:
         home = rig.model.constants.home
         mode = info.safety_mode.name.lower().replace("_", "-")
         console.check(GOOD, "arm", f"pucks 1-7 answer, safety {mode}")
+        for text in info.warnings:
+            console.check(WARNING, "start-up", text)
         angles = "  ".join(f"J{i + 1} {angle:.2f}" for i, angle in enumerate(home))
         console.say(f"Home position, rad: {angles}")
         if not args.yes and not _is_confirmed(console):

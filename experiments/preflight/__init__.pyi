@@ -7,10 +7,9 @@ from .conditions import (
     write_conditions,
 )
 from .host_checks import free_bytes
-from .preflight import LOOP_TEST, Preflight, connect_rig, run_preflight, start_devices
+from .preflight import Preflight, connect_rig, run_preflight, start_devices
 
 __all__ = [
-    "LOOP_TEST",
     "Preflight",
     "check_conditions",
     "confirm_foot",

@@ -19,7 +19,7 @@ from experiments.operator import (
     Prompt,
     wait_for_key,
 )
-from experiments.preflight.host_checks import CheckResult
+from experiments.preflight.page import CheckResult
 from experiments.rig import Rig
 from experiments.session import SessionFolder, list_sessions, read_json, write_json
 from experiments.settings import RigSettings, TerrainRow, flatten

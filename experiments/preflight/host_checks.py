@@ -2,18 +2,21 @@
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from acquisition import Record
+from experiments.messages import preflight_error
 from experiments.operator import BAD, GOOD, WARNING
+from experiments.preflight.page import Add, CheckResult
 from ft_sensor import axis_names, largest_traction
 from ft_sensor.serial_line import BURSTY
+from wam.bus import LONGEST_QUEUE, interface_state
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
+SESSION_GB = 0.9
 NOISY = 0.5  # N, several times what a quiet sensor shows
 
 
@@ -23,15 +26,6 @@ DiskProbe = Callable[[Path], int]  # a folder in, free bytes there out
 def free_bytes(folder: Path) -> int:
     """Return how much room is left where `folder` is [bytes]."""
     return shutil.disk_usage(folder).free
-
-
-@dataclass(frozen=True, slots=True)
-class CheckResult:
-    """One line of the page."""
-
-    mark: str
-    name: str
-    text: str
 
 
 def check_governor(cpus: Path = CPUS) -> CheckResult:
@@ -112,3 +106,47 @@ def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
         text += ", comes in bursts: latency timer of the adapter to 1 ms"
     is_fine = not is_bursty and fields["lost"] == fields["bad_checks"] == "0"
     return CheckResult(GOOD if is_fine else WARNING, name, text)
+
+
+def check_disk(data: Path, limit: float, add: Add, probe: DiskProbe) -> None:
+    """Grade the free space where the data folder is going to be.
+
+    Args:
+        data: the folder; it need not exist yet.
+        limit: least that must be free [GB].
+        add: takes mark, name and text of the line.
+        probe: tells how much room is left on a disk.
+
+    Raises:
+        PreflightError: less is free than the limit, or than a session needs.
+    """
+    folder = data
+    while not folder.exists():
+        folder = folder.parent
+    free = probe(folder) / 1e9
+    if free < max(limit, SESSION_GB):
+        add(BAD, "disk", f"{free:.1f} GB free")
+        raise preflight_error("disk-full", free=free, need=SESSION_GB, limit=limit)
+    add(GOOD, "disk", f"{free:.0f} GB free")
+
+
+def check_interface(channel: str) -> CheckResult | None:
+    """Grade an interface of SocketCAN; None where it is not there at all."""
+    try:
+        state = interface_state(channel)
+    except OSError:
+        return None  # the arm's check says so, with its fix
+    name = "CAN interface"
+    if not state.is_up:
+        return CheckResult(WARNING, name, f"{channel} is down")
+    if not state.has_carrier:
+        text = f"{channel} has left the bus: ip link set {channel} down, then up"
+        return CheckResult(WARNING, name, text)
+    if state.queue_length > LONGEST_QUEUE:
+        text = (
+            f"{channel} holds back up to {state.queue_length} frames, torques among "
+            f"them: ip link set {channel} txqueuelen {LONGEST_QUEUE}"
+        )
+        return CheckResult(WARNING, name, text)
+    text = f"{channel} is up and holds back {state.queue_length} frames at most"
+    return CheckResult(GOOD, name, text)

@@ -1,6 +1,5 @@
 """Is the rig fit to run? Every check graded, with what to do beside it."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -19,15 +18,17 @@ from experiments import provenance
 from experiments.messages import preflight_error
 from experiments.operator import BAD, GOOD, WARNING, Console
 from experiments.preflight.host_checks import (
-    CheckResult,
     DiskProbe,
     check_code,
+    check_disk,
     check_governor,
+    check_interface,
     check_stream,
     check_wrenches,
     free_bytes,
     reach_words,
 )
+from experiments.preflight.page import Add, CheckResult, ChecksPage
 from experiments.rig import EXCHANGE_CYCLES, FakeOptions, Rig, build_rig, gravity_words
 from experiments.settings import RigSettings, Settings, TerrainRow
 from wam.driver import (
@@ -39,10 +40,7 @@ from wam.driver import (
     zero_error,
 )
 
-LOOP_TEST = 5.0  # s
 STEPPED_TEST = 0.3  # s
-Add = Callable[[str, str, str], None]
-SESSION_GB = 0.9
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +75,7 @@ def run_preflight(
     rig: Rig,
     data: Path,
     console: Console,
-    seconds: float = LOOP_TEST,
+    seconds: float | None = None,
     probe: DiskProbe = free_bytes,
 ) -> Preflight:
     """Check configuration, arm, sensor, loop and disk; print one line each.
@@ -88,48 +86,60 @@ def run_preflight(
         rig: with its bus open.
         data: the data folder.
         console: where the page is printed.
-        seconds: how long the loop is tested [s].
+        seconds: how long the loop is tested [s]; None = `[loop] test_time`.
         probe: tells how much room is left on the disk.
 
     Raises:
-        PreflightError: a check failed.
+        PreflightError: a check failed; all that do not need it were run.
     """
-    checks: list[CheckResult] = []
-
-    def add(mark: str, name: str, text: str) -> None:
-        checks.append(CheckResult(mark, name, text))
-        console.check(mark, name, text)
-
-    def add_result(result: CheckResult) -> None:
-        add(result.mark, result.name, result.text)
-
-    weight = gravity_words(rig.settings.rig, rig.gravity_text, rig.row.foot)
-    add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, gravity {weight}")
-    add_result(check_code(provenance.collect()))
-    if not rig.is_stepped:
-        add_result(check_governor())
-    check_disk(rig, data, add, probe)
-    info = _check_arm(rig, add)
-    sensor = _check_sensor(rig, add)
-    _check_exchange(rig, add)
-    grants = _check_rights(rig, add)
+    page = ChecksPage(console)
+    _check_host(rig, data, page, probe)
+    info = page.attempt(lambda: _check_arm(rig, page))
+    sensor = None
+    if info is not None or not rig.settings.rig.ft_sensor.is_on_bus:
+        arm_state = "not touched" if info is None else "idle"
+        sensor = page.attempt(lambda: _check_sensor(rig, arm_state, page.add))
+    if info is not None:
+        page.attempt(lambda: _check_exchange(rig, page.add))
+    grants = _check_rights(rig, page.add)
+    page.require_fit()
+    assert info is not None
+    assert sensor is not None
     wrenches = rig.shared.wrenches.reader()
     rig.backend.begin()
-    _check_loop(rig, seconds, add)
-    _check_zero(rig, info, add)
+    _check_loop(rig, seconds or rig.settings.rig.loop.test_time, page.add)
+    page.attempt(lambda: _check_zero(rig, info, page.add))
     stale_ms = rig.settings.rig.limits.ft_stale_ms
-    add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
-    _check_stream(rig, add_result)
+    page.add_result(check_wrenches(wrenches.read(), rig.clock.now_ns(), stale_ms))
+    page.attempt(lambda: _check_stream(rig, page))
+    page.require_fit()
     devices = {f"ft_sensor:{key}": value for key, value in sensor.items()}
-    return Preflight(tuple(checks), {**devices, **grants})
+    return Preflight(tuple(page.checks), {**devices, **info.metadata(), **grants})
 
 
-def _check_arm(rig: Rig, add: Add) -> ArmInfo:
+def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> None:
+    """Grade what needs no device."""
+    settings = rig.settings.rig
+    weight = gravity_words(settings, rig.gravity_text, rig.row.foot)
+    page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, gravity {weight}")
+    page.add_result(check_code(provenance.collect()))
+    if not rig.is_stepped:
+        page.add_result(check_governor())
+    limit = settings.limits.free_disk_gb
+    page.attempt(lambda: check_disk(data, limit, page.add, probe))
+    if settings.can.interface == "socketcan" and not rig.is_simulated:
+        page.add_result(check_interface(settings.can.channel))
+
+
+def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
     try:
         info = rig.backend.start_arm()
     except TractionError as error:
-        add(BAD, "arm", error.message)
+        page.add(BAD, "arm", error.message)
         raise _not_reached(error, rig.settings.rig) from error
+    can = rig.settings.rig.can
+    where = "simulated" if rig.is_simulated else f"{can.interface}:{can.channel}"
+    page.add(GOOD, "bus", f"{where}, {info.door}")
     versions = sorted({puck.vers for puck in info.pucks})
     woken = sum(puck.was_asleep for puck in info.pucks)
     parts = [f"firmware {', '.join(map(str, versions))}"]
@@ -138,15 +148,17 @@ def _check_arm(rig: Rig, add: Add) -> ArmInfo:
     health, now_ns = [puck.health for puck in info.pucks], rig.clock.now_ns()
     ill = complaints(health, now_ns)
     parts += [temperature_range(health, now_ns), *ill]
-    add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
+    page.add(WARNING if ill else GOOD, "pucks 1-7", ", ".join(parts))
+    for text in info.warnings:
+        page.add(WARNING, "start-up", text)
     if not info.is_zeroed:
-        add(BAD, "zero", "not zeroed")
-        raise preflight_error("not-zeroed")
+        page.add(BAD, "zero", "not zeroed")
+        page.fail(preflight_error("not-zeroed"))
     faults = [f"{fault} fault: press Shift-idle" for fault in info.pendant.faults]
     is_calm = info.safety_mode is SafetyMode.IDLE and not faults
     name = info.safety_mode.name.lower().replace("_", "-")
     parts = [name, f"firmware {info.safety_vers}", *faults]
-    add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
+    page.add(GOOD if is_calm else WARNING, "safety", ", ".join(parts))
     return info
 
 
@@ -168,12 +180,12 @@ def _check_zero(rig: Rig, info: ArmInfo, add: Add) -> None:
     check_zero(error)
 
 
-def _check_sensor(rig: Rig, add: Add) -> dict[str, str]:
+def _check_sensor(rig: Rig, arm_state: str, add: Add) -> dict[str, str]:
     try:
         fields = rig.backend.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
-        raise _as_preflight(error, "idle") from error
+        raise _as_preflight(error, arm_state) from error
     name = f"{fields['model']}, {fields['measured_rate']}"
     add(GOOD, "F/T sensor", f"{name}, {reach_words(fields, _lever(rig))}")
     return fields
@@ -186,29 +198,28 @@ def _lever(rig: Rig) -> float:
     return float(tool.sole[2] - tool.sensor_height)
 
 
-def _check_stream(rig: Rig, add_result: Callable[[CheckResult], None]) -> None:
+def _check_stream(rig: Rig, page: ChecksPage) -> None:
     """Grade what became of the sensor's stream while the loop was tested."""
     fields = rig.backend.sensor_metadata()
     result = check_stream(fields)
-    if result is None:
-        return
-    add_result(result)
-    if result.mark == BAD:
+    page.add_result(result)
+    if result is not None and result.mark == BAD:
         raise preflight_error("ft-lost", why=fields["trouble"].rstrip("."))
 
 
-def start_devices(rig: Rig) -> None:
-    """Start arm, sensor and loop without a page of checks.
+def start_devices(rig: Rig) -> ArmInfo:
+    """Start arm, sensor and loop without a page; return what the arm says.
 
     Raises:
         PreflightError: the arm or the sensor is not fit.
     """
     try:
-        rig.backend.start_arm()
+        info = rig.backend.start_arm()
         rig.backend.open_sensor()
     except TractionError as error:
         raise _as_preflight(error, "not touched") from error
     rig.backend.begin()
+    return info
 
 
 def _check_exchange(rig: Rig, add: Add) -> None:
@@ -262,23 +273,6 @@ def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     )
     is_late = report.missed > worst * seconds
     add(WARNING if is_late else GOOD, f"loop {seconds:g} s", text)
-
-
-def check_disk(rig: Rig, data: Path, add: Add, probe: DiskProbe = free_bytes) -> None:
-    """Grade the free space below `data`.
-
-    Raises:
-        PreflightError: less than the limit is free.
-    """
-    folder = data
-    while not folder.exists():
-        folder = folder.parent
-    free = probe(folder) / 1e9
-    limit = rig.settings.rig.limits.free_disk_gb
-    if free < max(limit, SESSION_GB):
-        add(BAD, "disk", f"{free:.1f} GB free")
-        raise preflight_error("disk-full", free=free, need=SESSION_GB, limit=limit)
-    add(GOOD, "disk", f"{free:.0f} GB free")
 
 
 def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:

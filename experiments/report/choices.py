@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from acquisition import SettingsError
 from analysis.data import PrepareOptions, RecordedTrial, TractionSeries
@@ -86,5 +87,5 @@ def repeat_study(
         options = choice.options(study.options)
         with fitting(console) as progress:
             other = run_study(series, options, study.simulated, progress, store)
-        others.append((choice, other))
+        others.append((choice.remarked(chain(*trials.values())), other))
     return others

@@ -1,7 +1,7 @@
 from .backend import EXCHANGE_CYCLES
 from .build import build_tool, terrain_frame
 from .bus_log import logging_bus, open_bus_log
-from .fake import build_sensor_server, build_server
+from .fake import ServedArm, build_sensor_server, build_server
 from .gravity import gravity_path, gravity_words, read_gravity
 from .processes import MultiProcessBackend
 from .rig import FakeOptions, Rig, build_rig
@@ -12,6 +12,7 @@ __all__ = [
     "FakeOptions",
     "MultiProcessBackend",
     "Rig",
+    "ServedArm",
     "SimulatedHand",
     "build_rig",
     "build_sensor_server",

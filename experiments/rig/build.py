@@ -22,7 +22,7 @@ from experiments.settings import FootSection, RigSettings, TerrainRow, build_dev
 from ft_sensor import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
 from ft_sensor.vendors import BarrettSensor
-from wam.bus import CanBus, CanLink, FrameTap
+from wam.bus import CanLink, Door, FrameTap
 from wam.control import FootController, LockGains, SoftWalls, Walls
 from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
 from wam.model import ArmConstants, ArmModel, Body, Tool, sensor_body
@@ -40,7 +40,11 @@ def terrain_frame(row: TerrainRow) -> TerrainFrame:
 
 def build_tool(rig: RigSettings, foot: str) -> Tool:
     """Return sensor and foot as rig.toml describes them."""
-    section: FootSection = rig.feet.tread if foot == "tread" else rig.feet.bare
+    return tool_with(rig, rig.feet.tread if foot == "tread" else rig.feet.bare)
+
+
+def tool_with(rig: RigSettings, section: FootSection) -> Tool:
+    """Return the sensor of rig.toml with the foot that `section` describes."""
     sensor = rig.ft_sensor
     body = sensor_body()
     return Tool(
@@ -85,9 +89,9 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
     return SafetyLimits(speed, safety.speed_fault, torque, safety.torque_fault_units)
 
 
-def build_link(bus: CanBus, shared: SharedLayout, clock: Clock) -> CanLink:
-    """Return the link to a bus; every frame goes into the shared memory too."""
-    return CanLink(bus, FrameTap(FrameTape(shared.frames), clock))
+def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
+    """Return the link through a door; every frame goes into the shared memory too."""
+    return CanLink(door, FrameTap(FrameTape(shared.frames), clock))
 
 
 def build_arm(

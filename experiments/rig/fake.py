@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition import (
@@ -22,15 +23,15 @@ from experiments.rig.build import (
     build_tool,
     open_bus_sensor,
     terrain_frame,
+    tool_with,
 )
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
-from wam.model import ArmModel, tool_metadata, tool_of
+from wam.bus import PythonCanDoor
+from wam.model import ArmModel, Tool, tool_metadata, tool_of
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from fakes.serving import PuckServer, SensorLine, SensorServer
 
 
@@ -109,7 +110,7 @@ def stepped(
         options=PlantOptions(friction=fields["friction"], seed=world.seed),
     )
     clock.attach(simulation)
-    link = build_link(simulation.bus, shared, clock)
+    link = build_link(PythonCanDoor(simulation.bus, clock), shared, clock)
     arm = build_arm(settings.rig, model.constants, link, clock)
 
     def sensor() -> WrenchSensor:
@@ -152,49 +153,99 @@ def _sensor_line(settings: Settings, path: Path, kind: str) -> SensorLine:
     return SensorLine(path, SensorChoice(**fields))
 
 
-def build_sensor_server(settings: Settings, line: tuple[Path, str]) -> SensorServer:
-    """Return a serial sensor alone, below which a foot hangs.
+NO_TOOL = "none"
 
-    `line`: the path it is served at, and its kind.
+
+@dataclass(frozen=True, slots=True)
+class ServedArm:
+    """What is served to other programs.
+
+    Attributes:
+        bus: "traction-fake" or an interface of python-can, and its channel.
+        line: path and kind of a serial sensor; None = the sensor is on the bus.
+        is_idle_first: the arm begins powered, idle, pucks asleep; otherwise in E-STOP.
+        tool: "tread" or "bare" of rig.toml, "none", or the path of a foot's file; empty
+            for the foot of the first terrain.
+        has_hand: a person carries the arm.
+        firmware: of the motor pucks, and of the safety module.
+    """
+
+    bus: tuple[str, str]
+    line: tuple[Path, str] | None
+    is_idle_first: bool
+    tool: str
+    has_hand: bool
+    firmware: tuple[int, int]
+
+
+def _served_tool(settings: Settings, tool: str) -> Tool | None:
+    """Return what hangs on the plate; `tool` as in `ServedArm`.
 
     Raises:
-        SettingsError: the path is in use or cannot be one.
+        SettingsError: its file cannot be read or is wrong.
+    """
+    if tool == NO_TOOL:
+        return None
+    if tool in ("", "tread", "bare"):
+        foot = tool or settings.matrix.terrains[0].foot
+        return build_tool(settings.rig, foot)
+    return tool_with(settings.rig, read_foot(Path(tool)))
+
+
+def build_sensor_server(
+    settings: Settings, line: tuple[Path, str], tool: str
+) -> SensorServer:
+    """Return a serial sensor alone, below which a foot hangs.
+
+    Args:
+        settings: all settings.
+        line: the path it is served at, and its kind.
+        tool: as in `ServedArm`.
+
+    Raises:
+        SettingsError: the path is in use or cannot be one, or there is no tool.
     """
     from fakes.serving import SensorServer, hanging_load
 
-    tool = build_tool(settings.rig, settings.matrix.terrains[0].foot)
+    hanging = _with_sensor(_served_tool(settings, tool))
     served = _sensor_line(settings, *line)
-    return SensorServer(served, hanging_load(tool), SystemClock())
+    return SensorServer(served, hanging_load(hanging), SystemClock())
 
 
-def build_server(
-    settings: Settings,
-    bus: tuple[str, str],
-    line: tuple[Path, str] | None,
-    *,
-    is_idle: bool,
-) -> PuckServer:
+def _with_sensor(tool: Tool | None) -> Tool:
+    if tool is None:
+        raise SettingsError(
+            "Without a tool there is no wrist sensor to serve.",
+            hint="Leave out --serial or --tool none. Nothing was started.",
+        )
+    return tool
+
+
+def build_server(settings: Settings, served: ServedArm) -> PuckServer:
     """Return a simulated arm that serves its pucks to other programs.
 
     The arm is at its home position, where an operator puts it before zeroing.
 
-    Args:
-        settings: all settings; the first terrain of the matrix names the foot.
-        bus: "traction-fake" or an interface of python-can, and its channel.
-        line: path and kind of a serial sensor; None = the sensor is on the bus.
-        is_idle: it begins powered, idle, pucks asleep; otherwise in E-STOP.
-
     Raises:
-        SettingsError: the socket's path is in use or cannot be one.
+        SettingsError: the socket's path is in use or cannot be one, or the tool is
+            wrong.
         LinkError: the bus cannot be opened.
     """
     from fakes.serving import HomePose, build_home_server, open_can_port
 
-    row = settings.matrix.terrains[0]
-    port = open_can_port(*bus, settings.rig.can.bitrate)
-    tool = build_tool(settings.rig, row.foot)
-    served = _sensor_line(settings, *line) if line is not None else None
-    home = HomePose(tool, terrain_frame(row), served, is_idle)
+    tool, line = _served_tool(settings, served.tool), None
+    if served.line is not None:
+        _with_sensor(tool)
+        line = _sensor_line(settings, *served.line)
+    home = HomePose(
+        tool,
+        terrain_frame(settings.matrix.terrains[0]),
+        line,
+        served.is_idle_first,
+        served.has_hand,
+        served.firmware,
+    )
+    port = open_can_port(*served.bus, settings.rig.can.bitrate)
     try:
         return build_home_server(port, home, SystemClock())
     except SettingsError:

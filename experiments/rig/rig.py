@@ -112,6 +112,7 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
     else:
         fields = world.metadata() if world is not None else None
         clock = SystemClock()
+        shared.memory.touch()
         jobs = _jobs(settings, row, gravity_text, fields)
         backend = _start_processes(jobs, settings, shared, clock)
         if backend.fake is not None:

@@ -42,7 +42,7 @@ from ft_sensor.serial_line import (
     open_port,
     stream_metadata,
 )
-from wam.bus import CanLink, open_bus
+from wam.bus import CanLink, open_door
 from wam.driver import ArmInfo, WamArm
 from wam.model import ArmModel, load_constants
 
@@ -155,8 +155,9 @@ class ControlWorker:
         """Return the arm, its bus open; raises LinkError."""
         if self._arm is None:
             can = self._context.settings["can"]
-            bus = open_bus(can["interface"], can["channel"], can["bitrate"])
-            link = self._link = build_link(bus, self._context.shared, self._clock)
+            address = can["interface"], can["channel"], can["bitrate"]
+            door = open_door(*address, self._clock)
+            link = self._link = build_link(door, self._context.shared, self._clock)
             self._arm = build_arm(self._rig, self._constants, link, self._clock)
         return self._arm
 
@@ -179,7 +180,6 @@ class ControlWorker:
 
     def _run(self, loop_server: LoopServer) -> None:
         """Run the loop; whatever ends it, an arm that got torques is braked."""
-        self._context.shared.memory.touch()
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         try:
             while not loop_server.is_over:

@@ -10,7 +10,6 @@ from experiments.arguments import data_option
 from experiments.fault_injection import HostFaults, plan_faults
 from experiments.operator import Console, OperatorInput, keyboard
 from experiments.preflight import (
-    LOOP_TEST,
     Preflight,
     check_conditions,
     confirm_foot,
@@ -138,7 +137,7 @@ def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Pr
     foot = confirm_foot(rig.row, before, request.operator, console)
     console.check(foot.mark, foot.name, foot.text)
     probe = host_faults.free_bytes
-    return run_preflight(rig, request.data, console, LOOP_TEST, probe).after(foot)
+    return run_preflight(rig, request.data, console, probe=probe).after(foot)
 
 
 def _check_conditions(

@@ -51,9 +51,14 @@ class StopFlag:
 
 
 @contextmanager
-def handle_signals(stop: StopFlag) -> Generator[None]:
-    """Turn Ctrl-C, SIGTERM and a lost terminal into requests to stop."""
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+def handle_signals(stop: StopFlag, *, is_service: bool = False) -> Generator[None]:
+    """Turn Ctrl-C, SIGTERM and a lost terminal into requests to stop.
+
+    A service outlives its terminal where it was started to do so, as by nohup.
+    """
+    numbers = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+    if is_service and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+        numbers.remove(signal.SIGHUP)
     before = [signal.signal(number, stop.request) for number in numbers]
     try:
         yield

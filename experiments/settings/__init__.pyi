@@ -1,5 +1,5 @@
 from .calibrations import NOTHING, check_kind, read_calibration, with_calibrations
-from .load import Settings, load_settings
+from .load import Settings, load_settings, read_foot
 from .matrix import MatrixSettings, TerrainRow
 from .origins import flatten, origin_lines
 from .rig import FootSection, OperatorSection, RigSettings
@@ -19,5 +19,6 @@ __all__ = [
     "load_settings",
     "origin_lines",
     "read_calibration",
+    "read_foot",
     "with_calibrations",
 ]

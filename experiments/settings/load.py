@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from acquisition import SettingsError, parse_toml, read_text
 from experiments.settings.matrix import MatrixSettings, TerrainRow
-from experiments.settings.rig import RigSettings
+from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
 
 _M = TypeVar("_M", bound=BaseModel)
@@ -115,14 +115,23 @@ def load_settings(config: Path | None) -> Settings:
     return Settings(rig, matrix, rig_text, matrix_text, origin, folder)
 
 
-def _read(path: Path) -> str:
+def read_foot(path: Path) -> FootSection:
+    """Return the foot that a TOML file of its own describes: mass, com, inertia, sole.
+
+    Raises:
+        SettingsError: it cannot be read, or holds a wrong key or value.
+    """
+    text = _read(path, "Name a foot of rig.toml, or a file with mass, com, inertia.")
+    return _parse(FootSection, text, path.name)
+
+
+def _read(path: Path, hint: str = "Name a rig.toml with --config.") -> str:
     try:
         return read_text(path)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SettingsError(
-            f"{path} cannot be read ({reason}).",
-            hint="Name a rig.toml with --config. Nothing was started.",
+            f"{path} cannot be read ({reason}).", hint=f"{hint} Nothing was started."
         ) from error
 
 

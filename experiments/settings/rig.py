@@ -152,9 +152,11 @@ class LoopSection(SettingsSection):
     Attributes:
         spin_us: it stops sleeping so long before each deadline and watches the time;
             for a kernel that wakes late. It costs the share of the core.
+        test_time: the preflight measures the loop for so long.
     """
 
     spin_us: Number = Field(default=0.0, ge=0, le=500, examples=[0])
+    test_time: Number = Field(default=5.0, ge=0.5, le=3600, examples=[5])
 
 
 class OperatorSection(SettingsSection):

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 SETTLE = 1.0  # s before anything is measured
 WARM = 180.0  # s, or half of the time, after which memory has to stay as it is
 _TICKS = os.sysconf("SC_CLK_TCK")
-_PAGE_KB = os.sysconf("SC_PAGE_SIZE") / 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +31,7 @@ class ProcessUse:
     Attributes:
         name: of the process.
         cpu: share of one core.
-        growth_kb: resident memory at the end less that when warm [KiB].
+        growth_kb: peak of resident memory at the end less the peak when warm [KiB].
         page_faults: pages it had to wait for since it was warm.
     """
 
@@ -70,7 +69,7 @@ class BenchReport:
 @dataclass(frozen=True, slots=True)
 class _Usage:
     cpu_s: float
-    resident_kb: float
+    most_resident_kb: float
     faults: int
 
 
@@ -193,7 +192,12 @@ def _usage(pid: int) -> _Usage:
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     cpu = (int(fields[11]) + int(fields[12])) / _TICKS
     faults = int(fields[7]) + int(fields[9])
-    return _Usage(cpu, int(fields[21]) * _PAGE_KB, faults)
+    return _Usage(cpu, _most_resident_kb(pid), faults)
+
+
+def _most_resident_kb(pid: int) -> float:
+    status = Path(f"/proc/{pid}/status").read_text()
+    return float(status.partition("VmHWM:")[2].split()[0])
 
 
 def _use(
@@ -203,6 +207,6 @@ def _use(
     return ProcessUse(
         name,
         cpu=round((after.cpu_s - before.cpu_s) / seconds, 3),
-        growth_kb=round(after.resident_kb - middle.resident_kb, 1),
+        growth_kb=round(after.most_resident_kb - middle.most_resident_kb, 1),
         page_faults=after.faults - middle.faults,
     )

@@ -47,9 +47,9 @@ _CARRY, _REST, _PUSH, _AWAY = (
 class Hand:
     """Follows its orders with forces a person could exert."""
 
-    def __init__(self, dt: float) -> None:
+    def __init__(self, dt: float, *, is_there: bool = True) -> None:
         self._dt = dt
-        self.phase = HandPhase.CARRY
+        self.phase = HandPhase.CARRY if is_there else HandPhase.AWAY
         self._start: Vector3 | None = None
         self._path: list[Vector3] = []
         self._moved = 0.0

@@ -19,15 +19,19 @@ _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 
 
 def arm_and_hand(
-    constants: ArmConstants, tool: Tool, frame: TerrainFrame
+    constants: ArmConstants,
+    tool: Tool,
+    frame: TerrainFrame,
+    forearm: float = FOREARM_MASS,
 ) -> tuple["pin.Model", int, int]:
     """Return a model whose world is the terrain frame, and its frames: sole and hand.
 
-    The hand is on link 6, where a person holds the forearm, and has the mass of one.
+    The hand is on link 6, where a person holds the forearm, and has the mass of one:
+    `forearm` [kg], 0 where there is no person.
     """
     model = build_pinocchio(constants, (tool.sensor, tool.foot))
     _stand_in(model, frame)
-    hand = _add_forearm(model, constants)
+    hand = _add_forearm(model, constants, forearm)
     return model, add_point(model, constants, "sole", tool.sole), hand
 
 
@@ -59,14 +63,14 @@ def _stand_in(model: "pin.Model", frame: TerrainFrame) -> None:
     model.gravity.linear = axes.dot(model.gravity.linear)
 
 
-def _add_forearm(model: "pin.Model", constants: ArmConstants) -> int:
-    """Add the hand's frame on link 6 and the mass of a forearm in it."""
+def _add_forearm(model: "pin.Model", constants: ArmConstants, mass: float) -> int:
+    """Add the hand's frame on link 6 and the mass [kg] of a forearm in it."""
     alpha, height = constants.alpha[5], constants.d[6] - _HAND_ABOVE_PLATE
     c, s = np.cos(alpha), np.sin(alpha)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     link = pin.SE3(tilt, np.array([constants.a[5], 0.0, constants.d[5]]))
     placement = link * pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
     hand = model.addFrame(pin.Frame("hand", 6, 0, placement, pin.FrameType.OP_FRAME))
-    arm = pin.Inertia(FOREARM_MASS, np.zeros(3), np.zeros((3, 3)))
+    arm = pin.Inertia(mass, np.zeros(3), np.zeros((3, 3)))
     model.appendBodyToJoint(6, placement.act(arm), pin.SE3.Identity())
     return hand

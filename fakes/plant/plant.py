@@ -54,11 +54,13 @@ class PlantOptions:
             it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
         substeps: steps per 2 ms cycle.
         seed: draws the parameters of friction; None = the nominal ones.
+        has_hand: a person holds the arm by its forearm, from the beginning.
     """
 
     friction: float = 0.02
     substeps: int = 4
     seed: int | None = None
+    has_hand: bool = True
 
 
 class ArmPlant:
@@ -84,7 +86,9 @@ class ArmPlant:
     ) -> None:
         options = options or PlantOptions()
         self._constants = constants
-        self._model, self._sole, self._hand = arm_and_hand(constants, tool, frame)
+        forearm = FOREARM_MASS if options.has_hand else 0.0
+        parts = arm_and_hand(constants, tool, frame, forearm)
+        self._model, self._sole, self._hand = parts
         self._data = self._model.createData()
         self._wrist = WristGauges(tool, frame.axes()[:, 2], PERIOD_NS * 1e-9)
         self._substeps = options.substeps
@@ -95,20 +99,20 @@ class ArmPlant:
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
-        self._up: list[float] = (up * FOREARM_MASS * GRAVITY).tolist()
+        self._up: list[float] = (up * forearm * GRAVITY).tolist()
         # counts of the encoders per joint angle
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
         self._is_held = True
         self.terrain: Terrain | None = None
-        self.hand = Hand(PERIOD_NS * 1e-9)
+        self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
         self._sum = _NOTHING  # of the ground's wrench over a cycle
         self._ground = [0.0] * 6  # its mean
-        self._push = (0.0, 0.0, 0.0)
-        self._held = (0.0, 0.0, 0.0)  # that and the weight the person carries
+        # Force of the hand, and with it the weight that the person carries.
+        self._push = self._held = (0.0, 0.0, 0.0)
         self._joints = JointState(q, self._dt)
         self._prepare()
 

@@ -9,6 +9,7 @@ from wam.bus import (
     PuckRole,
     PuckStatus,
     names,
+    nearest_documented,
     position_reply_id,
     property_number,
 )
@@ -43,8 +44,9 @@ class MotorPuck:
         self.vers = options.vers[i]
         self.offset = 0
         self.torque = 0
-        self.p_number = property_number(Device.MOTOR, "P", self.vers)
-        self.t_header = 0x80 | property_number(Device.MOTOR, "T", self.vers)
+        self._table = nearest_documented(self.vers)
+        self.p_number = property_number(Device.MOTOR, "P", self._table)
+        self.t_header = 0x80 | property_number(Device.MOTOR, "T", self._table)
         self.properties = {
             "ROLE": MAGNETIC_ENCODER | PuckRole.TATER,
             **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
@@ -76,7 +78,7 @@ class MotorPuck:
         """Return what `number` means to the puck as it is now."""
         if self.life.power is Power.MONITOR:
             return names(Device.MONITOR).get(number)
-        return names(Device.MOTOR, self.vers).get(number)
+        return names(Device.MOTOR, self._table).get(number)
 
     def value_of(self, name: str, counts: int) -> int | None:
         """Return the value of a property, None for one that is not modelled."""

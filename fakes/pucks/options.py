@@ -16,7 +16,7 @@ class NetworkOptions:
         are_asleep: pucks wait in the monitor, as after power-up.
         has_sensor: there is a force/torque sensor on the bus, node 8.
         is_zeroed: a host has defined the positions (never when asleep or E_STOP).
-        vers: firmware of each motor puck.
+        vers: firmware of each motor puck; its table is the nearest documented one.
         monitor_vers: what VERS says while a puck sleeps.
         safety_vers: firmware of the safety module.
         cts, ipnm, poles, mt: constants of each motor puck.

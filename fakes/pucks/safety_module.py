@@ -22,6 +22,7 @@ from wam.bus import (
     compose_id,
     encode_reply,
     names,
+    nearest_documented,
 )
 from wam.driver import (
     COUNTS_PER_SPEED,
@@ -78,6 +79,8 @@ class FakeSafetyModule:
         self.is_disobedient = False
         self._heartbeat_ns = options.heartbeat_ns
         self._options = options
+        vers = nearest_documented(options.safety_vers)
+        self._names = names(Device.SAFETY, vers)
         self._schedule = schedule
         self._on_change = on_change
         self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, _SAFE)
@@ -140,7 +143,7 @@ class FakeSafetyModule:
     def receive(self, request: Property) -> None:
         """Take a GET or SET sent to the module."""
         number = request.number
-        name = names(Device.SAFETY, self._options.safety_vers).get(number)
+        name = self._names.get(number)
         if request.value is not None:
             self._tell(name, request.value)
         elif name is not None:
@@ -212,7 +215,7 @@ class FakeSafetyModule:
             if 0 <= value < self.mode and not self.is_disobedient:
                 self._enter(SafetyMode(value))
         elif name in ("DEF", "LOAD"):
-            limit = names(Device.SAFETY, self._options.safety_vers).get(value)
+            limit = self._names.get(value)
             if limit in _POWER_UP_LIMITS:
                 self._properties[limit] = _POWER_UP_LIMITS[limit]
         elif name in self._properties and name not in _READ_ONLY:

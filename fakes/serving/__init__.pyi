@@ -1,4 +1,5 @@
-from .puck_server import HomePose, PuckServer, build_home_server, open_can_port
+from .home_arm import HomePose, build_home_server
+from .puck_server import PuckServer, open_can_port
 from .rig_process import scene_of
 from .sensor_server import SensorLine, SensorServer, hanging_load
 

@@ -1,33 +1,14 @@
 """Serves a puck network to other programs, on the wall clock, in one thread."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
-from acquisition import PERIOD_NS, Clock, SafetyMode
+from acquisition import Clock
 from fakes.bus import CanPort, Frame, SocketHub
-from fakes.plant import ArmPlant
-from fakes.pucks import (
-    SENSOR_FORCE_ERRORS,
-    SENSOR_TORQUE_ERRORS,
-    Load,
-    MotorSide,
-    NetworkOptions,
-    PendantAction,
-    PuckNetwork,
-    WiredNetwork,
-)
-from fakes.randomness import trial_generator
-from fakes.sensor import SensorErrors
-from fakes.serving.sensor_server import SensorLine, SensorServer
+from fakes.pucks import MotorSide, PendantAction, PuckNetwork, WiredNetwork
+from fakes.serving.sensor_server import SensorServer
 from fakes.world_clock import TICK_NS, WorldClock
-from ft_sensor import TerrainFrame
-from wam.model import Tool, load_constants
-
-_SEED = 1  # of the sensor's errors
 
 Tap = Callable[[int, bytes], None]
 
@@ -67,36 +48,6 @@ class Port(Protocol):
     def close(self) -> None:
         """Leave the bus."""
         ...
-
-
-class SupportedMotors:
-    """Motors of an arm that a person carries as long as no motor pulls.
-
-    Implements fakes.pucks.bank.MotorSide. Without power, and under zero torque, the arm
-    stays where it is instead of falling.
-    """
-
-    def __init__(self, motors: MotorSide) -> None:
-        self._motors = motors
-        self._is_braked = True
-
-    def advance(self, t_ns: int) -> None:
-        """Let the world go on to `t_ns`."""
-        self._motors.advance(t_ns)
-
-    def counts(self) -> Sequence[int]:
-        """Return the encoder counts of the seven motors now."""
-        return self._motors.counts()
-
-    def set_braking(self, is_braked: bool, is_powered: bool) -> None:
-        """Brake or release the joints; the torques that follow decide."""
-        self._is_braked = is_braked or not is_powered
-
-    def set_torques(self, units: Sequence[int]) -> None:
-        """Apply torques [puck units]; under zero torque the arm is carried."""
-        is_held = self._is_braked or not any(units)
-        self._motors.set_braking(is_braked=is_held, is_powered=True)
-        self._motors.set_torques(units)
 
 
 class PuckServer:
@@ -200,57 +151,3 @@ def open_can_port(interface: str, channel: str, bitrate: int) -> Port:
     if interface == "traction-fake":
         return SocketHub(Path(channel))
     return CanPort(interface, channel, bitrate)
-
-
-@dataclass(frozen=True, slots=True)
-class HomePose:
-    """An arm at its home position, and how it is pose.
-
-    Attributes:
-        tool: what it carries.
-        frame: where the container stands.
-        line: of a serial sensor; None = the sensor is on the bus.
-        is_idle_first: powered, idle, pucks asleep; otherwise in E-STOP.
-    """
-
-    tool: Tool
-    frame: TerrainFrame
-    line: SensorLine | None
-    is_idle_first: bool
-
-
-def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
-    """Return a server of an arm that stands at its home position, not zeroed.
-
-    It has a force/torque sensor on its bus or on a serial line.
-
-    Raises:
-        SettingsError: the serial line's path is in use or cannot be one.
-    """
-    constants = load_constants()
-    home = constants.home.copy()
-    # Home lies on or past two stops; a simulated spring would throw the arm off them.
-    constants = replace(
-        constants,
-        q_lower=np.minimum(constants.q_lower, home),
-        q_upper=np.maximum(constants.q_upper, home),
-    )
-    plant = ArmPlant(constants, pose.tool, pose.frame, home)
-    now_ns = clock.now_ns()
-    plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS
-    motors = SupportedMotors(plant)
-    rng = trial_generator(_SEED, "home", 0)
-    errors = SensorErrors(rng, SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS)
-    options = NetworkOptions(
-        safety_mode=SafetyMode.IDLE if pose.is_idle_first else SafetyMode.E_STOP,
-        are_asleep=True,
-        has_sensor=pose.line is None,
-        is_zeroed=False,
-        mt=constants.mt,
-    )
-    load = Load(plant.sensor_load, errors)
-    network = PuckNetwork(motors, options, now_ns, load)
-    sensor = None
-    if pose.line is not None:
-        sensor = SensorServer(pose.line, plant.sensor_load, clock)
-    return PuckServer(network, motors, port, clock, sensor)

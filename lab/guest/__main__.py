@@ -19,7 +19,37 @@ from lab.results import (
     to_line,
 )
 
-_WARM = ("numpy", "pinocchio", "can", "serial", "mcap", "pydantic", "rich", "scipy")
+# What programs load: read once, and there already when they start.
+_WARM = (
+    "can",
+    "mcap.writer",
+    "pinocchio",
+    "serial",
+    "rich.console",
+    "acquisition.recording",
+    "experiments.commands.run",
+    "experiments.rig.processes",
+    "experiments.run.session",
+    "experiments.trial.quality",
+    "scipy.signal",
+    "fakes.serving.puck_server",
+)
+# The files' owner and time of change are others in here: git would read them all.
+_GIT = {
+    "GIT_CONFIG_COUNT": "3",
+    "GIT_CONFIG_KEY_0": "core.checkStat",
+    "GIT_CONFIG_VALUE_0": "minimal",
+    "GIT_CONFIG_KEY_1": "core.trustctime",
+    "GIT_CONFIG_VALUE_1": "false",
+    "GIT_CONFIG_KEY_2": "safe.directory",
+    "GIT_CONFIG_VALUE_2": "*",
+}
+_SYMBOLS = (
+    "__per_cpu_offset",
+    "lapic_events",
+    "lapic_timer_period",
+    "setup_boot_APIC_clock",
+)
 _PAUSE = 0.2  # s
 _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
@@ -31,6 +61,7 @@ def main(names: list[str]) -> None:
     """
     os.environ["TMPDIR"] = str(PLACE / "tmp")
     os.environ["HOME"] = str(PLACE)
+    os.environ.update(_GIT)
     (PLACE / "tmp").mkdir(parents=True, exist_ok=True)
     _tell(_timer_addresses())
     wait(_PAUSE)  # the host writes into the kernel's memory
@@ -45,12 +76,12 @@ def main(names: list[str]) -> None:
 
 
 def _timer_addresses() -> TimerAddresses:
-    found: dict[str, int] = {}
+    symbols: dict[str, int] = {}
     with Path("/proc/kallsyms").open(encoding="ascii") as lines:
         for line in lines:
             address, _, name, *_ = line.split()
-            found[name] = int(address, 16)
-    return TimerAddresses(found["__per_cpu_offset"], found["lapic_events"])
+            symbols[name] = int(address, 16)
+    return TimerAddresses(*(symbols[name] for name in _SYMBOLS))
 
 
 def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:

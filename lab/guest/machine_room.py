@@ -9,15 +9,21 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from experiments.__main__ import main as traction
+from lab.guest import far_sensor, pushed_arm
 from lab.guest.commands import Program, ScenarioError, Shell, read_text
+from lab.guest.warm_start import Run
 
 PLACE = Path("/run/lab")
 ROOT = Path(__file__).parents[2]
 CAN, FAR_CAN = "can0", "can1"  # the program's card, and the simulated arm's
 BITRATE = 1_000_000
+# A short preflight: every second of the loop costs the host many.
+_QUICK = {"test_time = 5.0 ": "test_time = 0.5 "}
 TRAVEL = 0.07  # m: a container that is crossed in a few seconds
 _PYTHON = sys.executable
 _START = "import sys; from experiments.__main__ import main; sys.exit(main())"
+COLD = ("env",)  # a command before the program: it is executed, as on the rig
 _ARM_PATIENCE = 60.0  # s of guest time until the served arm is ready
 _BUS_SENSOR = {'kind = "bota" ': 'kind = "barrett" '}
 _SERIAL_KEYS = ("port =", "baudrate =", "sinc =")
@@ -89,23 +95,29 @@ class MachineRoom:
         """The configuration, once one of `write_config` was called."""
         return self.folder / "rig.toml"
 
-    def start(self, *command: str) -> Program:
-        """Start a process that ends with the scenario at the latest."""
-        program = Program(command, self.log)
+    def start(self, *command: str, run: Run | None = None) -> Program:
+        """Start a process that ends with the scenario at the latest.
+
+        `run`: what the command does, as a function, for a warm start.
+        """
+        program = Program(command, self.log, run=run)
         self._stack.callback(program.close)
         return program
 
     def traction(self, *arguments: str, before: Sequence[str] = ()) -> Program:
         """Start the program with the scenario's configuration and data folder.
 
-        `before`: a command that starts another one, with its options.
+        It is forked with its libraries loaded, or executed by `before`: a command that
+        starts another one, with its options.
         """
         where = ("--config", str(self.config), "--data", str(self.data))
+        if not before:
+            return self.start_plain(*arguments, *where)
         return self.start(*before, _PYTHON, "-c", _START, *arguments, *where)
 
     def start_plain(self, *arguments: str) -> Program:
         """Start the program with these arguments only."""
-        return self.start(_PYTHON, "-c", _START, *arguments)
+        return self.start("traction", *arguments, run=lambda: sys.exit(traction()))
 
     def finish(self, program: Program, patience: float, code: int = 0) -> str:
         """Return the output of a program that is to end with an exit code.
@@ -121,24 +133,28 @@ class MachineRoom:
     def serve_home_arm(self, *options: str) -> Program:
         """Return `traction fake` serving an arm at home, pucks asleep."""
         where = ("--can", f"socketcan:{FAR_CAN}", "--idle-first")
-        command = (_PYTHON, "-c", _START, "fake", *where, *options)
-        server = self.start(*command, "--config", str(self.config))
+        server = self.start_plain("fake", *where, *options, *self._config_option())
         server.expect("ready:", _ARM_PATIENCE)
         return server
 
     def serve_pushed_arm(self, *options: str) -> Program:
         """Return a server of an arm with hand and ground, above the container."""
-        command = (_PYTHON, "-m", "lab.guest.pushed_arm", "--config", str(self.config))
-        server = self.start(*command, "--bus", f"socketcan:{FAR_CAN}", *options)
+        where = ("--bus", f"socketcan:{FAR_CAN}")
+        command = ("pushed_arm", *self._config_option(), *where, *options)
+        server = self.start(*command, run=pushed_arm.main)
         server.expect("ready", _ARM_PATIENCE)
         return server
 
     def serve_far_sensor(self) -> Program:
         """Return a server of the configured serial sensor behind the adapter."""
-        command = (_PYTHON, "-m", "lab.guest.far_sensor", "--config", str(self.config))
-        server = self.start(*command, "--line", str(line_port()))
+        where = ("--line", str(line_port()))
+        command = ("far_sensor", *self._config_option(), *where)
+        server = self.start(*command, run=far_sensor.main)
         server.expect("ready", _ARM_PATIENCE)
         return server
+
+    def _config_option(self) -> tuple[str, str]:
+        return ("--config", str(self.config))
 
     def write_bus_config(self) -> None:
         """Write the shipped configuration with the sensor on the bus."""
@@ -155,7 +171,7 @@ class MachineRoom:
         """
         shipped = resources.files("experiments.data")
         text = (shipped / "rig.toml").read_text(encoding="utf-8")
-        for old, new in changes.items():
+        for old, new in {**_QUICK, **changes}.items():
             if old not in text:
                 raise ScenarioError(f"rig.toml has no {old!r}")
             text = text.replace(old, new)

@@ -26,48 +26,72 @@ class LedSession:
     program: Program
     arm: Program
 
-    def activate(self) -> None:
-        """Support the arm and press the pendant."""
+    def wait_idle(self) -> None:
+        """Wait until the arm is to be activated."""
         self.program.expect("Press Shift-activate", _START)
-        self._hand("lift", "activate")
-        self._press(" ")
 
     def tare(self) -> None:
-        """Lift the foot until the program has tared."""
-        self.program.expect("Lift the foot", _STEP)
-        self._hand("lift")
+        """Activate the arm; lift the foot, which is tared then."""
+        self.wait_idle()
+        self.activate()
+        self.lift()
 
-    def make_ready(self, number: int) -> None:
-        """Lift the foot, put it down, wait until it rests."""
+    def activate(self) -> None:
+        """Support the arm, press the pendant, confirm it."""
+        self.hand("lift")
+        self.program.run_on(_REACTION)  # an arm that is held is silent for no cycle
+        self.hand("activate")
+        self._press(" ")
+
+    def lift(self) -> None:
+        """Lift the foot as asked; it is tared while it is still."""
+        self.program.expect("Lift the foot", _STEP)
+        self.hand("lift")
+
+    def await_ready(self) -> None:
+        """Activate the arm and wait until a trial can be recorded."""
         self.tare()
         self.program.expect("[space] record", _STEP)
-        self._hand(f"prepare {number}", "put_down")
+
+    def put_down(self, number: int) -> None:
+        """Put the foot down on the ground of trial `number`, once it is tared."""
+        self.hand(f"prepare {number}", "put_down")
         self.program.run_on(_REST)
 
-    def record(self) -> None:
-        """Begin to record, and to push."""
+    def record(self, number: int = 1) -> None:
+        """Put the foot down, begin to record, push for a while."""
+        self.put_down(number)
         self._press(" ")
-        self._hand("push")
-
-    def keep(self) -> None:
-        """End the trial after a second, wait until it is on the disk, keep it."""
+        self.hand("push")
         self.program.run_on(_PUSH)
+
+    def review(self) -> None:
+        """End the trial, wait until it is on the disk and to be judged."""
         self._press(" ")
         self.program.expect("written and verified", _STEP)
         self.program.expect("[k]eep", _STEP)
-        self._hand("rest")
-        self._press("k")
+        self.hand("rest")
 
-    def trial(self, number: int) -> None:
-        """Record one trial and keep it."""
-        self.make_ready(number)
+    def keep(self) -> None:
+        """Review the trial and keep it; the foot is to be lifted next."""
+        self.review()
+        self._press("k")
+        self.lift()
+
+    def another(self) -> None:
+        """Wait until the next trial can be recorded."""
+        self.program.expect("[space] record", _STEP)
+
+    def whole_trial(self) -> None:
+        """Activate the arm, record the only trial that is left, end the session."""
+        self.await_ready()
         self.record()
         self.keep()
+        self.end()
 
-    def end(self, code: int = 0) -> None:
+    def end(self) -> None:
         """Wait for the end of the last tare and of the program."""
-        self.tare()
-        self.room.finish(self.program, _STEP, code)
+        self.room.finish(self.program, _STEP)
 
     def pause(self) -> None:
         """Let the arm hold for a second, then go on; a trial is ready before."""
@@ -77,29 +101,32 @@ class LedSession:
         self._press(" ")
         self.program.expect("[space] record", _STEP)
 
+    def confirm(self) -> None:
+        """Press the space bar, as asked."""
+        self._press(" ")
+
     def _press(self, key: str) -> None:
         """Press a key as a person does: what comes before a prompt is forgotten."""
         self.program.run_on(_REACTION)
         self.program.press(key)
 
-    def _hand(self, *actions: str) -> None:
+    def hand(self, *actions: str) -> None:
+        """Let the person at the arm act."""
         for action in actions:
             self.arm.press(f"{action}\n")
 
 
-def begin(room: MachineRoom, arm: Program, trials: int, *options: str) -> LedSession:
-    """Return a session of `trials` trials up to the activated arm."""
-    program = room.traction("run", TERRAIN, "--trials", str(trials), *options)
-    session = LedSession(room, program, arm)
-    session.activate()
-    return session
+def begin(room: MachineRoom, arm: Program, trials: int) -> LedSession:
+    """Return a session of `trials` trials, before its preflight."""
+    program = room.traction("run", TERRAIN, "--trials", str(trials))
+    return LedSession(room, program, arm)
 
 
 def resume(room: MachineRoom, arm: Program) -> LedSession:
-    """Return the unfinished session, opened again, up to the activated arm."""
-    session = LedSession(room, room.traction("resume"), arm)
-    session.activate()
-    return session
+    """Return the unfinished session, opened again; whoever cut it has mended it."""
+    arm.press("mend\n")
+    arm.press("idle\n")
+    return LedSession(room, room.traction("resume"), arm)
 
 
 def session_folder(room: MachineRoom) -> Path:
@@ -117,6 +144,17 @@ def verify_kept(room: MachineRoom, wanted: int) -> list[Path]:
     require(len(kept) == wanted, f"{len(kept)} trials kept in place of {wanted}")
     room.finish(room.start_plain("verify", str(folder)), _STEP)
     return kept
+
+
+def require_rejected(room: MachineRoom, wanted: int) -> int:
+    """Return how many attempts were put away.
+
+    Raises:
+        ScenarioError: it is not `wanted`.
+    """
+    count = len(list((session_folder(room) / "rejected").glob("T???.mcap")))
+    require(count == wanted, f"{count} attempts put away in place of {wanted}")
+    return count
 
 
 def cycle_figures(room: MachineRoom) -> dict[str, str]:

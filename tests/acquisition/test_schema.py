@@ -41,8 +41,8 @@ def numbers_of(layout):
     return [n for n in names[5:] if not n.startswith("padding")]
 
 
-def test_a_cycle_is_540_bytes_with_its_frame():
-    assert CYCLE.size == 540
+def test_a_cycle_is_548_bytes_with_its_frame():
+    assert CYCLE.size == 548
     assert b"wam_base\0" in CYCLE.template
 
 

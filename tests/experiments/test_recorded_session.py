@@ -4,8 +4,11 @@ import json
 import tarfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from acquisition.trial_file.reader import TrialReader
+from acquisition.trial_file.recover import recover_file
 from tests.experiments.cycle_digest import KEPT, digests_of, processor, record
 from tests.experiments.program import journal, only_session, traction
 
@@ -49,6 +52,26 @@ def test_a_session_of_version_0_1_is_held_against_its_sidecars(recorded):
     done = traction(*arguments)
     assert done.code == 6
     assert path.name in done.err
+
+
+def test_cycles_of_version_0_1_lack_the_time_of_the_bus_only(recorded):
+    path = only_session(recorded[0]) / "trials" / "T01.mcap"
+    cycles = TrialReader(path).cycles().data
+    assert not cycles["bus_ns"].any()
+    assert np.all(np.diff(cycles["cycle"]) == 1)
+    assert (cycles["arm_ns"] > cycles["host_ns"]).all()
+    assert np.isfinite(cycles["traction"][-1]).all()
+
+
+def test_a_truncated_trial_of_version_0_1_is_recovered(recorded):
+    path = only_session(recorded[0]) / "trials" / "T01.mcap"
+    whole = len(TrialReader(path).cycles().data)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    recovery = recover_file(path)
+    trial = TrialReader(recovery.path)
+    kept = len(trial.cycles().data)
+    assert 0 < kept < whole
+    assert trial.metadata["result"]["cycles_written"] == str(kept)
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ It shares no code with the project, so that an error in the common codec shows.
 """
 
 from collections.abc import Callable, Iterable
+from math import cos, floor, pi, sin
 
 import can
 
@@ -24,6 +25,103 @@ LIMITS = {VL1: 0x1599, VL2: 0x1800, TL1: 0x1C7A, TL2: 0x1FA4}
 ENCODER_LIMITS = ((132, (101, 102)), (125, (100, 101)), (65, (96, 97)))
 IDLE, ACTIVE = 1, 2
 TYPES = dict.fromkeys(PUCKS, 0) | {SAFETY: 2, SENSOR: 6}
+
+
+CYCLE = 0.002  # s
+# Joint angles, and what the motors make of them: gears 42, 28.25, 18, 9.7 and 14.93,
+# with a differential of 1.68 in the shoulder and of 1 in the wrist.
+HOME_Q = (0.0, -2.0, 0.0, 3.13, 0.0, 0.0, 0.0)
+SHOULDER, ELBOW, UPPER, WRIST_GEAR, FLANGE = 42.0, 18.0, 28.25, 9.7, 14.93
+LATERAL = UPPER / 1.68
+UNITS = (2700, 2700, 2700, 2700, 6500, 6500, 17474)  # per N m at the motor
+# The arm alone: twists of the joints' axes [rad], first moments of the links [kg m].
+TWISTS = (-pi / 2, pi / 2, -pi / 2, pi / 2, -pi / 2, pi / 2, 0.0)
+MOMENTS = (
+    (-0.047700911, 1.312474953, -0.007106682),
+    (-0.009183513, 0.120354394, 0.059750958),
+    (0.147771229, -2.274893057, 0.000054069),
+    (-0.123600041, 0.000148219, 0.259148511),
+    (0.000019550, -0.242068292, 0.000529462),
+    (-0.000024234, -0.006898922, 0.009897766),
+    (0.000011199, 0.000005474, 0.004343890),
+)
+FALL = (0.0, 0.0, -9.81)
+# Joint gains of the vendor's library [N m/rad], [N m s/rad].
+KP = (900.0, 2500.0, 600.0, 500.0, 50.0, 50.0, 8.0)
+KD = (10.0, 20.0, 5.0, 2.0, 0.5, 0.5, 0.05)
+LARGEST_UNITS = 4700  # below the module's warning
+POLE = 0.265  # of the velocity filter: share of a new difference
+
+Vector = tuple[float, float, float]
+
+
+def joints(counts: Iterable[int]) -> list[float]:
+    """Return joint angles [rad] of motor positions."""
+    m = [2 * pi * count / 4096 for count in counts]
+    return [
+        -m[0] / SHOULDER,
+        (m[1] - m[2]) / (2 * UPPER),
+        -(m[1] + m[2]) / (2 * LATERAL),
+        -m[3] / ELBOW,
+        (m[4] + m[5]) / (2 * WRIST_GEAR),
+        (m[5] - m[4]) / (2 * WRIST_GEAR),
+        -m[6] / FLANGE,
+    ]
+
+
+def motor_units(tau: list[float]) -> list[int]:
+    """Return puck units of joint torques [N m]; power is kept."""
+    motors = (
+        -tau[0] / SHOULDER,
+        tau[1] / (2 * UPPER) - tau[2] / (2 * LATERAL),
+        -tau[1] / (2 * UPPER) - tau[2] / (2 * LATERAL),
+        -tau[3] / ELBOW,
+        (tau[4] - tau[5]) / (2 * WRIST_GEAR),
+        (tau[4] + tau[5]) / (2 * WRIST_GEAR),
+        -tau[6] / FLANGE,
+    )
+    units = [floor(u * per) for u, per in zip(motors, UNITS, strict=True)]
+    return [max(-LARGEST_UNITS, min(LARGEST_UNITS, u)) for u in units]
+
+
+def packed(units: list[int]) -> bytes:
+    """Return a torque frame: four times 14 bits after the property."""
+    word = 0
+    for value in [*units, 0][:4]:
+        word = word << 14 | value & 0x3FFF
+    return bytes((0x80 | T,)) + word.to_bytes(7, "big")
+
+
+def turned(matrix: list[Vector], v: Vector) -> Vector:
+    x, y, z = (sum(a * b for a, b in zip(row, v, strict=True)) for row in matrix)
+    return x, y, z
+
+
+def transposed(matrix: list[Vector]) -> list[Vector]:
+    return [(a, b, c) for a, b, c in zip(*matrix, strict=True)]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    (ax, ay, az), (bx, by, bz) = a, b
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+def holding_torques(q: list[float]) -> list[float]:
+    """Return the joint torques [N m] that carry the links of the arm alone at `q`."""
+    turns: list[list[Vector]] = []
+    for angle, twist in zip(q, TWISTS, strict=True):
+        c, s, ca, sa = cos(angle), sin(angle), cos(twist), sin(twist)
+        turns.append([(c, -s * ca, s * sa), (s, c * ca, -c * sa), (0.0, sa, ca)])
+    falls, fall = [], FALL
+    for turn in turns:
+        fall = turned(transposed(turn), fall)
+        falls.append(fall)
+    torque, torques = (0.0, 0.0, 0.0), []
+    for turn, fall, moment in reversed(list(zip(turns, falls, MOMENTS, strict=True))):
+        x, y, z = cross(fall, moment)
+        torque = turned(turn, (x + torque[0], y + torque[1], z + torque[2]))
+        torques.insert(0, torque[2])
+    return torques
 
 
 class DeviationError(Exception):
@@ -93,6 +191,36 @@ class StrictClient:
             for group in (LOWER, WRIST):
                 self._send(group, bytes((0x80 | T, *bytes(7))))
             self._hear(())
+
+    def read_joints(self) -> list[float]:
+        """Return the joint angles [rad] now."""
+        self._send(WHOLE_ARM, bytes((P,)))
+        heard = self._hear({position_id(node) for node in PUCKS})
+        return joints(self._position(heard[position_id(node)]) for node in PUCKS)
+
+    def move(self, offsets: tuple[float, ...], seconds: float) -> list[float]:
+        """Turn the joints from home by `offsets` [rad]; return where they are then.
+
+        Gravity of the bare arm and a PD in each joint, along a straight line that
+        begins and ends at rest and takes four fifths of the time.
+        """
+        q = list(HOME_Q)
+        speed = [0.0] * 7
+        cycles = round(seconds / CYCLE)
+        for cycle in range(cycles):
+            before, q = q, self.read_joints()
+            steps = zip(before, q, speed, strict=True)
+            speed = [v + POLE * ((b - a) / CYCLE - v) for a, b, v in steps]
+            s = min(1.25 * (cycle + 1) / cycles, 1.0)
+            share = s * s * s * (10.0 + s * (-15.0 + 6.0 * s))
+            wanted = [a + share * d for a, d in zip(HOME_Q, offsets, strict=True)]
+            state = zip(holding_torques(q), KP, KD, wanted, q, speed, strict=True)
+            tau = [g + kp * (w - a) - kd * v for g, kp, kd, w, a, v in state]
+            units = motor_units(tau)
+            self._send(LOWER, packed(units[:4]))
+            self._send(WRIST, packed(units[4:]))
+            self._hear(())
+        return self.read_joints()
 
     def tare(self) -> None:
         """Zero the sensor; the reading after it may be the old one."""

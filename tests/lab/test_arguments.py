@@ -3,10 +3,11 @@
 import pytest
 
 from lab import __main__ as program
-from lab.guest.scenarios.registry import ALL, chosen
+from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import Kernel, image_package
 from lab.machine import SLOWNESS, Sockets, command
 from lab.requirements import LabError, install_line, missing_packages
+from lab.results import TimerAddresses, to_line
 
 
 def test_what_is_missing_is_named_once_as_a_package():
@@ -75,7 +76,7 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
 ):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
     sockets = Sockets(tmp_path / "a", tmp_path / "b", tmp_path / "c")
-    kernel = Kernel(tmp_path / "vmlinux", ())
+    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
     words = command(kernel, tmp_path / "initramfs", sockets)
     assert any("path=/," in word and "readonly=on" in word for word in words)
     cards = [word for word in words if word.startswith("kvaser_pci")]
@@ -84,12 +85,44 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
     assert f"tsc_early_khz={SLOWNESS}000000" in words[words.index("-append") + 1]
 
 
+def test_a_machine_whose_timer_is_known_waits_for_its_rate(monkeypatch, tmp_path):
+    monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
+    sockets = Sockets(tmp_path / "a", tmp_path / "b", tmp_path / "c")
+    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
+    assert program.known_timer(kernel) is None
+    assert "-S" not in command(kernel, tmp_path / "initramfs", sockets)
+    addresses = TimerAddresses(1, 2, 3, 4)
+    kernel.timer.write_text(to_line(addresses))
+    assert program.known_timer(kernel) == addresses
+    assert "-S" in command(kernel, tmp_path / "initramfs", sockets)
+
+
+def test_a_timer_of_another_version_is_measured_again(tmp_path):
+    kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
+    kernel.timer.write_text("@lab {}")
+    assert program.known_timer(kernel) is None
+    assert not kernel.timer.exists()
+
+
+def weighed(*weights):
+    return [
+        Scenario(f"number {number}", lambda room: {}, weight=weight)
+        for number, weight in enumerate(weights)
+    ]
+
+
 @pytest.mark.parametrize("count", [1, 2, 5, 8])
 def test_machines_share_every_scenario_once_and_none_is_idle(count):
-    parts = program.shares(ALL[:5], count)
-    assert sorted(one.name for part in parts for one in part) == sorted(
-        one.name for one in ALL[:5]
-    )
-    assert all(parts)
+    scenarios = weighed(1, 1, 1, 1, 1)
+    parts = program.shares(scenarios, count)
+    names = sorted(one.name for part in parts for one in part)
+    assert names == sorted(one.name for one in scenarios)
     assert len(parts) == min(count, 5)
     assert max(map(len, parts)) - min(map(len, parts)) <= 1
+    assert all(parts)
+
+
+def test_machines_take_equal_weights():
+    parts = program.shares(weighed(1, 7, 2, 4, 6), 2)
+    assert sorted(sum(one.weight for one in part) for part in parts) == [10, 10]
+    assert parts[0][0].weight == 7

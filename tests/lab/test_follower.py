@@ -1,11 +1,22 @@
 """What the host makes of a machine's console: results, silence, a sudden end."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import pytest
 
-from lab.__main__ import Follower
-from lab.results import Begun, Finished, ScenarioResult, Verdict, to_line
+from lab.follower import LIMIT, Follower
+from lab.results import (
+    Begun,
+    Finished,
+    ScenarioResult,
+    TimerAddresses,
+    Verdict,
+    to_line,
+)
 
-PASSED = ScenarioResult("bench", Verdict.PASSED, 1.0)
+SENT = ScenarioResult("bench", Verdict.PASSED, 1.0)
+PASSED = replace(SENT, processor=1.0)  # as the host completes it
 FINISHED = to_line(Finished(2.0))
 
 
@@ -14,7 +25,13 @@ class Tape:
 
     def __init__(self, *lines, is_hanging=False):
         self._lines = list(lines)
+        self._taken = 0.0
         self._is_hanging = is_hanging
+
+    def processor_seconds(self):
+        """Each look at it finds a second more."""
+        self._taken += 1.0
+        return self._taken
 
     def line(self, until_ns):
         assert until_ns > 0
@@ -26,17 +43,18 @@ class Tape:
 
 
 def follow(tape, *names):
-    return Follower("no debugger", is_shown=False).follow(tape, names)
+    no = Path("no such file")
+    return Follower(no, no, is_shown=False).follow(tape, names)
 
 
 def test_results_come_out_in_the_order_in_which_they_came():
-    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(PASSED), FINISHED]
+    lines = [to_line(Begun("bench")), "[ 1.0] usb", to_line(SENT), FINISHED]
     assert follow(Tape(*lines), "bench") == [PASSED]
 
 
 @pytest.mark.parametrize("is_hanging", [True, False])
 def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
-    lines = [to_line(Begun("bench")), to_line(PASSED), to_line(Begun("session"))]
+    lines = [to_line(Begun("bench")), to_line(SENT), to_line(Begun("session"))]
     tape = Tape(*lines, "Oops: 0002", is_hanging=is_hanging)
     passed, lost = follow(tape, "bench", "session", "never begun")
     assert passed == PASSED
@@ -51,6 +69,54 @@ def test_a_machine_that_never_boots_is_lost_in_its_boot():
 
 
 def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
-    lines = [to_line(Begun("bench")), to_line(PASSED), FINISHED]
+    lines = [to_line(Begun("bench")), to_line(SENT), FINISHED]
     results = follow(Tape(*lines), "bench", "session")
     assert results[-1].verdict is Verdict.HUNG
+
+
+def test_a_timer_that_is_corrected_is_known_from_then_on(tmp_path, monkeypatch):
+    corrected = []
+    monkeypatch.setattr(
+        "lab.timer_rate.correct", lambda *given: corrected.append(given[1:3])
+    )
+    timer, line = tmp_path / "timer", to_line(TimerAddresses(1, 2, 3, 4))
+    for _ in range(2):
+        Follower(tmp_path, timer, is_shown=False).follow(Tape(line), [])
+    assert corrected == [(1, 2)]
+    assert timer.read_text() == line
+
+
+class Starved(Tape):
+    """A machine of a busy host: silent for so many limits, each with a tenth of it."""
+
+    def __init__(self, *lines, silences, share=0.1):
+        super().__init__(*lines)
+        self._silences = silences
+        self._share = share
+
+    def processor_seconds(self):
+        return self._taken
+
+    def line(self, until_ns):
+        if len(self._lines) == 2 and self._silences:  # before the result
+            self._silences -= 1
+            self._taken += self._share * LIMIT
+            raise TimeoutError
+        return super().line(until_ns)
+
+
+def starved(**how):
+    tape = Starved(to_line(Begun("bench")), to_line(SENT), FINISHED, **how)
+    return follow(tape, "bench")[0].verdict
+
+
+def test_a_machine_that_a_busy_host_gives_little_time_has_not_hung():
+    assert starved(silences=8) is Verdict.PASSED
+
+
+def test_a_machine_has_hung_once_it_had_its_time():
+    assert starved(silences=12) is Verdict.HUNG
+
+
+def test_a_machine_that_wants_no_time_has_hung():
+    assert starved(silences=2, share=0.001) is Verdict.HUNG

@@ -1,9 +1,11 @@
 """The table of verdicts on the terminal and in docs/lab.md."""
 
-from lab.report import page, result_line, summary
+from lab.report import Conditions, cycle_words, page, result_line, summary
 from lab.results import ScenarioResult, Verdict
 
-PASSED = ScenarioResult("bench", Verdict.PASSED, 3.5, {"rate": "500 Hz", "p|q": "1"})
+PASSED = ScenarioResult(
+    "bench", Verdict.PASSED, 3.5, {"rate": "500 Hz", "p|q": "1"}, processor=41.2
+)
 FAILED = ScenarioResult(
     "session", Verdict.FAILED, 1.0, {}, "Traceback\n  line\nValueError: no"
 )
@@ -29,9 +31,38 @@ def test_the_summary_counts_each_verdict():
     assert "61 s" in text
 
 
+CONDITIONS = Conditions("6.1.0-9-amd64", "QEMU 7.2", "2 x fast", 2, 61.4)
+
+
 def test_the_page_has_a_row_and_a_sentence_for_each_scenario():
-    text = page([PASSED, FAILED], {"bench": "Measure the loop."}, 61.4)
+    text = page([PASSED, FAILED], {"bench": "Measure the loop."}, CONDITIONS)
     rows = [line for line in text.splitlines() if line.startswith("| ")]
-    assert "| bench | passed | 3.5 | rate: 500 Hz; p\\|q: 1 |" in rows
+    assert "| bench | passed | 3.5 | 41 | rate: 500 Hz; p\\|q: 1 |" in rows
     assert any("ValueError: no" in row for row in rows)
     assert "**bench**: Measure the loop." in text
+
+
+def test_the_page_says_with_what_it_was_made():
+    text = page([PASSED, FAILED], {}, CONDITIONS)
+    for words in ("6.1.0-9-amd64", "QEMU 7.2", "2 x fast", "61 s", "41 s"):
+        assert words in text
+
+
+def kept(cycles, missed):
+    figures = {"cycles": str(cycles), "missed": str(missed)}
+    return ScenarioResult("session", Verdict.PASSED, 1.0, figures)
+
+
+def test_cycles_of_all_scenarios_count_together():
+    words = cycle_words([kept(60_000, 0), PASSED, kept(40_000, 2)])
+    assert "2 of 100000" in words
+    assert "20 ppm" in words
+
+
+def test_none_missed_is_only_as_good_as_their_number():
+    # Of 3 / n misses a cycle, 95 % of all runs of n cycles would show one.
+    assert "below 30 ppm" in cycle_words([kept(100_000, 0)])
+
+
+def test_without_trials_nothing_is_said_of_cycles():
+    assert "ppm" not in cycle_words([PASSED])

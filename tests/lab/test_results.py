@@ -19,7 +19,7 @@ RESULT = ScenarioResult(
 
 
 @pytest.mark.parametrize(
-    "message", [RESULT, Begun("session"), TimerAddresses(2**63, 7), Finished(2.5)]
+    "message", [RESULT, Begun("session"), TimerAddresses(2**63, 7, 8, 9), Finished(2.5)]
 )
 def test_a_message_survives_the_console(message):
     line = to_line(message)

@@ -7,7 +7,8 @@ import threading
 import pytest
 
 from lab.requirements import LabError
-from lab.timer_rate import correct, packet
+from lab.results import TimerAddresses
+from lab.timer_rate import correct, packet, preset
 
 OFFSETS, OFFSET, EVENTS = 0xFFFF_0000, 0xFFFF_8880_0000_0000, 0x1000
 MULT = OFFSET + EVENTS + 48
@@ -22,6 +23,7 @@ class Stub:
             MULT: struct.pack("<I", mult),
         }
         self.is_detached = False
+        self.commands = []
         self._listener = socket.socket(socket.AF_UNIX)
         self._listener.bind(str(path))
         self._listener.listen()
@@ -44,6 +46,11 @@ class Stub:
 
     def _answer(self, command):
         name, rest = command[:1], command[1:].decode()
+        self.commands.append(command.decode())
+        if name in b"Zz":
+            return "OK"
+        if name == b"c":  # it runs into what was set before
+            return "T05thread:01;"
         if name == b"D":
             self.is_detached = True
             return "OK"
@@ -69,3 +76,14 @@ def test_a_timer_that_cannot_be_one_is_left_alone(tmp_path, mult):
     stub.thread.join(10)
     assert stub.is_detached
     assert struct.unpack("<I", stub.memory[MULT]) == (mult,)
+
+
+def test_a_kernel_that_is_known_is_told_its_rate_before_it_measures_it(tmp_path):
+    stub = Stub(tmp_path / "gdb", 1)
+    preset(tmp_path / "gdb", TimerAddresses(OFFSETS, EVENTS, 0x5000, 0x6000), 6)
+    stub.thread.join(10)
+    # 1 GHz of a processor that is six times faster than time, 250 ticks a second.
+    assert struct.unpack("<I", stub.memory[0x5000]) == (24_000_000,)
+    set_up = [stub.commands.index(text) for text in ("Z1,6000,1", "c", "z1,6000,1")]
+    assert set_up == sorted(set_up)
+    assert stub.is_detached

@@ -1,4 +1,5 @@
 from .decoder import BusReader, describe_id
+from .doors import PythonCanDoor, open_bus, open_door
 from .error_frames import BusErrors, error_names
 from .frames import (
     GROUP_BIT,
@@ -31,7 +32,8 @@ from .frames import (
     property_reply_id,
     wrap_position,
 )
-from .link import CanBus, CanLink, FrameTap, Link, open_bus
+from .kernel_door import LONGEST_QUEUE, interface_state
+from .link import CanLink, Door, FrameTap, Link
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -41,9 +43,10 @@ from .log import (
     parse_log,
 )
 from .properties import (
+    FIRST_RELEASED,
     MAGNETIC_ENCODER,
     MODERN,
-    OLDEST_DRIVEN,
+    NEWEST_DOCUMENTED,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
     Device,
@@ -53,17 +56,20 @@ from .properties import (
     device_of,
     is_wide,
     names,
+    nearest_documented,
     property_number,
 )
 from .property_client import PropertyClient
 
 __all__ = [
+    "FIRST_RELEASED",
     "GROUP_BIT",
     "LONGEST_LINE",
+    "LONGEST_QUEUE",
     "MAGNETIC_ENCODER",
     "MODERN",
     "MOTOR_NODES",
-    "OLDEST_DRIVEN",
+    "NEWEST_DOCUMENTED",
     "POLES_OF_GIMBALS",
     "POLES_OF_WRIST",
     "SAFETY_NODE",
@@ -73,11 +79,11 @@ __all__ = [
     "BusReader",
     "BusSummary",
     "BusTraffic",
-    "CanBus",
     "CanLink",
     "CanLog",
     "DecodedLine",
     "Device",
+    "Door",
     "FrameError",
     "FrameTap",
     "Group",
@@ -88,6 +94,7 @@ __all__ = [
     "PuckMode",
     "PuckRole",
     "PuckStatus",
+    "PythonCanDoor",
     "Triple",
     "compose_id",
     "decode_force",
@@ -108,9 +115,12 @@ __all__ = [
     "encode_torques",
     "error_names",
     "group_id",
+    "interface_state",
     "is_wide",
     "names",
+    "nearest_documented",
     "open_bus",
+    "open_door",
     "parse_log",
     "position_reply_id",
     "property_number",

@@ -11,7 +11,8 @@ from acquisition import BusCondition
 from wam.bus.frames import Payload
 
 ERROR_MASK = 0x1FFFFFFF  # all classes, for the socket's filter
-ERROR_FLAG, EXTENDED_FLAG = 0x20000000, 0x80000000  # of Linux, in an identifier
+# Flags of Linux in an identifier.
+ERROR_FLAG, REMOTE_FLAG, EXTENDED_FLAG = 0x20000000, 0x40000000, 0x80000000
 _ACKNOWLEDGE = frozenset({0x19, 0x1B})  # slot and delimiter, in data[3]
 
 

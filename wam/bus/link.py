@@ -1,36 +1,75 @@
-"""The one door to python-can: a bus that is sent to and drained, never waited on."""
+"""A CAN bus as the driver sees it: frames of devices, the rest sorted out."""
 
 import errno
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
-import can
-
-from acquisition import NS_PER_S, Clock, LinkError, LinkFullError, utc_offset_ns
+from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
 from acquisition.ipc import FrameTape
-from wam.bus.error_frames import BusErrors
+from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
 MODE_BROADCAST_ID = compose_id(SAFETY_NODE, Group.BUS, is_group=True)
 _FULL = frozenset({errno.ENOBUFS, errno.EAGAIN})  # a queue, a socket's buffer
-_DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
+DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
+_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
+_AHEAD_NS = 5_000_000  # frames go on arriving while a bus is drained
+_LARGEST_ID = 0x7FF  # of a frame that a WAM uses
 
 
 class Frame(NamedTuple):
     """A frame as received or sent.
 
     Attributes:
-        can_id: 11-bit identifier.
+        can_id: 11-bit identifier; at a door also Linux's flags, of which an error, an
+            extended or a remote frame has one.
         data: payload.
-        stamp: time of arrival by the bus's own clock [s], 0.0 = it has none.
+        t_ns: when the bus had it, on the host's monotonic clock [ns], 0 = not known.
     """
 
     can_id: int
     data: bytes
-    stamp: float
+    t_ns: int
 
 
-Tap = Callable[[Sequence[tuple[int, bytes, float]]], None]  # each like a Frame
+Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # each like a Frame
+
+
+class Door(Protocol):
+    """Frames of all kinds, out and in; what a link needs of an adapter.
+
+    Attributes:
+        name: what it is, for people.
+        lost: frames that arrived and found no room, as far as it can tell.
+    """
+
+    name: str
+    lost: int
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Queue a data frame with an 11-bit identifier.
+
+        Raises:
+            LinkFullError: the queue is full.
+            LinkError: the bus is down.
+        """
+        ...
+
+    def receive(self) -> list[Frame]:
+        """Return what has arrived, oldest first; never waits, raises LinkError."""
+        ...
+
+    def has_unsent(self) -> bool:
+        """Return whether frames wait in this host, as far as it can tell."""
+        ...
+
+    def fileno(self) -> int:
+        """Return the descriptor to wait on, -1 if there is none."""
+        ...
+
+    def close(self) -> None:
+        """Give the adapter back."""
+        ...
 
 
 class Link(Protocol):
@@ -51,12 +90,20 @@ class Link(Protocol):
         """Identifier of the first frame of another master; None = none ever came."""
         ...
 
+    def metadata(self) -> dict[str, str]:
+        """Return which door this is and what it lost, as text for a recording."""
+        ...
+
     def send(self, can_id: int, data: bytes) -> None:
         """Queue a frame; raises LinkError when the bus refuses it."""
         ...
 
     def receive(self) -> list[Frame]:
         """Return what has arrived, oldest first; never waits."""
+        ...
+
+    def has_unsent(self) -> bool:
+        """Return whether frames wait in this host, as far as the door can tell."""
         ...
 
     def fileno(self) -> int:
@@ -72,33 +119,8 @@ class Link(Protocol):
         ...
 
 
-CanBus = can.BusABC  # for modules that may not know python-can
-
-
-def open_bus(interface: str, channel: str, bitrate: int) -> can.BusABC:
-    """Return an open bus of python-can.
-
-    Args:
-        interface: python-can's name of the adapter, such as "socketcan".
-        channel: the adapter's name, such as "can0".
-        bitrate: [bit/s]; a SocketCAN interface has its own and ignores it.
-
-    Raises:
-        LinkError: the adapter is missing, down or unknown to python-can.
-    """
-    bus: can.BusABC | None = None
-    try:
-        bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate)
-        bus.recv(0)  # an interface that is down says so at the first look only
-    except (can.CanError, OSError, ValueError, ImportError) as error:
-        if bus is not None:
-            bus.shutdown()
-        raise _cannot_open(interface, channel, bitrate, error) from error
-    return bus
-
-
 class CanLink:
-    """A python-can bus seen by the driver: sent to, drained, never waited on.
+    """A bus seen by the driver: sent to, drained, never waited on.
 
     Frames of hosts (FROM = 0, the own ones included), remote, extended and error
     frames are dropped. The safety module's broadcast of a change of mode has no known
@@ -112,11 +134,11 @@ class CanLink:
         foreign_id: the first of them; None = none has.
     """
 
-    def __init__(self, bus: CanBus, tap: Tap | None = None) -> None:
-        """Take a bus over.
+    def __init__(self, door: Door, tap: Tap | None = None) -> None:
+        """Take a door over.
 
         Args:
-            bus: of python-can.
+            door: to the bus.
             tap: takes every data frame with an 11-bit identifier, sent or received;
                 all that have arrived at once together.
         """
@@ -125,13 +147,14 @@ class CanLink:
         self.errors = BusErrors()
         self.foreign_ids: set[int] = set()
         self.foreign_id: int | None = None
-        self._bus = bus
+        self._door = door
         self._inbox: list[Frame] = []
+        self._error: LinkError | None = None  # looking came across it
         self._is_open = True
-        try:
-            self._descriptor = bus.fileno()
-        except NotImplementedError:
-            self._descriptor = -1
+
+    def metadata(self) -> dict[str, str]:
+        """Return which door this is and what it lost, as text for a recording."""
+        return {"link:door": self._door.name, "link:lost_frames": str(self._door.lost)}
 
     def send(self, can_id: int, data: bytes) -> None:
         """Queue a data frame with an 11-bit identifier.
@@ -141,14 +164,9 @@ class CanLink:
         """
         if not self._is_open:
             raise LinkError("The CAN bus is closed.", hint="Start again.")
-        # positionally: stamp, identifier, is it an extended one
-        message = can.Message(0.0, can_id, False, data=data)
-        try:
-            self._bus.send(message)
-        except (can.CanError, OSError) as error:
-            raise _broken(self._bus.channel_info, error) from error
+        self._door.send(can_id, data)
         if self._tap is not None:
-            self._tap(((can_id, data, 0.0),))
+            self._tap(((can_id, data, 0),))
 
     def receive(self) -> list[Frame]:
         """Return the device frames that have arrived, oldest first.
@@ -156,20 +174,28 @@ class CanLink:
         Raises:
             LinkError: the bus is down.
         """
+        if self._error is not None:
+            error, self._error = self._error, None
+            raise error
         self._drain()
         frames, self._inbox = self._inbox, []
         return frames
 
+    def has_unsent(self) -> bool:
+        """Return whether frames wait in this host, as far as the door can tell."""
+        return self._is_open and self._door.has_unsent()
+
     def fileno(self) -> int:
         """Return the bus's descriptor, -1 if it has none."""
-        return self._descriptor if self._is_open else -1
+        return self._door.fileno() if self._is_open else -1
 
     def is_readable(self) -> bool:
         """Return whether a device frame has arrived; a dead bus has none."""
         if not self._inbox:
             try:
                 self._drain()
-            except LinkError:
+            except LinkError as error:
+                self._error = error
                 return False
         return bool(self._inbox)
 
@@ -177,36 +203,25 @@ class CanLink:
         """Give the bus back; a second call does nothing."""
         if self._is_open:
             self._is_open = False
-            self._bus.shutdown()
+            self._door.close()
 
     def _drain(self) -> None:
         if not self._is_open:
             return
-        receive = self._bus.recv
-        frames: list[Frame] = []
-        try:
-            for _ in range(_DRAIN_AT_MOST):
-                message = receive(0)
-                if message is None:
-                    break
-                if message.is_error_frame:
-                    self.errors.add(message.arbitration_id, message.data)
-                elif not (message.is_extended_id or message.is_remote_frame):
-                    data, stamp = bytes(message.data), message.timestamp
-                    frames.append(Frame(message.arbitration_id, data, stamp))
-        except (can.CanError, OSError) as error:
-            raise _broken(self._bus.channel_info, error) from error
-        finally:
-            if frames:
-                self._sort(frames)
+        arrived = self._door.receive()
+        if arrived:
+            self._sort(arrived)
 
-    def _sort(self, frames: list[Frame]) -> None:
-        """Show frames to the tap and keep those of devices."""
-        if self._tap is not None:
-            self._tap(frames)
-        for frame in frames:
-            can_id = frame.can_id
-            if can_id == MODE_BROADCAST_ID:
+    def _sort(self, arrived: list[Frame]) -> None:
+        """Show plain frames to the tap and keep those of devices."""
+        is_plain = True
+        for frame in arrived:
+            can_id = frame[0]
+            if can_id > _LARGEST_ID:
+                is_plain = False
+                if can_id & ERROR_FLAG:
+                    self.errors.add(can_id, frame[1])
+            elif can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1
             elif can_id & SENDER_MASK:
                 self._inbox.append(frame)
@@ -214,26 +229,22 @@ class CanLink:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id
+        if self._tap is None:
+            return
+        if not is_plain:
+            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
+        if arrived:
+            self._tap(arrived)
 
 
-def _cannot_open(
-    interface: str, channel: str, bitrate: int, error: Exception
-) -> LinkError:
-    up = f"Fix: ip link set {channel} up type can bitrate {bitrate}. Arm not touched."
-    if interface == "socketcan" and _number_of(error) == errno.ENETDOWN:
-        return LinkError(f"{channel} is down.", hint=up)
-    if interface == "socketcan" and _number_of(error) == errno.ENODEV:
-        return LinkError(
-            f"{channel} does not exist.", hint=f"Is the adapter plugged in? {up}"
-        )
-    return LinkError(
-        f"CAN {interface}:{channel} cannot be opened: {error}.",
-        hint="Check the interface's name, its driver and its cable. Arm not touched.",
-    )
+def is_plausible(t_ns: int, now_ns: int) -> bool:
+    """Return whether a frame that is at hand now can be of `t_ns` [monotonic ns]."""
+    return -_AHEAD_NS <= now_ns - t_ns < _PLAUSIBLE_NS
 
 
-def _broken(channel: str, error: Exception) -> LinkError:
-    number = _number_of(error)
+def broken_link(channel: str, error: Exception) -> LinkError:
+    """Return what to raise when a bus refused to send or to receive."""
+    number = error_number(error)
     is_full = number in _FULL or (number is None and "full" in str(error).lower())
     if is_full:
         return LinkFullError(
@@ -246,38 +257,25 @@ def _broken(channel: str, error: Exception) -> LinkError:
     )
 
 
-def _number_of(error: Exception) -> int | None:
+def error_number(error: Exception) -> int | None:
     """Return the system's error number, which python-can keeps in its own field."""
     own = getattr(error, "error_code", None)
     return own if isinstance(own, int) else getattr(error, "errno", None)
 
 
-_PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further from now is of another clock
-
-
 class FrameTap:
     """Implements `wam.bus.link.Tap`; times are monotonic [ns].
 
-    A bus stamps what it receives by UTC or by the monotonic clock [s], or not at all
-    (0.0); what has no stamp that can be believed is of now.
+    What the bus has no time for is of now.
     """
 
     def __init__(self, tape: FrameTape, clock: Clock) -> None:
         self._tape = tape
         self._clock = clock
-        self._offset_ns = utc_offset_ns(clock)[0]
 
-    def __call__(self, frames: Sequence[tuple[int, bytes, float]]) -> None:
-        """Note frames that were sent or found just now, oldest first."""
-        now_ns, offset_ns = self._clock.now_ns(), self._offset_ns
-        rows: list[tuple[int, int, int, bytes]] = []
-        for can_id, data, stamp in frames:
-            t_ns = now_ns
-            if stamp:
-                t_ns = round(stamp * NS_PER_S)
-                if not 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
-                    t_ns -= offset_ns
-                    if not 0 <= now_ns - t_ns < _PLAUSIBLE_NS:
-                        t_ns = now_ns
-            rows.append((t_ns, can_id, len(data), data))
-        self._tape.add(rows)
+    def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
+        """Note frames that were sent or arrived just now, oldest first."""
+        now_ns = self._clock.now_ns()
+        self._tape.add(
+            [(t_ns or now_ns, can_id, len(data), data) for can_id, data, t_ns in frames]
+        )

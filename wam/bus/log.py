@@ -96,7 +96,7 @@ class BusTraffic:
         self.counts: Counter[int] = Counter()
         self.bits = 0.0
 
-    def __call__(self, frames: Sequence[tuple[int, bytes, float]]) -> None:
+    def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
         """Count frames that were heard."""
         for can_id, data, _ in frames:
             self.counts[can_id] += 1

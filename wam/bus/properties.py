@@ -171,8 +171,7 @@ ZERO 55@32 56@33 55@36 42@61"""
 
 
 MODERN = 61  # from here on motor and safety firmware have tables of their own
-FIRST_RELEASED = 32
-OLDEST_DRIVEN = 65  # from here on all that the driver asks a motor for has its place
+FIRST_RELEASED, NEWEST_DOCUMENTED = 32, 200
 POLES_OF_WRIST = 6
 POLES_OF_GIMBALS = 8
 MAGNETIC_ENCODER = 0x0100
@@ -276,6 +275,11 @@ def names(device: Device, vers: int = MODERN) -> dict[int, str]:
 def is_wide(name: str) -> bool:
     """Return whether a property is answered with 32 bits instead of 16."""
     return name in WIDE
+
+
+def nearest_documented(vers: int) -> int:
+    """Return `vers`, or the firmware next to it whose table is documented."""
+    return min(max(vers, FIRST_RELEASED), NEWEST_DOCUMENTED)
 
 
 def _shared(motor: dict[str, int]) -> dict[str, int]:

@@ -1,24 +1,16 @@
 from .arm import WamArm
 from .health import complaints, health_metadata, temperature_range
-from .safety_module import (
-    COUNTS_PER_SPEED,
+from .home import HOME_LIMIT, check_home, check_zero, home_error, zero_error
+from .pendant import (
     MONITORS,
-    WARNING_SHARE,
     PendantButton,
     PendantWord,
     SafetyLevel,
-    SafetyLimits,
     encode_pendant,
 )
+from .safety_module import COUNTS_PER_SPEED, WARNING_SHARE, SafetyLimits
 from .settings import ArmSettings
-from .startup import (
-    HOME_LIMIT,
-    ArmInfo,
-    check_home,
-    check_zero,
-    home_error,
-    zero_error,
-)
+from .startup import ArmInfo
 
 __all__ = [
     "COUNTS_PER_SPEED",

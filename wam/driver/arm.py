@@ -30,6 +30,7 @@ _ALL_FRESH = (1 << MOTORS) - 1
 # Pucks without power are silent first; asked in these many incomplete cycles at once,
 # the module says whether it was a stop, even when one question or answer is lost.
 _URGENT_CYCLES = 3
+_FIRST_POSITIONS_NS = 1_000 * _MS  # as long as the vendor's library waits for them
 _ZEROED_WITHIN = 1000  # counts; the arm must stand while it is zeroed
 _IGNORED_SPEED_FAULTS = 5  # the safety module's history, as libbarrett says
 
@@ -93,11 +94,11 @@ class WamArm:
         self._safety = SafetyModule(self._properties, self._clock, info.safety_vers)
         self._poller.set_firmware(info.safety_vers)
         self._poller.note_mode(info.safety_mode, self._clock.now_ns())
-        self._poller.is_lowering = False
-        self._poller.note_pendant(info.pendant)
+        self._poller.begin(info.pendant)
         health = [puck.health for puck in info.pucks]
-        self._poller.health.begin(health, self._clock.now_ns())
-        self._traffic.set_firmware(info.pucks[0].vers)
+        firmware = [puck.vers for puck in info.pucks]
+        self._poller.health.begin(health, firmware, self._clock.now_ns())
+        self._traffic.set_firmware(firmware[0])  # P and T are the same in all seven
         transmission = Transmission(
             self._settings.j2mp,
             tuple(puck.cts for puck in info.pucks),
@@ -108,7 +109,12 @@ class WamArm:
         self._begin_at_rest()
         dated = zip(info.pucks, self.health(), strict=True)
         pucks = tuple(replace(puck, health=health) for puck, health in dated)
-        return replace(info, pucks=pucks, late_replies=self._properties.late_replies)
+        return replace(
+            info,
+            pucks=pucks,
+            late_replies=self._properties.late_replies,
+            door=self._link.metadata()["link:door"],
+        )
 
     def read(self, now_ns: int) -> ArmReading:
         """Ask for the joint positions at `now_ns` and return them.
@@ -138,6 +144,7 @@ class WamArm:
         return ArmReading(
             host_ns=now_ns,
             arm_ns=traffic.arm_ns,
+            bus_ns=traffic.bus_ns,
             counts=list(motion.counts),
             q=motion.q,
             qd=motion.qd,
@@ -239,7 +246,7 @@ class WamArm:
             self._properties.pause(_MS)
         # The module must see the new positions while it still ignores speed.
         self._begin_at_rest()
-        self._check_taken(counts, motion.counts)
+        _check_taken(counts, motion.counts)
         self._safety.mark_zeroed()
 
     def _look_at_pendant(self) -> None:
@@ -247,19 +254,11 @@ class WamArm:
         if self._motion is None:
             return
         try:
-            self._poller.note_pendant(self._safety.pendant())
+            self._poller.note_pendant(self._safety.pendant(self._poller.excused))
         except LinkError:
             self.counters.link_errors += 1
         except DeviceFaultError:
             self.counters.malformed += 1
-
-    def _check_taken(self, wanted: Sequence[int], reported: Sequence[int]) -> None:
-        worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
-        if worst > _ZEROED_WITHIN:
-            raise DeviceFaultError(
-                f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
-                hint="The arm must not move while it is zeroed. Zero it again.",
-            )
 
     def _started(self) -> JointEstimator:
         if self._motion is None:
@@ -270,16 +269,27 @@ class WamArm:
 
     def _begin_at_rest(self) -> None:
         """Take the positions as they are, with velocity zero."""
-        for _ in range(3):
-            now_ns = self._clock.now_ns()
+        deadline_ns = self._clock.now_ns() + _FIRST_POSITIONS_NS
+        while (now_ns := self._clock.now_ns()) < deadline_ns:
             self._traffic.exchange(now_ns)
             counts = [c for c in self._traffic.received if c is not None]
             if len(counts) == MOTORS:
                 self._started().begin(now_ns, counts)
                 self._missing_cycles = 0
                 return
+            self._properties.pause(_MS)
         silent = [n for n in MOTOR_NODES if self._traffic.received[n - 1] is None]
         raise LinkTimeoutError(
             f"{pucks_verb(silent)} not report a position.",
             hint="Check the cable, or a puck in reset.",
+        )
+
+
+def _check_taken(wanted: Sequence[int], reported: Sequence[int]) -> None:
+    """Raise DeviceFaultError unless the pucks report the counts that were set."""
+    worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
+    if worst > _ZEROED_WITHIN:
+        raise DeviceFaultError(
+            f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
+            hint="The arm must not move while it is zeroed. Zero it again.",
         )

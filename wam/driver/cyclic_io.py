@@ -16,7 +16,6 @@ from acquisition import (
 from wam.bus import (
     MODERN,
     MOTOR_NODES,
-    BusErrors,
     Device,
     Group,
     Link,
@@ -25,6 +24,7 @@ from wam.bus import (
     encode_get,
     encode_torques,
     group_id,
+    nearest_documented,
     position_reply_id,
     property_number,
 )
@@ -47,15 +47,17 @@ class LinkCounters:
         rejected: positions that jumped.
         malformed: frames that contradict the protocol.
         link_errors: times the bus refused.
-        errors: what error frames of the bus's controller reported.
+        withheld: torques not sent because earlier frames had not left.
+        link: the bus, which says what its door is and what was lost there.
     """
 
+    link: Link
     missing: list[int] = field(default_factory=lambda: [0] * MOTORS)
     stale: int = 0
     rejected: int = 0
     malformed: int = 0
     link_errors: int = 0
-    errors: BusErrors = field(default_factory=BusErrors)
+    withheld: int = 0
 
     def text(self) -> str:
         """Return the counters in one line."""
@@ -69,7 +71,9 @@ class LinkCounters:
             "link:rejected_jumps": str(self.rejected),
             "link:malformed_frames": str(self.malformed),
             "link:bus_errors": str(self.link_errors),
-            "link:error_frames": self.errors.text() or "none",
+            "link:withheld_torques": str(self.withheld),
+            "link:error_frames": self.link.errors.text() or "none",
+            **self.link.metadata(),
         }
 
 
@@ -95,6 +99,7 @@ class CycleTraffic:
     Attributes:
         received: positions of this cycle [counts], motors 1 to 7, None = no reply.
         arm_ns: when the last of them arrived [ns], 0 = none did.
+        bus_ns: when the bus had the last of them [ns], 0 = it does not tell.
         sent: torques that the bus took last [puck units], motors 1 to 7.
         sent_ns: when it took them [ns], 0 = never.
         poller: safety module and pucks, asked in the free bus time.
@@ -106,11 +111,12 @@ class CycleTraffic:
     def __init__(self, link: Link, clock: Clock, settings: ArmSettings) -> None:
         self.received: list[int | None] = [None] * MOTORS
         self.arm_ns = 0
+        self.bus_ns = 0
         self.sent = [0] * MOTORS
         self.sent_ns = 0
         self.poller = StatusPoller(link, settings)
         self.bus_device: BusDevice | None = None
-        self.counters = LinkCounters(errors=link.errors)
+        self.counters = LinkCounters(link)
         self.condition = BusCondition.SOUND
         self._errors_seen = 0  # error frames
         self._owed = 0  # bit i set = motor i+1 may still answer an earlier question
@@ -121,6 +127,7 @@ class CycleTraffic:
 
     def set_firmware(self, vers: int) -> None:
         """Use the property numbers of puck firmware `vers`."""
+        vers = nearest_documented(vers)
         self.p_number = property_number(Device.MOTOR, "P", vers)
         self._get_p = encode_get(self.p_number)
         self._t_number = property_number(Device.MOTOR, "T", vers)
@@ -132,13 +139,14 @@ class CycleTraffic:
         that owes an earlier answer is given the time to send two: the last one counts.
         """
         self.poller.begin_cycle(now_ns)
-        self.arm_ns = 0
+        self.arm_ns = self.bus_ns = 0
         self.received = [None] * MOTORS
         try:
             self.counters.stale += self._collect()
             if self._owed:
                 self._owed &= self._missing()
             self.received = [None] * MOTORS
+            self.bus_ns = 0
             self._link.send(_ARM_ID, self._get_p)
             self._ask_companion()
             self._await_replies(now_ns)
@@ -160,7 +168,7 @@ class CycleTraffic:
     def listen(self, now_ns: int) -> None:
         """Take what is not a position; ask for none at `now_ns`, and do not wait."""
         self.poller.begin_cycle(now_ns)
-        self.arm_ns = 0
+        self.arm_ns = self.bus_ns = 0
         try:
             self.counters.stale += self._collect()
         except LinkError:
@@ -176,7 +184,14 @@ class CycleTraffic:
         return is_new
 
     def transmit(self, units: list[int]) -> bool:
-        """Send torques [puck units]; return False when the bus refused a frame."""
+        """Send torques [puck units]; return False when the bus did not take a frame.
+
+        While motors are silent and frames still wait in this host, a torque would wait
+        too and act when it is stale: none is sent then.
+        """
+        if self._owed and self._link.has_unsent():
+            self.counters.withheld += 1
+            return False
         try:
             self._link.send(_LOWER_ID, encode_torques(units[:4], self._t_number))
             self.sent[:4] = units[:4]
@@ -228,7 +243,7 @@ class CycleTraffic:
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
         arrived, received = 0, self.received
-        for can_id, data, _ in self._link.receive():
+        for can_id, data, t_ns in self._link.receive():
             index = _POSITION_INDEX.get(can_id)
             try:
                 if index is not None:
@@ -236,6 +251,7 @@ class CycleTraffic:
                     if received[index] is not None:
                         self._owed &= ~(1 << index)
                     received[index] = counts
+                    self.bus_ns = t_ns
                     arrived += 1
                 else:
                     if self.bus_device is not None:

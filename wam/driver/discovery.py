@@ -6,6 +6,7 @@ from acquisition import (
     BusCondition,
     Clock,
     DeviceFaultError,
+    LinkFullError,
     PreflightError,
     SafetyMode,
 )
@@ -35,7 +36,11 @@ def discover_pucks(
         DeviceFaultError: a puck says that it does not work.
         LinkError: the bus is down.
     """
-    stats = _ask(properties, range(1, 32), _MS)
+    try:
+        stats = _ask(properties, range(1, 32), _MS)
+    except LinkFullError:
+        _check_bus(properties.bus_condition)
+        raise
     mode = _mode(properties, clock, stats)
     for _ in range(_SECOND_LOOKS):
         silent = [node for node in _EXPECTED if node not in stats]
@@ -86,8 +91,8 @@ def _check_bus(condition: BusCondition) -> None:
     if condition is BusCondition.OFF:
         raise PreflightError(
             "The CAN controller has left the bus after too many errors (bus-off).",
-            hint="Check cable and bit rate, then restart it: ip link set can0 type can "
-            "restart, or down and up.",
+            hint="Check cable and bit rate. Set up with restart-ms it comes back by "
+            "itself, otherwise: ip link set can0 down, then up.",
         )
     if condition is BusCondition.UNHEARD:
         raise PreflightError(

@@ -2,10 +2,18 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Final
 
 from acquisition import NS_PER_S
-from wam.bus import MOTOR_NODES, Device, Property, property_number
+from wam.bus import (
+    MODERN,
+    MOTOR_NODES,
+    Device,
+    Property,
+    nearest_documented,
+    property_number,
+)
 
 # The loop asks each puck something every 0.7 s; four questions without an answer and
 # older reports are no longer news.
@@ -36,25 +44,28 @@ class PuckHealth:
         return self.heard_ns is not None and now_ns - self.heard_ns <= NEWS_NS
 
 
-# The numbers up to 41 are the same in every firmware that can be driven.
 _FIELDS: Final = {
-    property_number(Device.MOTOR, name): field
-    for name, field in (
-        ("TEMP", "puck_degc"),
-        ("THERM", "motor_degc"),
-        ("VBUS", "bus_voltage"),
-        ("ERROR", "error"),
-    )
+    "TEMP": "puck_degc",
+    "THERM": "motor_degc",
+    "VBUS": "bus_voltage",
+    "ERROR": "error",
 }
-_QUESTIONS = tuple((node, number) for number in _FIELDS for node in MOTOR_NODES)
+_QUESTIONS = tuple((node, name) for name in _FIELDS for node in MOTOR_NODES)
 
 
-def ask_health(ask: Callable[[int], int | None]) -> PuckHealth:
-    """Return what a puck says when `ask(number)` puts each question to it.
+@cache
+def _numbers(vers: int) -> dict[str, int]:
+    """Return the number of each property that is asked for, by name."""
+    known = nearest_documented(vers)
+    return {name: property_number(Device.MOTOR, name, known) for name in _FIELDS}
+
+
+def ask_health(ask: Callable[[int], int | None], vers: int) -> PuckHealth:
+    """Return what a puck with firmware `vers` answers to `ask(number)`.
 
     When that was is for the caller to know: see `HealthTable.begin`.
     """
-    answers = {field: ask(number) for number, field in _FIELDS.items()}
+    answers = {_FIELDS[name]: ask(number) for name, number in _numbers(vers).items()}
     return PuckHealth(**answers)
 
 
@@ -68,15 +79,31 @@ class HealthTable:
     def __init__(self) -> None:
         self.pucks: list[PuckHealth] = [PuckHealth() for _ in MOTOR_NODES]
         self._next = 0
+        self._learn([MODERN] * len(MOTOR_NODES))
+
+    def _learn(self, firmware: Sequence[int]) -> None:
+        """Use the property numbers of the firmware of pucks 1 to 7."""
+        tables = [_numbers(vers) for vers in firmware]
+        self._questions = [(node, tables[node - 1][name]) for node, name in _QUESTIONS]
+        self._fields = [
+            {number: _FIELDS[name] for name, number in table.items()}
+            for table in tables
+        ]
 
     def next_question(self) -> tuple[int, int]:
         """Return (node, property number); all 28 come in turn."""
-        question = _QUESTIONS[self._next]
-        self._next = (self._next + 1) % len(_QUESTIONS)
+        question = self._questions[self._next]
+        self._next = (self._next + 1) % len(self._questions)
         return question
 
-    def begin(self, pucks: Sequence[PuckHealth], now_ns: int) -> None:
-        """Take what pucks 1 to 7 have answered by `now_ns`, at start-up."""
+    def begin(
+        self, pucks: Sequence[PuckHealth], firmware: Sequence[int], now_ns: int
+    ) -> None:
+        """Take what pucks 1 to 7 have answered by `now_ns`, at start-up.
+
+        `firmware` of each decides under which number it is asked from now on.
+        """
+        self._learn(firmware)
         self.pucks[:] = [
             replace(puck, heard_ns=now_ns if puck != PuckHealth() else None)
             for puck in pucks
@@ -84,7 +111,7 @@ class HealthTable:
 
     def note(self, node: int, reply: Property, now_ns: int) -> None:
         """Take the answer of puck `node`; other properties than these are ignored."""
-        field = _FIELDS.get(reply.number)
+        field = self._fields[node - 1].get(reply.number)
         if field is not None:
             old = self.pucks[node - 1]
             self.pucks[node - 1] = replace(old, heard_ns=now_ns, **{field: reply.value})

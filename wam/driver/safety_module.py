@@ -3,11 +3,18 @@
 The host may only ask it to go down; up is the pendant's business.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from enum import IntEnum
 
 from acquisition import Clock, DeviceFaultError, LinkError, SafetyMode
-from wam.bus import SAFETY_NODE, Device, PropertyClient, property_number
+from wam.bus import (
+    SAFETY_NODE,
+    Device,
+    PropertyClient,
+    nearest_documented,
+    property_number,
+)
+from wam.driver.pendant import MONITORS, NO_PENDANT, PendantWord, decode_pendant
 
 COUNTS_PER_SPEED = 4096  # VL1 and VL2 are Q4.12: 1 m/s is 4096
 WARNING_SHARE = 0.9  # of the fault's value, where no warning is given
@@ -44,88 +51,6 @@ _RETRY_NS = 10_000_000
 _CONFIG_GAP_NS = 10_000_000  # configuration frames closer together are not promised
 
 
-class SafetyLevel(IntEnum):
-    """State of one of the module's monitors."""
-
-    SAFE = 1
-    WARNING = 2
-    FAULT = 4
-
-
-class PendantButton(IntEnum):
-    """What is pressed on the pendant."""
-
-    E_STOP = 0
-    ACTIVATE = 1
-    IDLE = 2
-    NONE = 3
-
-
-@dataclass(frozen=True, slots=True)
-class PendantWord:
-    """The word PEN taken apart.
-
-    Attributes:
-        velocity, torque, voltage, heartbeat, other: state of each monitor.
-        segments: lit segments of the display, bit 0 top, clockwise, bit 6 middle.
-        is_idle_lit: the idle lamp.
-        is_active_lit: the activate lamp.
-        button: what is pressed.
-    """
-
-    velocity: SafetyLevel
-    torque: SafetyLevel
-    voltage: SafetyLevel
-    heartbeat: SafetyLevel
-    other: SafetyLevel
-    segments: int
-    is_idle_lit: bool
-    is_active_lit: bool
-    button: PendantButton
-
-    @property
-    def faults(self) -> tuple[str, ...]:
-        """Names of the monitors that report a fault."""
-        return tuple(
-            name for name in MONITORS if getattr(self, name) is SafetyLevel.FAULT
-        )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Names of the monitors that warn."""
-        return tuple(
-            name for name in MONITORS if getattr(self, name) is SafetyLevel.WARNING
-        )
-
-
-MONITORS = ("velocity", "torque", "voltage", "heartbeat", "other")
-
-
-def decode_pendant(word: int) -> PendantWord:
-    """Return the meaning of PEN, a 32-bit word (libbarrett, safety_module.cpp).
-
-    Raises:
-        DeviceFaultError: a monitor shows none or several of its three states.
-    """
-    levels = [_level(word, 3 * i, name) for i, name in enumerate(MONITORS)]
-    return PendantWord(
-        *levels,
-        segments=word >> 16 & 0xFF,
-        is_idle_lit=bool(word >> 24 & 1),
-        is_active_lit=bool(word >> 25 & 1),
-        button=PendantButton(word >> 26 & 3),
-    )
-
-
-def encode_pendant(pendant: PendantWord) -> int:
-    """Return the word PEN of a state, as the module reports it."""
-    word = pendant.segments << 16 | pendant.button << 26
-    word |= pendant.is_idle_lit << 24 | pendant.is_active_lit << 25
-    for i, name in enumerate(MONITORS):
-        word |= getattr(pendant, name) << 3 * i
-    return word
-
-
 def decode_mode(value: int) -> SafetyMode:
     """Return the mode a MODE reply stands for, UNKNOWN for anything else."""
     return SafetyMode(value) if value in (0, 1, 2) else SafetyMode.UNKNOWN
@@ -137,7 +62,7 @@ class SafetyModule:
     def __init__(self, properties: PropertyClient, clock: Clock, vers: int) -> None:
         self._properties = properties
         self._clock = clock
-        self._vers = vers
+        self._vers = nearest_documented(vers)
 
     def mode(self) -> SafetyMode:
         """Return the mode.
@@ -205,12 +130,11 @@ class SafetyModule:
         """Let the module ignore `count` samples before something makes a jump."""
         self._set("IFAULT", count)
 
-    def set_limits(self, limits: SafetyLimits) -> None:
-        """Bring VL and TL to their power-up values, then to `limits`, and read back.
+    def set_limits(self, limits: SafetyLimits) -> tuple[str, ...]:
+        """Bring VL and TL to their power-up values, then to `limits`.
 
-        Raises:
-            DeviceFaultError: the module keeps another value.
-            LinkTimeoutError: the module is silent.
+        Returns:
+            In words, which of them are read back otherwise; libbarrett does not look.
         """
         wanted = limits.words()
         for name in wanted:
@@ -219,34 +143,51 @@ class SafetyModule:
             self._set("LOAD", number)
         for name, value in wanted.items():
             self._set(name, value)
-        for name, value in wanted.items():
-            actual = self._get(name)
-            if actual != value:
-                raise DeviceFaultError(
-                    f"The safety module has {name} = {actual}, expected {value}.",
-                    hint="Switch the arm off and on, then start again.",
-                )
+        kept = {name: self._try_get(name) for name in wanted}
+        return tuple(
+            f"The safety module does not answer GET {name}; {value} was sent."
+            if kept[name] is None
+            else f"The safety module has {name} = {kept[name]}, expected {value}."
+            for name, value in wanted.items()
+            if kept[name] != value
+        )
 
-    def pendant(self) -> PendantWord:
-        """Return pendant and monitors; DeviceFaultError if they make no sense."""
-        return decode_pendant(self._get("PEN") & 0xFFFFFFFF)
+    def pendant(self, excused: Collection[str] = ()) -> PendantWord:
+        """Return pendant and monitors; `excused` of them may be UNKNOWN.
+
+        Raises:
+            DeviceFaultError: another one makes no sense.
+            LinkTimeoutError: the module is silent.
+        """
+        return decode_pendant(self._get("PEN") & 0xFFFFFFFF, excused)
+
+    def doubted_pendant(self) -> tuple[PendantWord, str]:
+        """Return pendant and monitors, and in words what is not as documented.
+
+        Neither silence nor nonsense is an error here: libbarrett does not ask.
+        """
+        word = self._try_get("PEN")
+        if word is None:
+            return NO_PENDANT, "The safety module does not answer GET PEN."
+        word &= 0xFFFFFFFF
+        pendant = decode_pendant(word, MONITORS)
+        if not pendant.unclear:
+            return pendant, ""
+        return pendant, (
+            f"The pendant's word {word:08X} shows none or several states of: "
+            f"{', '.join(pendant.unclear)}. Their faults would not be noticed."
+        )
 
     def _get(self, name: str) -> int:
-        number = property_number(Device.SAFETY, name, self._vers)
-        return self._properties.require(SAFETY_NODE, number, name)
+        return self._properties.require(SAFETY_NODE, self._number(name), name)
+
+    def _try_get(self, name: str) -> int | None:
+        return self._properties.get(SAFETY_NODE, self._number(name))
+
+    def _number(self, name: str) -> int:
+        return property_number(Device.SAFETY, name, self._vers)
 
     def _set(self, name: str, value: int) -> None:
-        number = property_number(Device.SAFETY, name, self._vers)
+        number = self._number(name)
         self._properties.set(SAFETY_NODE, number, value)
         self._properties.pause(_CONFIG_GAP_NS)
-
-
-def _level(word: int, shift: int, name: str) -> SafetyLevel:
-    bits = word >> shift & 7
-    if bits not in (1, 2, 4):
-        raise DeviceFaultError(
-            f"The pendant's {name} field is {bits:03b}; exactly one bit must be set "
-            f"(word {word:08X}).",
-            hint="Switch the arm off and on, then look at the pendant.",
-        )
-    return SafetyLevel(bits)

@@ -1,16 +1,19 @@
 """The start-up of a WAM: who is on the bus, healthy, the right arm, and zeroed?"""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from acquisition import Clock, DeviceFaultError, PreflightError, SafetyMode
+from acquisition import (
+    Clock,
+    DeviceFaultError,
+    PreflightError,
+    SafetyMode,
+    SettingsError,
+)
 from wam.bus import (
+    FIRST_RELEASED,
     MAGNETIC_ENCODER,
-    MODERN,
     MOTOR_NODES,
-    OLDEST_DRIVEN,
+    NEWEST_DOCUMENTED,
     POLES_OF_GIMBALS,
     POLES_OF_WRIST,
     SAFETY_NODE,
@@ -20,53 +23,15 @@ from wam.bus import (
     PuckMode,
     PuckStatus,
     device_of,
+    names,
+    nearest_documented,
     property_number,
 )
 from wam.driver.discovery import discover_pucks, pucks_verb
 from wam.driver.health import PuckHealth, ask_health
-from wam.driver.safety_module import PendantWord, SafetyModule
+from wam.driver.pendant import PendantWord
+from wam.driver.safety_module import SafetyModule
 from wam.driver.settings import ArmSettings
-from wam.model import ArmConstants, Array
-
-HOME_LIMIT = 0.03  # rad; by eye an arm is put against its stops to about a degree
-
-
-def home_error(
-    j2mp: Array,
-    cts: Sequence[int],
-    mech: Sequence[float],
-    mech_at_home: Sequence[float],
-) -> Array:
-    """Return how far the joints are from home [rad], shape (7,).
-
-    Args:
-        j2mp: motor angles from joint angles, shape (7, 7).
-        cts: counts per motor turn, seven.
-        mech: absolute motor angles now [counts], seven.
-        mech_at_home: the same when home was defined, seven.
-    """
-    turn: Array = np.array(cts, dtype=np.float64)
-    apart = np.array(mech, dtype=np.float64) - np.array(mech_at_home, dtype=np.float64)
-    wrapped = (apart + turn / 2) % turn - turn / 2
-    return np.asarray(np.linalg.solve(j2mp, 2 * np.pi / turn * wrapped), np.float64)
-
-
-def check_home(error: Array) -> None:
-    """Refuse to define home where it was not last time.
-
-    Raises:
-        PreflightError: a joint is more than 0.03 rad from where home was.
-    """
-    joint = int(np.abs(error).argmax())
-    if abs(error[joint]) > HOME_LIMIT:
-        raise PreflightError(
-            f"Joint {joint + 1} is {error[joint]:+.3f} rad from where home was last "
-            f"time (limit {HOME_LIMIT}), as far as its motor's absolute encoder tells.",
-            arm_state="idle",
-            hint="Put the arm against its stops and zero it again. If a cable was "
-            "tensioned or a motor changed, take mech_at_home out of rig.toml.",
-        )
-
 
 _VERS, _ROLE, _STAT, _MODE = 0, 1, 5, 8  # the same in every firmware
 _MS = 1_000_000
@@ -111,6 +76,8 @@ class ArmInfo:
         pendant: what the pendant shows.
         is_zeroed: positions have been defined since power-up.
         late_replies: replies that came after their question was given up.
+        door: how the bus was reached, for people.
+        warnings: what is not as documented and does not keep the arm from being driven.
     """
 
     pucks: tuple[PuckInfo, ...]
@@ -120,12 +87,23 @@ class ArmInfo:
     pendant: PendantWord
     is_zeroed: bool
     late_replies: int
+    door: str = ""
+    warnings: tuple[str, ...] = ()
+
+    def metadata(self) -> dict[str, str]:
+        """Return firmware and warnings as text for a recording."""
+        return {
+            "arm:firmware": " ".join(str(puck.vers) for puck in self.pucks),
+            "arm:safety_firmware": str(self.safety_vers),
+            "arm:warnings": " ".join(self.warnings) or "none",
+        }
 
 
 class StartUp:
     """The questions to a WAM before it is driven.
 
-    It follows libbarrett's start-up, without its waits for a person.
+    It follows libbarrett's start-up, without its waits for a person. What that library
+    neither reads nor verifies is a warning here.
     """
 
     def __init__(
@@ -135,6 +113,7 @@ class StartUp:
         self._clock = clock
         self._boot_ns = settings.boot_ns
         self._limits = settings.safety_limits
+        self._warnings: list[str] = []
 
     def run(self) -> ArmInfo:
         """Return what is there, awake and idle.
@@ -148,26 +127,30 @@ class StartUp:
         """
         stats = discover_pucks(self._properties, self._clock, self._boot_ns)
         safety_vers = self._properties.require(SAFETY_NODE, _VERS, "VERS")
-        _check_firmware("The safety module", safety_vers, MODERN)
+        self._note_firmware("the safety module", safety_vers)
         safety = SafetyModule(self._properties, self._clock, safety_vers)
         mode = safety.mode()
-        safety.set_limits(self._limits)
+        self._warnings += safety.set_limits(self._limits)
         asleep = [node for node, stat in stats.items() if stat == PuckStatus.RESET]
         self._wake(asleep)
         pucks = tuple(self._identify(node, node in asleep) for node in MOTOR_NODES)
+        self._check_firmware(pucks)
         self._check_wrist(pucks[-1])
         if any(puck.was_asleep for puck in pucks) and safety.is_zeroed():
             safety.forget_zero()  # one puck restarted alone: it has lost its position
         if mode is not SafetyMode.ACTIVE:
             self._properties.set_group(Group.ARM, _MODE, PuckMode.IDLE)
+        pendant, doubt = safety.doubted_pendant()
+        self._warnings += [doubt] if doubt else []
         return ArmInfo(
             pucks=pucks,
             nodes=tuple(stats),
             safety_vers=safety_vers,
             safety_mode=safety.mode(),
-            pendant=safety.pendant(),
+            pendant=pendant,
             is_zeroed=safety.is_zeroed(),
             late_replies=self._properties.late_replies,
+            warnings=tuple(self._warnings),
         )
 
     def _wake(self, asleep: list[int]) -> None:
@@ -192,7 +175,6 @@ class StartUp:
     def _identify(self, node: int, was_asleep: bool) -> PuckInfo:
         # Asleep, VERS is the monitor's; only now does it select the right table.
         vers = self._properties.require(node, _VERS, "VERS")
-        _check_firmware(f"Puck {node}", vers, OLDEST_DRIVEN)
         role = self._properties.require(node, _ROLE, "ROLE")
         if device_of(role) is not Device.MOTOR:
             raise PreflightError(
@@ -207,11 +189,50 @@ class StartUp:
             )
         mech = None
         if vers >= _ABSOLUTE_SINCE and role & MAGNETIC_ENCODER:
-            mech = self._get(node, "MECH", vers)
-        health = ask_health(lambda number: self._properties.get(node, number))
+            mech = self._properties.get(node, _number(node, "MECH", vers))
+            if mech is None:
+                self._warnings.append(
+                    f"Puck {node} does not answer GET MECH: where it was zeroed is not "
+                    "checked."
+                )
+        health = ask_health(lambda number: self._properties.get(node, number), vers)
         return PuckInfo(node, vers, role, cts, ipnm, mech, was_asleep, health)
 
+    def _note_firmware(self, who: str, vers: int) -> None:
+        """Warn of firmware that nobody has described; the nearest known serves it."""
+        nearest = nearest_documented(vers)
+        if vers != nearest:
+            self._warnings.append(
+                f"Firmware {vers} of {who} is not documented ({FIRST_RELEASED} to "
+                f"{NEWEST_DOCUMENTED} are): its properties are taken as in {nearest}."
+            )
+
+    def _check_firmware(self, pucks: tuple[PuckInfo, ...]) -> None:
+        """Refuse pucks that one question or one torque frame cannot reach together.
+
+        Raises:
+            DeviceFaultError: their firmware numbers P or T differently.
+        """
+        for vers in sorted({puck.vers for puck in pucks}):
+            nodes = ",".join(str(puck.node) for puck in pucks if puck.vers == vers)
+            self._note_firmware(f"puck {nodes}", vers)
+        reached = {tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks}
+        if len(reached) > 1:
+            raise DeviceFaultError(
+                "The pucks' firmwares do not fit together: "
+                f"{' '.join(str(puck.vers) for puck in pucks)} number P or T "
+                "differently.",
+                hint="Ask Barrett for one firmware on all seven pucks.",
+            )
+
     def _check_wrist(self, puck: PuckInfo) -> None:
+        table = names(Device.MOTOR, nearest_documented(puck.vers))
+        if "POLES" not in table.values():
+            self._warnings.append(
+                f"Puck {puck.node} with firmware {puck.vers} has no POLES: a wrist is "
+                "taken for granted, gimbals would not be noticed."
+            )
+            return
         poles = self._get(puck.node, "POLES", puck.vers)
         if poles != POLES_OF_WRIST:
             kind = "gimbals" if poles == POLES_OF_GIMBALS else "something unknown"
@@ -221,56 +242,20 @@ class StartUp:
             )
 
     def _get(self, node: int, name: str, vers: int) -> int:
-        number = property_number(Device.MOTOR, name, vers)
+        number = _number(node, name, vers)
         return self._properties.require(node, number, name)
 
 
-def _check_firmware(who: str, actual: int, needed: int) -> None:
-    """Raise DeviceFaultError for firmware whose properties have other numbers."""
-    if actual < needed:
-        raise DeviceFaultError(
-            f"{who} has firmware {actual}; {needed} or later is needed.",
-            hint="Ask Barrett for newer firmware.",
-        )
-
-
-def zero_error(
-    constants: ArmConstants,
-    cts: Sequence[int],
-    counts: Sequence[int],
-    mech: Sequence[int],
-    mech_at_home: Sequence[int],
-) -> Array:
-    """Return how far the joints are from where their positions put them [rad], (7,).
-
-    Motors are known within their turn only: an error of joint 1 modulo 0.15 rad, of
-    joint 4 modulo 0.35 rad.
-
-    Args:
-        constants: of the arm.
-        cts: counts per motor turn, seven.
-        counts: positions that the pucks tell [counts], seven.
-        mech: absolute motor angles at the same place [counts], seven.
-        mech_at_home: absolute motor angles where home was defined [counts], seven.
-    """
-    turn = np.array(cts, dtype=np.float64)
-    home = turn / (2.0 * np.pi) * (constants.j2mp @ constants.home)
-    travelled = np.array(counts, dtype=np.float64) - home
-    wanted = (np.array(mech_at_home) + travelled) % turn
-    return home_error(constants.j2mp, cts, mech, wanted.tolist())
-
-
-def check_zero(error: Array) -> None:
-    """Refuse an arm that is zeroed elsewhere than last time.
+def _number(node: int, name: str, vers: int) -> int:
+    """Return the number of a property that puck `node` has to have.
 
     Raises:
-        PreflightError: a joint is more than 0.03 rad off.
+        DeviceFaultError: its firmware does not have it.
     """
-    joint = int(np.abs(error).argmax())
-    if abs(error[joint]) > HOME_LIMIT:
-        raise PreflightError(
-            f"Joint {joint + 1} is {error[joint]:+.3f} rad from where its position "
-            f"puts it (limit {HOME_LIMIT}), says its motor's absolute encoder.",
-            arm_state="idle",
-            hint="The zero is wrong: put the arm at home, then: traction zero.",
-        )
+    try:
+        return property_number(Device.MOTOR, name, nearest_documented(vers))
+    except SettingsError as error:
+        raise DeviceFaultError(
+            f"Puck {node} with firmware {vers} has no {name}.",
+            hint="The arm cannot be driven without it: ask Barrett for newer firmware.",
+        ) from error

@@ -17,11 +17,13 @@ from wam.bus import (
     decode_reply,
     encode_get,
     encode_set,
+    nearest_documented,
     property_number,
     property_reply_id,
 )
 from wam.driver.health import HealthTable
-from wam.driver.safety_module import PendantWord, decode_mode, decode_pendant
+from wam.driver.pendant import PendantWord, decode_pendant
+from wam.driver.safety_module import decode_mode
 from wam.driver.settings import ArmSettings
 
 BRAKED = (SafetyMode.IDLE, SafetyMode.E_STOP)
@@ -44,6 +46,7 @@ class StatusPoller:
         heard_ns: when the module last reported a mode [ns], 0 = never.
         warnings: monitors of the module that warn.
         faults: monitors of the module that report a fault.
+        excused: monitors that made no sense at start-up; they are left out.
         health: the newest answers of the pucks.
         is_lowering: IDLE is sent again with every question for its mode,
             until it says that it is.
@@ -54,6 +57,7 @@ class StatusPoller:
         self.heard_ns = 0
         self.warnings: tuple[str, ...] = ()
         self.faults: tuple[str, ...] = ()
+        self.excused: tuple[str, ...] = ()
         self.health = HealthTable()
         self.is_lowering = False
         self._link = link
@@ -69,7 +73,7 @@ class StatusPoller:
 
     def set_firmware(self, vers: int) -> None:
         """Use the property numbers of safety firmware `vers`."""
-        self._pen = property_number(Device.SAFETY, "PEN", vers)
+        self._pen = property_number(Device.SAFETY, "PEN", nearest_documented(vers))
 
     def begin_cycle(self, now_ns: int) -> None:
         """Let the cycle of `now_ns` begin; its question may be asked."""
@@ -123,7 +127,8 @@ class StatusPoller:
             if mode is not SafetyMode.UNKNOWN:  # nonsense leaves the question open
                 self.note_mode(mode, self._now_ns)
         elif reply.number == self._pen:
-            self.note_pendant(decode_pendant(reply.value & 0xFFFFFFFF))
+            word = reply.value & 0xFFFFFFFF
+            self.note_pendant(decode_pendant(word, self.excused))
 
     def note_mode(self, mode: SafetyMode, now_ns: int) -> None:
         """Take the mode that the module reported by `now_ns`; UNKNOWN = none."""
@@ -133,6 +138,12 @@ class StatusPoller:
         self._unanswered = 0
         if mode in BRAKED:
             self.is_lowering = False
+
+    def begin(self, pendant: PendantWord) -> None:
+        """Take the word of a start; what makes no sense in it is left out later."""
+        self.is_lowering = False
+        self.excused = pendant.unclear
+        self.note_pendant(pendant)
 
     def note_pendant(self, pendant: PendantWord) -> None:
         """Take the monitors that the module has just reported."""

@@ -3,8 +3,8 @@
 import re
 
 from lab.guest.commands import ScenarioError, require
-from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
-from lab.guest.network import clear, disturb, queue_length, set_up_both
+from lab.guest.machine_room import CAN, COLD, FAR_CAN, MachineRoom
+from lab.guest.network import clear, disturb, set_up_both
 
 Figures = dict[str, str]
 _PATIENCE = 60.0  # s of guest time for a command that tests the loop
@@ -28,7 +28,9 @@ def home_arm(room: MachineRoom) -> Figures:
     room.write_bus_config()
     room.serve_home_arm()
     room.finish(room.traction("zero", "--yes"), _PATIENCE)
-    page = room.finish(room.traction("check", "--loop-test", "2"), _PATIENCE)
+    page = room.finish(
+        room.traction("check", "--loop-test", "2", before=COLD), _PATIENCE
+    )
     require("LIVE RIG" in page, "check did not meet a live rig")
     missed = figure(page, r"missed (\d+/\d+)")
     bench = room.finish(room.traction("bench", "--seconds", "1"), _PATIENCE)
@@ -41,21 +43,6 @@ def home_arm(room: MachineRoom) -> Figures:
 
 
 _REFUSED = 3  # exit code: nothing was created
-
-
-def disturbed_adapter(room: MachineRoom) -> Figures:
-    """Make can0 slow, then lossy, and measure the loop over it."""
-    _served(room)
-    room.finish(room.traction("zero", "--yes"), _PATIENCE)
-    figures: Figures = {"queue": str(queue_length(room.shell, CAN))}
-    for how in ("delay 600us", "loss 0.5%"):
-        disturb(room.shell, CAN, how)
-        program = room.traction("bench", "--seconds", "1")
-        code = program.wait(_PATIENCE)
-        require(code in {0, 4}, f"bench with {how}: exit code {code}")
-        figures[how] = figure(program.output, r"([\d.]+ Hz.*)")
-        clear(room.shell, CAN)
-    return figures
 
 
 def full_queue(room: MachineRoom) -> Figures:

@@ -1,134 +1,71 @@
-"""Sessions on a real CAN socket: whole, killed, cut off from the arm."""
+"""Sessions on a real CAN socket: whole, with one seed twice, over a bad adapter."""
 
-import signal
-from collections.abc import Callable
-
-from lab.guest.commands import Program, require
-from lab.guest.machine_room import CAN, MachineRoom
-from lab.guest.monitor import CARD, Monitor
-from lab.guest.network import NET, set_up, set_up_both
+from lab.guest.commands import Program
+from lab.guest.machine_room import CAN, FAR_CAN, MachineRoom
+from lab.guest.network import clear, disturb, queue_length, set_up_both
+from lab.guest.promises import hold_to, promise
 from lab.guest.scenarios.bus import Figures, figure
-from lab.guest.sessions import (
-    LedSession,
-    begin,
-    cycle_figures,
-    resume,
-    session_folder,
-    verify_kept,
-)
+from lab.guest.sessions import begin, cycle_figures, require_rejected, verify_kept
+from lab.guest.ways import farthest, way_of
 
-_INTO_TRIAL = 1.0  # s
-_BRAKED = 3.0  # s until the arm is braked by the process that outlives the console
-_ENDED = 30.0  # s until a session that lost its arm has ended
-_FAULT_CODE = 4
+PATIENCE = 60.0  # s of guest time for the end of a session
 
 
-def _room_with_arm(room: MachineRoom) -> Program:
+def served_arm(room: MachineRoom, *options: str) -> Program:
+    """Return the arm above the container, its sensor on the bus."""
     set_up_both(room.shell)
     room.write_bus_config()
-    return room.serve_pushed_arm()
+    return room.serve_pushed_arm(*options)
 
 
 def three_trials(room: MachineRoom) -> Figures:
-    """Record a session of three trials with a pause before the second."""
-    arm = _room_with_arm(room)
-    session = begin(room, arm, 3)
-    session.trial(1)
-    session.make_ready(2)
-    session.pause()
-    session.record()
+    """Record three trials with a pause, and compare the ways of two with one seed.
+
+    The simulated hand wavers from the instant at which a trial is prepared, and a key
+    comes when it comes: one seed is one ground, and not one way. How far apart the ways
+    are is a figure, without a limit.
+    """
+    session = begin(room, served_arm(room), 3)
+    session.await_ready()
+    session.record(1)
     session.keep()
-    session.trial(3)
+    session.another()
+    session.pause()
+    session.record(1)
+    session.keep()
+    session.another()
+    session.record(2)
+    session.keep()
     session.end()
-    verify_kept(room, 3)
-    return cycle_figures(room)
+    first, again, other = (way_of(path) for path in verify_kept(room, 3))
+    same, different = farthest(first, again), farthest(first, other)
+    return {
+        "one seed": f"{same * 1e3:.2f} mrad apart",
+        "another": f"{different * 1e3:.2f} mrad",
+        **cycle_figures(room),
+    }
 
 
-def killed_console(room: MachineRoom) -> Figures:
-    """Kill -9 the console in a trial; the file is ended, resume goes on."""
-    arm = _room_with_arm(room)
-    session = begin(room, arm, 1)
-    session.make_ready(1)
-    session.record()
-    session.program.run_on(_INTO_TRIAL)
-    session.program.signal(signal.SIGKILL)
-    session.program.run_on(_BRAKED)
-    require(not session.program.is_running, "the console is still there")
-    return _resume_after(room, arm)
-
-
-def link_down(room: MachineRoom) -> Figures:
-    """Take can0 down in a trial, up again; the session ends, resume goes on."""
-
-    def cut(session: LedSession) -> None:
-        room.shell.run(f"ip link set {CAN} down")
-
-    return _cut_off(room, cut, lambda: set_up(room.shell, CAN))
-
-
-def card_out(room: MachineRoom) -> Figures:
-    """Pull the CAN card out of its slot in a trial, put it in; resume goes on."""
-    monitor = Monitor(room)
-    node = NET / CAN
-
-    def cut(session: LedSession) -> None:
-        monitor.pull_out(CARD, node)
-
-    def mend() -> None:
-        monitor.put_in(CARD, node)
-        set_up(room.shell, CAN)
-
-    try:
-        return _cut_off(room, cut, mend)
-    finally:
-        monitor.close()
-
-
-def link_down_before_activation(room: MachineRoom) -> Figures:
-    """Take can0 down before the arm is activated: refused, resume goes on."""
-    arm = _room_with_arm(room)
-    program = room.traction("run", "TF", "--trials", "1")
-    program.expect("Press Shift-activate", 60.0)
-    room.shell.run(f"ip link set {CAN} down")
-    code = program.wait(_ENDED)
-    require(code in {3, _FAULT_CODE}, f"exit code {code}")
-    set_up(room.shell, CAN)
-    return {"exit code": str(code), **_resume_after(room, arm)}
-
-
-def link_down_while_ready(room: MachineRoom) -> Figures:
-    """Take can0 down between two trials; the session ends, resume goes on."""
-    arm = _room_with_arm(room)
-    session = begin(room, arm, 1)
-    session.make_ready(1)
-    room.shell.run(f"ip link set {CAN} down")
-    room.finish(session.program, _ENDED, _FAULT_CODE)
-    set_up(room.shell, CAN)
-    return _resume_after(room, arm)
-
-
-def _cut_off(
-    room: MachineRoom, cut: Callable[[LedSession], None], mend: Callable[[], None]
-) -> Figures:
-    """Cut the arm off in a trial, as `cut` does; `mend` it and resume."""
-    arm = _room_with_arm(room)
-    session = begin(room, arm, 1)
-    session.make_ready(1)
-    session.record()
-    session.program.run_on(_INTO_TRIAL)
-    cut(session)
-    output = room.finish(session.program, _ENDED, _FAULT_CODE)
-    mend()
-    said = figure(output, r"(?m)^((?!.*floating).*ARM: .*)$")
-    return {"said": said, **_resume_after(room, arm)}
-
-
-def _resume_after(room: MachineRoom, arm: Program) -> Figures:
-    arm.press("mend\n")
-    arm.press("idle\n")
-    session = resume(room, arm)
-    session.trial(1)
-    session.end()
-    verify_kept(room, 1)
-    rejected = len(list((session_folder(room) / "rejected").glob("T???.mcap")))
-    return {"rejected": str(rejected), **cycle_figures(room)}
+def bad_adapter(room: MachineRoom) -> Figures:
+    """Record a trial over a slow adapter, and one whose replies get lost."""
+    arm = served_arm(room)
+    queue = queue_length(room.shell, CAN)
+    disturb(room.shell, CAN, "delay 600us")
+    session = begin(room, arm, 2)
+    session.await_ready()
+    page = session.program.output
+    session.record(1)
+    session.keep()
+    session.another()
+    clear(room.shell, CAN)
+    disturb(room.shell, FAR_CAN, "loss 0.2%")
+    session.record(2)
+    session.keep()
+    code = session.program.wait(PATIENCE)
+    clear(room.shell, FAR_CAN)
+    for fault in ("reply-late", "reply-lost-some"):
+        hold_to(promise(fault, "recording"), code)
+    verify_kept(room, 2)
+    require_rejected(room, 0)
+    slow = figure(page, r"7 positions after ([^,]+, \d+ incomplete)")
+    return {"queue": str(queue), "slow exchange": slow, **cycle_figures(room)}

@@ -4,7 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from lab.guest.machine_room import MachineRoom
-from lab.guest.scenarios import bus, recording, serial_line
+from lab.guest.scenarios import (
+    bus,
+    calibration,
+    losses,
+    recording,
+    sensor_losses,
+    serial_line,
+)
 
 Run = Callable[[MachineRoom], dict[str, str]]
 
@@ -17,12 +24,14 @@ class Scenario:
         name: as `--only` takes it and the table shows it.
         run: does it, returns figures, raises ScenarioError.
         is_short: it is part of the short form, too.
+        weight: how long it takes beside others; machines get even shares.
         expected: why it fails for now; empty = it has to pass.
     """
 
     name: str
     run: Run
     is_short: bool = False
+    weight: int = 1
     expected: str = ""
 
     @property
@@ -32,22 +41,21 @@ class Scenario:
 
 
 ALL = (
-    Scenario("home arm", bus.home_arm, is_short=True),
+    Scenario("home arm", bus.home_arm, is_short=True, weight=2),
     Scenario("link down at start", bus.link_down_at_start, is_short=True),
     Scenario("second host", bus.second_host),
     Scenario("full queue", bus.full_queue),
-    Scenario("slow and lossy adapter", bus.disturbed_adapter),
+    Scenario("slow and lossy adapter", recording.bad_adapter, weight=4),
     Scenario("serial low latency", serial_line.low_latency, is_short=True),
     Scenario("serial makes", serial_line.three_makes),
     Scenario("serial no rights", serial_line.no_rights),
     Scenario("serial unplugged", serial_line.unplugged),
     Scenario("serial check", serial_line.check_with_serial_sensor),
-    Scenario("session", recording.three_trials),
-    Scenario("console killed", recording.killed_console),
-    Scenario("link down recording", recording.link_down),
-    Scenario("link down ready", recording.link_down_while_ready),
-    Scenario("link down idle", recording.link_down_before_activation),
-    Scenario("card out recording", recording.card_out),
+    Scenario("session", recording.three_trials, weight=6),
+    Scenario("link down in every phase", losses.link_down_in_every_phase, weight=8),
+    Scenario("lost in a trial", losses.lost_in_a_trial, weight=6),
+    Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=5),
+    Scenario("calibrate gravity", calibration.gravity, weight=7),
 )
 
 

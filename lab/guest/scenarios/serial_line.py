@@ -43,9 +43,14 @@ class Make:
     dropped: tuple[str, ...] = ("sinc =",)
 
 
+# At both speeds of the adapters in use, where their protocols know them; the Bota's
+# ends at 460800, the OptoForce has one of its own.
 MAKES = (
     Make("bota", 460_800, dropped=()),
+    Make("robotous", 460_800, ("rate = 500",)),
     Make("robotous", 921_600),
+    Make("optoforce", 460_800, _OPTOFORCE),
+    Make("optoforce", 921_600, _OPTOFORCE),
     Make("optoforce", 1_000_000, _OPTOFORCE),
 )
 
@@ -54,7 +59,7 @@ def three_makes(room: MachineRoom) -> Figures:
     """Read each make of sensor at its speeds and measure its rate."""
     figures: Figures = {}
     for make in MAKES:
-        _write(room, make)
+        write_make(room, make)
         server = room.serve_far_sensor()
         try:
             figures[f"{make.kind} {make.baudrate}"] = _rate(room)
@@ -65,7 +70,7 @@ def three_makes(room: MachineRoom) -> Figures:
 
 def low_latency(room: MachineRoom) -> Figures:
     """Ask the driver for low latency and read it back."""
-    _write(room, MAKES[0])
+    write_make(room, MAKES[0])
     _LATENCY.write_text("16", encoding="ascii")
     before = read_text(_LATENCY)
     opened = open_port(str(PORT), MAKES[0].baudrate)
@@ -82,7 +87,7 @@ def low_latency(room: MachineRoom) -> Figures:
 
 def no_rights(room: MachineRoom) -> Figures:
     """Open the port as a user without rights: a message that says what to do."""
-    _write(room, MAKES[0])
+    write_make(room, MAKES[0])
     # A root without this right is a user; the interpreter may lie in root's folder.
     os.chown(PORT, _NOBODY, _NOBODY)
     PORT.chmod(0o660)
@@ -99,7 +104,7 @@ def no_rights(room: MachineRoom) -> Figures:
 
 def unplugged(room: MachineRoom) -> Figures:
     """Pull the adapter out while the sensor is read; put it in and read again."""
-    _write(room, MAKES[0])
+    write_make(room, MAKES[0])
     server = room.serve_far_sensor()
     monitor = Monitor(room)
     try:
@@ -119,7 +124,7 @@ def unplugged(room: MachineRoom) -> Figures:
 
 def check_with_serial_sensor(room: MachineRoom) -> Figures:
     """Check the whole rig with its sensor on the serial adapter."""
-    _write(room, MAKES[0])
+    write_make(room, MAKES[0])
     set_up_both(room.shell)
     room.serve_pushed_arm("--line", str(line_port()))
     page = room.finish(room.traction("check"), _PATIENCE)
@@ -130,7 +135,8 @@ def check_with_serial_sensor(room: MachineRoom) -> Figures:
     }
 
 
-def _write(room: MachineRoom, make: Make) -> None:
+def write_make(room: MachineRoom, make: Make) -> None:
+    """Write a configuration with a sensor of this make behind the adapter."""
     changes = {
         _OLD_KIND: _NEW.format(make.kind),
         "baudrate = 460800": "\n".join([f"baudrate = {make.baudrate}", *make.extra]),

@@ -5,7 +5,8 @@ import pytest
 
 from acquisition.errors import SettingsError
 from analysis.data.prepare import prepare_trial
-from analysis.report.what_if import VALUES, parse_choice, plain_choice, side_by_side
+from analysis.report.what_if import VALUES, parse_choice
+from analysis.report.what_if_tables import plain_choice, side_by_side
 from analysis.study.crossval import plan_folds
 from analysis.study.models import GP_NN, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
@@ -27,6 +28,7 @@ from analysis.study.study import StudyOptions, run_study
         "window=nan:0.1",
         "frame=base",
         "drift=constant",
+        "inertia=halved",
         "kernel=cubic",
         "static_friction=none",
         "lag=x",
@@ -56,6 +58,8 @@ def test_choices_change_what_they_name_and_nothing_else():
     assert parse_choice("drift=interpolated").is_interpolated
     assert not parse_choice("drift=first").is_interpolated
     assert parse_choice("lag=-12.5").lag == -0.0125
+    assert parse_choice("inertia=removed").is_massless
+    assert not parse_choice("inertia=kept").is_massless
 
 
 @pytest.mark.parametrize("text", ["smoothing=41", "window=0.02:0.12"])

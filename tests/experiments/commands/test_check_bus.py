@@ -11,6 +11,7 @@ from acquisition.errors import LinkError
 from fakes.bus.hub import SocketHub
 from tests.experiments.program import traction, write_config
 from wam.bus.decoder import describe_id
+from wam.bus.doors import PythonCanDoor
 from wam.bus.log import BusTraffic
 
 
@@ -128,7 +129,8 @@ class DeafBus(can.BusABC):
 @pytest.fixture
 def served_by(monkeypatch):
     def serve(bus):
-        monkeypatch.setattr("wam.bus.open_bus", lambda *_: bus)
+        door = PythonCanDoor(bus, SystemClock())
+        monkeypatch.setattr("wam.bus.open_door", lambda *_: door)
 
     return serve
 

@@ -1,5 +1,6 @@
 """The served arm as another program meets it, in real time with generous limits."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -95,6 +96,35 @@ def test_a_service_without_stdin_goes_on_until_a_signal_ends_it(tmp_path):
             assert ask(bus, 10, b"\x08") == (0x546, "88 00 01 00")
         process.terminate()
         assert process.wait(PATIENCE) == 0
+    assert not (tmp_path / "bus").exists()
+
+
+BEGINNINGS = {
+    "background of a script": "{} </dev/null & echo $!; wait $!",
+    "without stdin": "{} <&- & echo $!; wait $!",
+    "nohup": "nohup {} 2>/dev/null & echo $!; wait $!",
+}
+
+
+@pytest.mark.parametrize("how", BEGINNINGS)
+def test_a_served_arm_of_a_shell_goes_on_until_sigterm(tmp_path, how):
+    serve = f"{sys.executable} -m experiments fake --idle-first --bare --firmware 60 "
+    serve += f"--can traction-fake:{tmp_path}/bus"
+    with subprocess.Popen(
+        ["bash", "-c", BEGINNINGS[how].format(serve)],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as shell:
+        lines = {shell.stdout.readline(), shell.stdout.readline()}
+        (pid,) = [int(line) for line in lines if line.strip().isdigit()]
+        with SocketBus(f"{tmp_path}/bus") as bus:
+            if how == "nohup":
+                os.kill(pid, signal.SIGHUP)  # the terminal was closed
+            for _ in range(2):
+                assert ask(bus, 10, b"\x00") == (0x546, "80 00 3c 00")  # VERS 60
+        os.kill(pid, signal.SIGTERM)
+        assert shell.wait(PATIENCE) == 0
     assert not (tmp_path / "bus").exists()
 
 

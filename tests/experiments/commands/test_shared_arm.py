@@ -66,8 +66,9 @@ def active_arm(tmp_path):
             server.step(lambda can_id, data: server.frames.append((can_id, data)))
             while other.recv(0) is not None:
                 pass
-            if server.has_master:
+            if server.has_master:  # at 1 kHz: this thread must not spin
                 other.send(message(0x404, b"\x30"))
+                clock.sleep_until(clock.now_ns() + 1_000_000)
 
     thread = threading.Thread(target=serve)
     thread.start()

@@ -5,6 +5,7 @@ import pytest
 from acquisition.errors import LinkError, LinkFullError, PreflightError
 from experiments.preflight import preflight
 from experiments.settings.load import load_settings
+from wam.bus.kernel_door import setup_command
 
 
 def refusal(error, monkeypatch):
@@ -21,7 +22,7 @@ def refusal(error, monkeypatch):
 
 def test_an_interface_that_is_down_comes_with_the_command_that_helps(monkeypatch):
     text = refusal(LinkError("can0 is down."), monkeypatch)
-    assert "ip link set can0 up type can bitrate 1000000" in text
+    assert setup_command("can0", 1_000_000) in text
 
 
 def test_a_full_queue_is_no_missing_adapter(monkeypatch):

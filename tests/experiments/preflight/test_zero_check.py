@@ -8,7 +8,7 @@ import pytest
 from acquisition.errors import PreflightError
 from experiments.rig.rig import Rig
 from tests.experiments.program import traction, write_config
-from wam.driver.startup import HOME_LIMIT, check_zero, zero_error
+from wam.driver.home import HOME_LIMIT, check_zero, zero_error
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()

@@ -10,6 +10,7 @@ from fakes.bus.hub import SocketHub
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig, SteppedClock
 from tests.wam.bus.test_link import message
+from wam.bus.doors import PythonCanDoor
 from wam.bus.error_frames import BusErrors
 from wam.bus.link import CanLink
 from wam.driver.arm import WamArm
@@ -25,7 +26,7 @@ class SharedBus(SteppedClock):
         super().__init__()
         self.hub = SocketHub(folder / "bus")
         self.other = SocketBus(str(folder / "bus"))
-        self.link = CanLink(SocketBus(str(folder / "bus")))
+        self.link = CanLink(PythonCanDoor(SocketBus(str(folder / "bus")), self))
         self.talk = {}
         self.hub.receive()
 

@@ -52,6 +52,26 @@ def test_an_urgent_request_stays_urgent():
     assert (stop.count, stop.is_urgent) == (3, True)
 
 
+@pytest.mark.parametrize(("is_service", "count"), [(True, 0), (False, 1)])
+def test_a_service_that_was_told_to_outlive_its_terminal_does(is_service, count):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        stop = StopFlag()
+        with handle_signals(stop, is_service=is_service):
+            signal.raise_signal(signal.SIGHUP)
+        assert stop.count == count
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+def test_a_service_that_loses_its_terminal_otherwise_ends():
+    stop = StopFlag()
+    with handle_signals(stop, is_service=True):
+        signal.raise_signal(signal.SIGHUP)
+    assert stop.count == 1
+
+
 @pytest.mark.parametrize("number", NUMBERS)
 def test_a_signal_is_a_request_and_its_handler_is_given_back(number):
     before = [signal.getsignal(each) for each in NUMBERS]

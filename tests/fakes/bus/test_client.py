@@ -10,10 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquisition.clock import SystemClock
 from acquisition.errors import SettingsError
 from fakes.bus.client import SocketBus, open_socket, pack_frame, unpack_frame
 from fakes.bus.hub import CLIENTS, SocketHub
-from wam.bus.link import CanLink, open_bus
+from wam.bus.doors import open_door
+from wam.bus.link import CanLink
 
 QUESTION = pack_frame(0x404, b"\x30")
 
@@ -216,7 +218,7 @@ def test_the_driver_opens_the_bus_as_any_other(hub, path, monkeypatch):
     backend = ("fakes.bus.client", "SocketBus")
     monkeypatch.setitem(can.interfaces.BACKENDS, "traction-fake", backend)
     monkeypatch.setattr(can.util, "VALID_INTERFACES", {"traction-fake"})
-    link = CanLink(open_bus("traction-fake", str(path), 1_000_000))
+    link = CanLink(open_door("traction-fake", str(path), 1_000_000, SystemClock()))
     hub.receive()
     link.send(0x404, b"\x30")
     assert hub.receive() == [(0x404, b"\x30")]

@@ -7,7 +7,7 @@ from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Motors
 from wam.bus.frames import encode_set, encode_torques
-from wam.driver.safety_module import SafetyLevel, decode_pendant
+from wam.driver.pendant import SafetyLevel, decode_pendant
 
 MS = 1_000_000
 HOME_COUNTS = (0, -36833, 36832, -36728, 0, 0, 0)

@@ -10,7 +10,7 @@ from fakes.pucks.speed_monitor import SpeedMonitor
 from tests.fakes.scenes import MODEL, START_Q
 from tests.fakes.stepped import Motors
 from wam.bus.frames import encode_set
-from wam.driver.safety_module import SafetyLevel, decode_pendant
+from wam.driver.pendant import SafetyLevel, decode_pendant
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import Transmission
 

@@ -9,12 +9,8 @@ from acquisition.errors import LinkError
 from fakes.bus.hub import CanPort
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.options import NetworkOptions
-from fakes.serving.puck_server import (
-    HomePose,
-    PuckServer,
-    SupportedMotors,
-    build_home_server,
-)
+from fakes.serving.home_arm import HomePose, SupportedMotors, build_home_server
+from fakes.serving.puck_server import PuckServer
 from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
 from tests.fakes.stepped import Motors, SteppedClock
 

@@ -13,6 +13,7 @@ from fakes.clock import SteppedClock
 from fakes.plant.plant import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
+from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
 from wam.control.controller import FootController
 from wam.control.soft_walls import SoftWalls, Walls
@@ -79,7 +80,7 @@ class HoldBench:
         self.plant.terrain = None
         self.plant.hand.let_go()
         self.braked_q = self.plant.q.copy()
-        self.arm = WamArm(CanLink(self.rig.bus), self.clock)
+        self.arm = WamArm(CanLink(PythonCanDoor(self.rig.bus, self.clock)), self.clock)
         self.arm.start()
         self.sent = []
         usual = self.arm.send

@@ -8,6 +8,7 @@ from fakes.clock import SteppedClock
 from fakes.plant.plant import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
+from wam.bus.doors import PythonCanDoor
 from wam.bus.link import CanLink
 from wam.control.controller import FootController
 from wam.driver.arm import WamArm
@@ -45,7 +46,9 @@ class ClosedLoop:
         self.model = ArmModel(CONSTANTS, tool)
         self.law = FootController(self.model, virtual_mass)
         self.arm = WamArm(
-            CanLink(self.rig.bus), self.clock, ArmSettings(j2mp=CONSTANTS.j2mp)
+            CanLink(PythonCanDoor(self.rig.bus, self.clock)),
+            self.clock,
+            ArmSettings(j2mp=CONSTANTS.j2mp),
         )
         self.arm.start()
 

@@ -9,6 +9,7 @@ from acquisition.control_loop.limits import TORQUE_STEP
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from tests.fakes.scenes import CONSTANTS, MODEL, make_rig
+from wam.bus.doors import PythonCanDoor
 from wam.bus.frames import decode_position, encode_position, position_reply_id
 from wam.bus.link import CanLink
 from wam.control.controller import FootController
@@ -56,7 +57,7 @@ class Bench:
     def __init__(self, state):
         self.rig, self.clock = make_rig()
         self.rig.plant.hand.let_go()
-        link = CanLink(self.rig.bus)
+        link = CanLink(PythonCanDoor(self.rig.bus, self.clock))
         self.arm = WamArm(link, self.clock)
         self.arm.start()
         self.lie = None  # (motor, counts)

@@ -4,10 +4,13 @@ import can
 import pytest
 
 from acquisition.clock import Readable
+from acquisition.devices import BusCondition
 from acquisition.errors import LinkError, LinkFullError
-from tests.fakes.stepped import Rig
-from wam.bus import link as can_link
-from wam.bus.link import CanLink, open_bus
+from tests.fakes.stepped import Rig, SteppedClock
+from wam.bus import doors
+from wam.bus.doors import PythonCanDoor, open_bus
+from wam.bus.kernel_door import InterfaceState, setup_command
+from wam.bus.link import CanLink
 
 
 class ScriptedBus(can.BusABC):
@@ -37,6 +40,10 @@ class ScriptedBus(can.BusABC):
         super().shutdown()
 
 
+def opened_link(bus, tap=None):
+    return CanLink(PythonCanDoor(bus, SteppedClock()), tap)
+
+
 def message(can_id, data=b"\x85\x00\x02\x00", **flags):
     flags.setdefault("is_extended_id", False)
     return can.Message(arbitration_id=can_id, data=data, **flags)
@@ -44,26 +51,26 @@ def message(can_id, data=b"\x85\x00\x02\x00", **flags):
 
 @pytest.fixture
 def opened(monkeypatch):
-    def make(bus):
+    def make(bus, is_up=True):
+        state = InterfaceState(is_up, has_carrier=True, queue_length=10)
+        monkeypatch.setattr(doors, "interface_state", lambda _: state)
+
         def factory(**_):
             if isinstance(bus, Exception):
                 raise bus
             return bus
 
-        monkeypatch.setattr(can_link.can, "Bus", factory)
+        monkeypatch.setattr(doors.can, "Bus", factory)
         return lambda: open_bus("socketcan", "can0", 1_000_000)
 
     return make
 
 
 def test_an_interface_that_is_down_says_how_to_raise_it(opened):
-    down = can.CanOperationError("Network is down", errno.ENETDOWN)
-    bus = ScriptedBus(error=down)
     with pytest.raises(LinkError) as caught:
-        opened(bus)()
+        opened(RuntimeError("opened all the same"), is_up=False)()
     assert caught.value.message == "can0 is down."
-    assert "ip link set can0 up type can bitrate 1000000" in caught.value.hint
-    assert bus.shutdowns == 1
+    assert setup_command("can0", 1_000_000) in caught.value.hint
 
 
 def test_an_interface_that_is_missing_is_named(opened):
@@ -84,10 +91,13 @@ def test_every_way_not_to_open_is_a_link_error(opened, error):
         opened(error)()
 
 
-def test_a_bus_that_opens_is_handed_over(opened):
-    bus = ScriptedBus()
+def test_a_bus_that_opens_is_handed_over_with_what_has_arrived(opened):
+    bus = ScriptedBus([message(0x040, is_error_frame=True)])
     assert opened(bus)() is bus
-    bus.shutdown()
+    link = opened_link(bus)
+    link.receive()
+    assert link.errors.condition is BusCondition.OFF
+    link.close()
 
 
 def test_only_data_frames_of_devices_come_through():
@@ -102,21 +112,21 @@ def test_only_data_frames_of_devices_come_through():
             message(0x546),
         ]
     )
-    link = CanLink(bus)
+    link = opened_link(bus)
     assert [frame.can_id for frame in link.receive()] == [0x426, 0x546]
     assert link.errors.frames == 1
     link.close()
 
 
 def test_the_broadcast_of_the_safety_module_is_a_hint_only():
-    link = CanLink(ScriptedBus([message(0x540)]))
+    link = opened_link(ScriptedBus([message(0x540)]))
     assert link.receive() == []
     assert link.mode_hints == 1
     link.close()
 
 
 def test_looking_keeps_what_arrived_for_the_reader():
-    link = CanLink(ScriptedBus([message(0x426)]))
+    link = opened_link(ScriptedBus([message(0x426)]))
     assert link.is_readable()
     assert len(link.receive()) == 1
     assert not link.is_readable()
@@ -124,14 +134,25 @@ def test_looking_keeps_what_arrived_for_the_reader():
 
 
 def test_a_flood_does_not_hold_the_reader():
-    link = CanLink(ScriptedBus([message(0x426)] * 2000))
+    link = opened_link(ScriptedBus([message(0x426)] * 2000))
     assert 0 < len(link.receive()) < 1000
+    link.close()
+
+
+def test_an_error_that_looking_came_across_is_the_readers():
+    bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
+    link = opened_link(bus)
+    assert not link.is_readable()
+    bus.error = None  # Linux says it once
+    with pytest.raises(LinkError, match="Network is down"):
+        link.receive()
+    assert link.receive() == []
     link.close()
 
 
 def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
     bus = ScriptedBus(error=can.CanOperationError("Network is down", errno.ENETDOWN))
-    link = CanLink(bus)
+    link = opened_link(bus)
     assert not link.is_readable()
     with pytest.raises(LinkError, match="broke"):
         link.receive()
@@ -150,7 +171,7 @@ def test_a_bus_that_breaks_is_a_link_error_but_never_readable():
     ],
 )
 def test_a_full_queue_is_known_by_its_number(error):
-    link = CanLink(ScriptedBus(error=error))
+    link = opened_link(ScriptedBus(error=error))
     with pytest.raises(LinkFullError, match="send queue is full") as refused:
         link.send(1, b"\x05")
     assert "acknowledges" in str(refused.value)
@@ -159,7 +180,7 @@ def test_a_full_queue_is_known_by_its_number(error):
 
 def test_closing_twice_shuts_the_bus_down_once():
     bus = ScriptedBus()
-    link = CanLink(bus)
+    link = opened_link(bus)
     link.close()
     link.close()
     assert bus.shutdowns == 1
@@ -170,7 +191,7 @@ def test_closing_twice_shuts_the_bus_down_once():
 
 
 def test_a_link_has_the_descriptor_of_its_bus():
-    link = CanLink(ScriptedBus())
+    link = opened_link(ScriptedBus())
     assert link.fileno() == 7
     assert isinstance(link, Readable)
     assert Rig().link.fileno() == -1
@@ -187,11 +208,11 @@ def test_a_tap_hears_all_plain_frames_sent_and_received():
             message(1, is_error_frame=True),
         ]
     )
-    link = CanLink(bus, heard.extend)
+    link = opened_link(bus, heard.extend)
     link.send(1, b"\x05")
     assert [frame.can_id for frame in link.receive()] == [0x426]
     assert [can_id for can_id, _, _ in heard] == [1, 0x426, 0x540, 0x404]
-    assert heard[0] == (1, b"\x05", 0.0)
+    assert heard[0] == (1, b"\x05", 0)
     link.close()
 
 
@@ -203,7 +224,8 @@ def test_a_tap_hears_what_came_before_the_bus_broke():
             return super()._recv_internal(timeout)
 
     heard = []
-    link = CanLink(Breaking([message(0x426)]), heard.extend)
+    link = opened_link(Breaking([message(0x426)]), heard.extend)
+    assert [frame.can_id for frame in link.receive()] == [0x426]
     with pytest.raises(LinkError):
         link.receive()
     assert [can_id for can_id, _, _ in heard] == [0x426]
@@ -212,9 +234,20 @@ def test_a_tap_hears_what_came_before_the_bus_broke():
 
 def test_the_first_frame_of_another_master_is_kept():
     arrived = [message(0x426), message(0x404, b"\x30"), message(0x00A, b"\x08")]
-    link = CanLink(ScriptedBus(arrived))
+    link = opened_link(ScriptedBus(arrived))
     assert link.foreign_id is None
     link.receive()
     assert link.foreign_id == 0x404
     assert link.foreign_ids == {0x404, 0x00A}
     link.close()
+
+
+def test_an_interface_is_set_up_to_come_back_and_to_hold_one_cycle():
+    words = setup_command("can1", 500_000).split()
+    assert words[:5] == ["ip", "link", "set", "can1", "up"]
+    kind = words.index("type")  # all that follows is of the controller
+    assert words[5:kind] == ["txqueuelen", "16"]
+    assert words[kind:] == [
+        *("type", "can", "bitrate", "500000"),
+        *("restart-ms", "100"),
+    ]

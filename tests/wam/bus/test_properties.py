@@ -9,6 +9,7 @@ from wam.bus.properties import (
     device_of,
     is_wide,
     names,
+    nearest_documented,
     numbers,
     property_number,
 )
@@ -45,6 +46,15 @@ def test_current_motor_firmware_has_its_numbers(name, number):
         ("V", 119, 44),
         ("HOLD", 131, 94),
         ("HOLD", 132, 77),
+        ("IPNM", 36, 108),
+        ("IPNM", 61, 83),
+        ("IPNM", 65, 86),
+        ("POLES", 44, 112),
+        ("POLES", 61, 87),
+        ("MECH", 60, 28),
+        ("TEMP", 60, 39),
+        ("THERM", 60, 46),
+        ("VBUS", 60, 47),
     ],
 )
 def test_numbers_move_with_the_firmware(name, vers, number):
@@ -69,6 +79,28 @@ def test_safety_module_has_numbers_of_its_own():
 def test_old_safety_firmware_shares_the_motor_table():
     table = numbers(Device.SAFETY, 40)
     assert (table["PEN"], table["P"]) == (85, 26)
+
+
+@pytest.mark.parametrize(
+    ("vers", "expected"),
+    [
+        (32, (55, 85, 91, 93, 100, 88, 89)),
+        (33, (56, 87, 93, 95, 102, 90, 91)),
+        (36, (55, 85, 91, 93, 100, 88, 89)),
+        (60, (55, 85, 91, 93, 100, 88, 89)),
+        (61, (42, 43, 46, 48, 55, 31, 32)),
+    ],
+)
+def test_numbers_of_the_safety_module_move_too(vers, expected):
+    asked = ("ZERO", "PEN", "VL2", "TL2", "IFAULT", "LOAD", "DEF")
+    assert tuple(property_number(Device.SAFETY, n, vers) for n in asked) == expected
+
+
+@pytest.mark.parametrize(
+    ("vers", "nearest"), [(-5, 32), (31, 32), (32, 32), (200, 200), (201, 200)]
+)
+def test_an_unknown_firmware_has_a_neighbour_that_is_documented(vers, nearest):
+    assert nearest_documented(vers) == nearest
 
 
 def test_sensor_has_one_table_for_every_version():

@@ -7,7 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import DeviceFaultError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
-from wam.bus.frames import decode_torques
+from wam.bus.frames import MOTOR_NODES, decode_torques
 from wam.bus.property_client import PropertyClient
 from wam.driver.arm import WamArm
 
@@ -128,22 +128,120 @@ def test_pucks_of_two_generations_work_together():
     assert [p.cts for p in info.pucks] == [4096] * 7
 
 
+# Where a table changes, the versions on both sides; 32 has no IPNM, before 44 there is
+# no POLES.
+BREAKS = (44, 45, 47, 50, 51, 61, 63, 64, 65, 68, 114, 119, 125, 132, 142, 145, 168)
+DOCUMENTED = sorted({40, 175, 174, 200, *BREAKS, *(vers - 1 for vers in BREAKS)})
+# Beginnings and ends of the ranges in which P, T, CTS, IPNM, POLES, PEN keep a number.
+ALL_WAYS = (40, 44, 49, 50, 60, 61, 63, 64, 65, 200)
+# P and T are numbered alike in 32..49, 50..60 and from 61 on, in hexadecimal:
+QUESTIONS = {40: ("1a", "8a"), 50: ("1a", "89"), 60: ("1a", "89"), 61: ("30", "aa")}
+
+
+@pytest.mark.parametrize("vers", DOCUMENTED)
+def test_every_documented_firmware_starts_and_is_read(vers):
+    bench = Bench(vers, vers, are_asleep=True)
+    info = bench.arm.start()
+    assert [p.ipnm for p in info.pucks] == [2700] * 4 + [6500] * 2 + [17474]
+    assert [p.cts for p in info.pucks] == [4096] * 7
+    assert info.pendant.faults == ()
+    assert ("POLES" in " ".join(info.warnings)) is (vers < 44)
+    reading, _ = bench.cycle(np.zeros(7))
+    assert reading.is_complete
+
+
+@pytest.mark.parametrize("vers", ALL_WAYS)
+def test_every_firmware_is_zeroed_driven_and_stopped(vers):
+    bench = Bench(vers, vers, is_zeroed=False)
+    bench.arm.start()
+    bench.arm.define_position(HOME)
+    assert bench.arm.start().is_zeroed
+    bench.rig.network.pendant("activate")
+    reading, _ = bench.cycle(TAU)
+    assert reading.q == pytest.approx(HOME, abs=1.2e-4)  # one count of floor
+    assert bench.rig.motors.units == [-64, -877, 556, -750, 168, 34, -59]
+    assert bench.arm.idle()
+    assert bench.rig.network.safety_mode is SafetyMode.IDLE
+
+
+@pytest.mark.parametrize("vers", ALL_WAYS)
+def test_every_safety_firmware_takes_limits_and_says_why_it_stops(vers):
+    bench = Bench(200, vers)
+    assert bench.arm.start().warnings == ()
+    bench.rig.network.pendant("activate")
+    bench.cycle(np.zeros(7))
+    bench.rig.network.trip("torque")
+    for _ in range(4):
+        bench.cycle(TAU)
+    assert bench.arm.safety_mode() is SafetyMode.IDLE
+    assert bench.arm.safety_faults() == ("torque",)
+
+
+@pytest.mark.parametrize("vers", ALL_WAYS)
+def test_every_firmware_is_asked_how_it_feels(vers):
+    bench = Bench(vers, vers)
+    bench.arm.start()
+    bench.rig.network.set_bus_voltage(41.0)
+    for node in MOTOR_NODES:
+        bench.rig.network.set_property(node, "TEMP", 50 + node)
+    for _ in range(28 * 50 + 1):
+        bench.cycle(np.zeros(7))
+    health = bench.arm.health()
+    assert [p.puck_degc for p in health] == [50 + node for node in MOTOR_NODES]
+    assert [(p.motor_degc, p.bus_voltage, p.error) for p in health] == [(33, 41, 0)] * 7
+
+
+@pytest.mark.parametrize(("vers", "bytes_"), QUESTIONS.items())
+def test_questions_and_torques_have_the_bytes_of_their_firmware(vers, bytes_):
+    bench = Bench(vers, 200)
+    bench.arm.start()
+    bench.rig.sent.clear()
+    bench.cycle(TAU)
+    first = {can_id: data[:1].hex() for _, can_id, data in bench.rig.sent}
+    assert (first[0x404], first[0x401], first[0x402]) == (*bytes_, bytes_[1])
+
+
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("motor", "safety", "who", "taken_as"),
     [
-        (
-            NetworkOptions(vers=(200,) * 4 + (64,) + (200,) * 2),
-            "Puck 5 has firmware 64; 65 or later is needed.",
-        ),
-        (
-            NetworkOptions(safety_vers=60),
-            "The safety module has firmware 60; 61 or later is needed.",
-        ),
+        (201, 200, "puck 1,2,3,4,5,6,7", 200),
+        (32767, 200, "puck 1,2,3,4,5,6,7", 200),
+        (200, 201, "the safety module", 200),
+        (200, 31, "the safety module", 32),
+        (200, 0, "the safety module", 32),
     ],
 )
-def test_older_firmware_is_refused_with_what_is_needed(options, message):
-    rig = Rig(options)
+def test_firmware_nobody_described_is_driven_as_the_nearest_with_a_warning(
+    motor, safety, who, taken_as
+):
+    # What the newest and the oldest known do stands for what nobody knows.
+    bench = Bench(motor, safety)
+    (warning,) = bench.arm.start().warnings
+    assert f"of {who} is not documented" in warning
+    assert f"as in {taken_as}." in warning
+    bench.rig.network.pendant("activate")
+    bench.cycle(TAU)
+    assert bench.rig.motors.units == [-64, -877, 556, -750, 168, 34, -59]
+
+
+@pytest.mark.parametrize("vers", [0, 31, 32])
+def test_firmware_without_units_of_torque_is_refused(vers):
+    bench = Bench(vers, 200)
+    with pytest.raises(DeviceFaultError) as caught:
+        bench.arm.start()
+    assert f"Puck 1 with firmware {vers} has no IPNM" in caught.value.message
+    assert "newer firmware" in caught.value.hint
+
+
+@pytest.mark.parametrize("other", [40, 50, 60])
+def test_pucks_that_one_frame_cannot_reach_together_are_refused(other):
+    rig = Rig(NetworkOptions(vers=(200, 200, other, 200, 200, 200, 200)), HOME_COUNTS)
     with pytest.raises(DeviceFaultError) as caught:
         WamArm(rig.link, rig.clock).start()
-    assert caught.value.message == message
-    assert "newer firmware" in caught.value.hint
+    assert f"200 200 {other} 200 200 200 200" in caught.value.message
+    assert "P or T" in caught.value.message
+
+
+def test_pucks_of_two_old_generations_work_together():
+    rig = Rig(NetworkOptions(vers=(50, 51, 60, 60, 60, 60, 50)), HOME_COUNTS)
+    assert len(WamArm(rig.link, rig.clock).start().pucks) == 7

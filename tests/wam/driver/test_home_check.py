@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import PreflightError
-from wam.driver.startup import HOME_LIMIT, check_home, home_error
+from wam.driver.home import HOME_LIMIT, check_home, home_error
 from wam.model.constants import load_constants
 
 CONSTANTS = load_constants()

@@ -187,6 +187,39 @@ def test_no_torque_waits_in_the_queue_of_a_host_that_is_not_heard(bench):
     assert not {0x401, 0x402} & set(heard)
 
 
+@pytest.mark.parametrize("is_silent", [True, False])
+def test_no_torque_follows_frames_that_have_not_left_while_motors_are_silent(
+    bench, is_silent
+):
+    bench.cycle()
+    bench.rig.link.has_unsent = lambda: True
+    if is_silent:
+        bench.faults.drop(position_reply_id(2), 1)
+    bench.rig.sent.clear()
+    bench.arm.read(bench.rig.clock.t_ns)
+    before = bench.arm.sent_ns
+    bench.arm.send(ZERO, ZERO)
+    torques = [can_id for _, can_id, _ in bench.rig.sent if can_id in {0x401, 0x402}]
+    assert torques == ([] if is_silent else [0x401, 0x402])
+    assert (bench.arm.sent_ns == before) == is_silent
+    withheld = bench.arm.counters.metadata()["link:withheld_torques"]
+    assert withheld == ("1" if is_silent else "0")
+
+
+def test_the_bus_time_of_a_reading_is_that_of_its_last_reply(bench):
+    reading = bench.cycle()
+    assert reading.host_ns < reading.bus_ns <= reading.arm_ns
+    bench.faults.drop(position_reply_id(7), 1)
+    assert bench.cycle().bus_ns < bench.rig.clock.t_ns
+    bench.faults.is_down = True
+    assert bench.cycle().bus_ns == 0
+
+
+def test_a_recording_says_through_which_door_the_bus_was_reached(bench):
+    fields = bench.arm.counters.metadata()
+    assert (fields["link:door"], fields["link:lost_frames"]) == ("python-can", "0")
+
+
 def test_an_error_of_the_controller_marks_the_reading_of_its_cycle_only(bench):
     assert not bench.cycle().has_bus_error
     bench.faults.report_error(0x004, bytes((0, 4, 0, 0, 0, 0, 0, 0)))

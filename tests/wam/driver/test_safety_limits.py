@@ -2,7 +2,6 @@ from itertools import pairwise
 
 import pytest
 
-from acquisition.errors import DeviceFaultError
 from tests.fakes.stepped import Rig
 from wam.bus.frames import encode_set
 from wam.driver.arm import WamArm
@@ -18,7 +17,7 @@ RAISED = SafetyLimits(
 
 
 def start(rig, limits):
-    WamArm(rig.link, rig.clock, ArmSettings(safety_limits=limits)).start()
+    return WamArm(rig.link, rig.clock, ArmSettings(safety_limits=limits)).start()
 
 
 def told(rig):
@@ -75,12 +74,23 @@ def test_limits_another_program_left_behind_are_gone():
     assert [f.data.hex(" ") for f in rig.link.receive()] == ["ae 00 00 10"]
 
 
-def test_a_module_that_keeps_its_limit_is_refused_with_both_values():
+def test_a_module_that_keeps_its_limit_is_driven_and_both_values_are_told():
     rig = Rig()
     receive = rig.network.receive
     set_vl2 = encode_set(46, 6144)
     rig.network.receive = lambda t, i, d: (
         None if (i, bytes(d)) == (0x00A, set_vl2) else receive(t, i, d)
     )
-    with pytest.raises(DeviceFaultError, match=r"VL2 = 4096, expected 6144"):
-        start(rig, RAISED)
+    (warning,) = start(rig, RAISED).warnings
+    assert "VL2 = 4096, expected 6144" in warning
+
+
+@pytest.mark.parametrize(("name", "number"), [("VL1", 45), ("TL2", 48)])
+def test_a_module_that_does_not_tell_a_limit_is_driven_with_a_warning(name, number):
+    rig = Rig()
+    receive = rig.network.receive
+    rig.network.receive = lambda t, i, d: (
+        None if (i, bytes(d)) == (0x00A, bytes((number,))) else receive(t, i, d)
+    )
+    (warning,) = start(rig, RAISED).warnings
+    assert f"GET {name}" in warning

@@ -5,14 +5,13 @@ from acquisition.errors import DeviceFaultError, LinkTimeoutError
 from fakes.pucks.options import NetworkOptions
 from tests.fakes.stepped import Rig
 from wam.bus.property_client import PropertyClient
-from wam.driver.safety_module import (
+from wam.driver.pendant import (
     PendantButton,
     SafetyLevel,
-    SafetyModule,
-    decode_mode,
     decode_pendant,
     encode_pendant,
 )
+from wam.driver.safety_module import SafetyModule, decode_mode
 
 WORDS = [0x0D3F1249, 0x0E3F1249, 0x00794249, 0x0D3F124C, 0x0D3F1849]
 

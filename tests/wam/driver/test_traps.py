@@ -39,7 +39,7 @@ from wam.bus.frames import (
 from wam.bus.link import MODE_BROADCAST_ID
 from wam.bus.properties import Device, names, property_number
 from wam.driver.arm import WamArm
-from wam.driver.safety_module import SafetyLevel
+from wam.driver.pendant import SafetyLevel
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import HOST_TORQUE_LIMITS, Transmission
 

@@ -1,0 +1,75 @@
+"""The force that accelerates the foot below the sensor, from its smoothed motion; pure.
+
+The sensor carries the foot: what it reads is the ground's force less m a of the foot's
+mass. a is the second derivative of a parabola fitted to the positions around each row
+(Savitzky and Golay 1964, Anal. Chem. 36(8), 1627-1639).
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition import SettingsError
+from analysis.data.series import Array
+
+WINDOW = 0.03  # s that one parabola spans; faster changes are not seen
+_ORDER = 2
+_FEWEST = 5  # samples of a parabola whose scatter tells its error
+_FEWEST_ROWS = 0.5  # share of its rows that a trial may have lost
+
+
+class InertialForce(NamedTuple):
+    """The force that a foot's acceleration takes.
+
+    Attributes:
+        force: m a in the frame of the positions [N], shape (n, 3).
+        uncertainty: standard uncertainty of each component from the scatter of the
+            positions [N]; what is faster than the window is not in it.
+    """
+
+    force: Array
+    uncertainty: float
+
+
+def inertial_force(
+    t: Array, position: Array, mass: float, window: float = WINDOW
+) -> InertialForce:
+    """Return the force that accelerates a body.
+
+    Args:
+        t: time [s], shape (n,), strictly increasing.
+        position: of its centre of mass [m], shape (n, 3).
+        mass: of the body [kg].
+        window: that one parabola spans [s].
+
+    Raises:
+        SettingsError: the samples are too few, or too far apart for the window.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import savgol_filter
+
+    period = float(np.median(np.diff(t)))
+    count = round((t[-1] - t[0]) / period) + 1
+    width = 2 * round(0.5 * window / period) + 1
+    if width < _FEWEST or width > t.size or t.size < _FEWEST_ROWS * count:
+        raise SettingsError(
+            f"Samples every {period * 1e3:.1f} ms show no acceleration: the foot's "
+            f"motion is smoothed over {window * 1e3:.0f} ms.",
+            hint="It takes the cycles of a recording, about 500 each second.",
+        )
+    even = t[0] + np.arange(count) * period  # a lost row is no jerk
+    evenly = CubicSpline(t, position)(even)
+    smooth = np.asarray(savgol_filter(evenly, width, _ORDER, axis=0))
+    curved = savgol_filter(evenly, width, _ORDER, deriv=2, delta=period, axis=0)
+    force = mass * np.asarray(curved)
+    inner = slice(width // 2, count - width // 2)  # the ends hang on one parabola each
+    scatter = float(np.sqrt(np.mean((evenly - smooth)[inner] ** 2)))
+    # Least squares on an even grid: variance of 2 c2, and of the residual amid it.
+    n = float(width)
+    gain = math.sqrt(720.0 / (n * (n**2 - 1) * (n**2 - 4))) / period**2
+    left = 1.0 - 3.0 * (3.0 * n**2 - 7.0) / (4.0 * n * (n**2 - 4.0))
+    return InertialForce(
+        np.column_stack([np.interp(t, even, axis) for axis in force.T]),
+        mass * gain * scatter / math.sqrt(left),
+    )

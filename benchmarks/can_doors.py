@@ -1,0 +1,169 @@
+"""What the 13 frames of a cycle cost through each door to the bus, side by side.
+
+Four frames leave and nine arrive in every cycle of 2 ms. Each door does so in turns and
+pauses in between, so that neither finds warm caches. Linux's CAN needs an interface;
+here datagrams on the loopback device carry the same 16 bytes, stamped by the kernel,
+and the sockets' options are the same. Processor time of this thread is measured.
+"""
+
+import argparse
+import gc
+import json
+import logging
+import math
+import socket
+import statistics
+import struct
+import sys
+import time
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from can.interfaces.socketcan import socketcan
+
+from acquisition import SystemClock
+from wam.bus import (
+    MODERN,
+    MOTOR_NODES,
+    SENSOR_NODE,
+    CanLink,
+    Device,
+    Door,
+    Group,
+    PythonCanDoor,
+    encode_force,
+    encode_get,
+    encode_position,
+    encode_torque,
+    encode_torques,
+    group_id,
+    position_reply_id,
+    property_number,
+)
+from wam.bus.kernel_door import KernelDoor
+
+GOAL_US = 45.0  # of the kernel's socket, per cycle
+_PERIOD_NS = 2_000_000
+_WARM_UP = 100  # cycles
+_FRAME = struct.Struct("=IB3x8s")
+_ARRIVING = [
+    (position_reply_id(node), encode_position(1000 * node)) for node in MOTOR_NODES
+] + [
+    (group_id(Group.FORCE, SENSOR_NODE), encode_force((1.0, -2.5, -9.81))),
+    (group_id(Group.TORQUE, SENSOR_NODE), encode_torque((0.1, -0.25, 0.015))),
+]
+
+
+@dataclass(frozen=True, slots=True)
+class DoorCost:
+    """Processor time of one cycle's frames.
+
+    Attributes:
+        name: the door.
+        median_us: over cycles [us].
+        p99_us: 99th percentile [us].
+    """
+
+    name: str
+    median_us: float
+    p99_us: float
+
+
+class Ends:
+    """A door and the far end of its bus."""
+
+    def __init__(self, near: socket.socket, door: Door) -> None:
+        self.far = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.far.bind(("127.0.0.1", 0))
+        near.bind(("127.0.0.1", 0))
+        near.connect(self.far.getsockname())
+        self.far.connect(near.getsockname())
+        self.far.setblocking(False)
+        self.near = near
+        self.link = CanLink(door)
+        self.times: list[int] = []
+        self._p = encode_get(property_number(Device.MOTOR, "P", MODERN))
+        self._t = property_number(Device.MOTOR, "T", MODERN)
+        self._ft = encode_get(property_number(Device.SENSOR, "FT"))
+
+    def cycle(self) -> int:
+        """Return the processor time of one cycle's frames [ns]."""
+        link, begin = self.link, time.thread_time_ns()
+        link.send(group_id(Group.ARM), self._p)
+        link.send(SENSOR_NODE, self._ft)
+        spent = time.thread_time_ns() - begin
+        for can_id, data in _ARRIVING:
+            self.far.send(_FRAME.pack(can_id, len(data), data))
+        begin = time.thread_time_ns()
+        arrived = len(link.receive())
+        link.send(group_id(Group.LOWER_TORQUE), encode_torques([1, 2, 3, 4], self._t))
+        link.send(group_id(Group.WRIST_TORQUE), encode_torques([5, 6, 7], self._t))
+        spent += time.thread_time_ns() - begin
+        if arrived != len(_ARRIVING):
+            raise RuntimeError(f"{arrived} of {len(_ARRIVING)} frames arrived")
+        for _ in range(4):
+            self.far.recv(_FRAME.size)
+        return spent
+
+
+def kernel_ends() -> Ends:
+    """Return our door onto the kernel's socket."""
+    near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    return Ends(near, KernelDoor(near, "loopback", SystemClock()))
+
+
+def library_ends() -> Ends:
+    """Return python-can's own bus for SocketCAN behind our door to it."""
+    near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    library: Any = socketcan
+    library.create_socket = lambda: near
+    library.bind_socket = lambda *_: None
+    bus = socketcan.SocketcanBus("loopback")
+    return Ends(near, PythonCanDoor(bus, SystemClock()))
+
+
+def measure(cycles: int) -> list[DoorCost]:
+    """Return what each door costs in `cycles` paced cycles."""
+    doors = {"kernel socket": kernel_ends(), "python-can": library_ends()}
+    next_ns = time.monotonic_ns()
+    gc.collect()
+    gc.disable()
+    for number in range(_WARM_UP + cycles):
+        for ends in doors.values():
+            next_ns = max(next_ns + _PERIOD_NS, time.monotonic_ns())
+            time.sleep(max(0.0, (next_ns - time.monotonic_ns()) * 1e-9))
+            spent = ends.cycle()
+            if number >= _WARM_UP:
+                ends.times.append(spent)
+    gc.enable()
+    return [_cost(name, ends.times) for name, ends in doors.items()]
+
+
+def _cost(name: str, times: list[int]) -> DoorCost:
+    late = sorted(times)[math.ceil(0.99 * len(times)) - 1]
+    return DoorCost(name, statistics.median(times) / 1e3, late / 1e3)
+
+
+def main() -> int:
+    """Measure and print; the exit code says nothing about the figures."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--cycles", type=int, default=3000, help="of each door (3000)")
+    parser.add_argument("--json", action="store_true", help="print JSON instead")
+    args = parser.parse_args()
+    logging.disable()  # python-can: datagrams have no options of CAN
+    costs = measure(max(1, args.cycles))
+    if args.json:
+        print(json.dumps([asdict(cost) for cost in costs], indent=2))
+        return 0
+    for cost in costs:
+        print(
+            f"{cost.name:16} p50 {cost.median_us:6.1f} us   p99 {cost.p99_us:6.1f} us"
+        )
+    ratio = costs[1].median_us / costs[0].median_us
+    verdict = "met" if costs[0].median_us <= GOAL_US else "missed"
+    print(f"{ratio:.1f} times less; goal {GOAL_US:.0f} us per cycle: {verdict}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

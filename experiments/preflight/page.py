@@ -1,0 +1,64 @@
+"""The page of the preflight: a line for each check, refusals kept to its end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from acquisition import PreflightError
+from experiments.operator import Console
+
+Add = Callable[[str, str, str], None]  # mark, name and text of a line
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True, slots=True)
+class CheckResult:
+    """One line of the page."""
+
+    mark: str
+    name: str
+    text: str
+
+
+class ChecksPage:
+    """The lines of the checks; one that fails does not hide the next.
+
+    Attributes:
+        checks: what was printed.
+    """
+
+    def __init__(self, console: Console) -> None:
+        self.checks: list[CheckResult] = []
+        self._console = console
+        self._failures: list[PreflightError] = []
+
+    def add(self, mark: str, name: str, text: str) -> None:
+        """Print one line and keep it."""
+        self.checks.append(CheckResult(mark, name, text))
+        self._console.check(mark, name, text)
+
+    def add_result(self, result: CheckResult | None) -> None:
+        """Print the line of a check, if it had anything to say."""
+        if result is not None:
+            self.add(result.mark, result.name, result.text)
+
+    def fail(self, error: PreflightError) -> None:
+        """Keep a refusal until the other checks have been run."""
+        self._failures.append(error)
+
+    def attempt(self, check: Callable[[], _T]) -> _T | None:
+        """Return what a check returns, None when it refused."""
+        try:
+            return check()
+        except PreflightError as error:
+            self.fail(error)
+            return None
+
+    def require_fit(self) -> None:
+        """Raise the first refusal; the others are said before it."""
+        if not self._failures:
+            return
+        first, *others = self._failures
+        for error in others:
+            self._console.say(f"Also: {error}")
+        raise first

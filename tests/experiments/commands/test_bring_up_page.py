@@ -1,0 +1,189 @@
+"""What the pages on the first hour and on a served arm say is what the program says."""
+
+import re
+import shlex
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition.devices import SafetyMode
+from acquisition.errors import PreflightError
+from experiments.__main__ import COMMANDS, build_parser
+from experiments.messages import CATALOGUE
+from experiments.settings.load import load_settings
+from fakes.pucks.options import NetworkOptions
+from tests.experiments.commands.test_check_bus import listen
+from tests.experiments.program import traction
+from tests.fakes.stepped import Rig
+from wam.bus.decoder import BusReader, describe_id
+from wam.bus.kernel_door import setup_command
+from wam.bus.log import parse_log
+from wam.driver.arm import WamArm
+from wam.driver.transmission import Transmission
+from wam.model.constants import load_constants
+
+ROOT = Path(__file__).parents[3]
+PAGES = {
+    name: (ROOT / "docs" / name).read_text()
+    for name in ("bring-up.md", "served-arm.md")
+}
+PAGE = PAGES["bring-up.md"]
+CONSTANTS = load_constants()
+
+
+def blocks(page):
+    return re.findall(r"```\w*\n(.*?)```", page, re.DOTALL)
+
+
+def commands(page, program):
+    """Return the commands of a program, without what it prints."""
+    lines = [line for block in blocks(page) for line in block.splitlines()]
+    return [
+        line for line in lines if line.startswith(f"{program} ") and "  " not in line
+    ]
+
+
+def rows(page):
+    """Return the cells of every row of every table."""
+    lines = [line for line in page.splitlines() if line.startswith("| ")]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def frames():
+    """Return (frame, words) of every row that shows a frame, in order."""
+    for cells in rows(PAGE):
+        for frame, words in pairwise(cells):
+            if re.fullmatch(r"`[0-9A-F]+#[0-9A-F]*`", frame):
+                yield frame.strip("`"), words
+
+
+def test_every_frame_decodes_to_its_words():
+    reader = BusReader()
+    said = []
+    for number, (frame, _) in enumerate(frames()):
+        (logged,) = parse_log([f"({1e-4 * number:.6f}) can0 {frame}"])
+        said.append(reader.read(logged)[-1].text)
+    told = [re.sub(r", (LATE: )?\d+ us after the question$", "", text) for text in said]
+    assert told == [words for _, words in frames()]
+    assert len(told) > 50
+
+
+def test_every_identifier_has_its_words():
+    shown = [
+        (match[1], cells[1])
+        for cells in rows(PAGE)
+        if (match := re.match(r"`([0-9A-F]{3})`", cells[0]))
+    ]
+    assert len(shown) >= 7
+    for can_id, words in shown:
+        assert describe_id(int(can_id, 16)) == words
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_of_a_page_is_understood(page):
+    found = commands(PAGES[page], "traction")
+    assert found
+    for line in found:
+        arguments = shlex.split(line.removesuffix("&"))[1:]
+        assert build_parser().parse_args(arguments).command == arguments[0]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_in_a_sentence_exists(page):
+    assert set(re.findall(r"`traction (\w+)", PAGES[page])) <= set(COMMANDS)
+
+
+def test_the_unit_of_the_service_starts_what_exists():
+    (start,) = re.findall(r"^ExecStart=(.*)$", PAGES["served-arm.md"], re.MULTILINE)
+    program, *arguments = shlex.split(start)
+    assert program.endswith("/bin/traction")
+    args = build_parser().parse_args(arguments)
+    assert (args.command, args.bare, args.idle_first) == ("fake", True, True)
+
+
+def test_the_options_of_a_served_arm_are_those_of_the_page(capsys):
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["fake", "--help"])
+    known = set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
+    assert set(re.findall(r"`(--[a-z-]+)", PAGES["served-arm.md"])) <= known
+
+
+def test_an_interface_is_set_up_by_the_same_words_everywhere():
+    can = load_settings(None).rig.can
+    setup = setup_command(can.channel, can.bitrate)
+    assert setup in commands(PAGE, "ip")
+    do = CATALOGUE["can-down"].do
+    assert setup in do.format(channel=can.channel, bitrate=can.bitrate)
+    for page in (ROOT / "docs").glob("*.md"):
+        told = re.findall(
+            r"ip link set \S+ up [^\n`]*type can[^\n`]*", page.read_text()
+        )
+        assert set(told) <= {setup}, page.name
+
+
+def refusal(options=None, silent=()):
+    """Return what the start says of an arm."""
+    rig = Rig(options)
+    for node in silent:
+        rig.network.silence(node)
+    with pytest.raises(PreflightError) as caught:
+        WamArm(rig.link, rig.clock).start()
+    return caught.value.message
+
+
+REFUSALS = {
+    "E-stop": (NetworkOptions(safety_mode=SafetyMode.E_STOP), ()),
+    "nobody": (None, (*range(1, 8), 10)),
+    "one puck": (None, (5,)),
+    "no wrist": (None, (5, 6, 7)),
+}
+
+
+@pytest.mark.parametrize("what", REFUSALS)
+def test_a_refusal_is_quoted_as_it_is(what):
+    assert f"`{refusal(*REFUSALS[what])}`" in PAGE
+
+
+def test_a_bus_on_which_nobody_acknowledges_is_quoted():
+    rig = Rig()
+    rig.network.faults.go_unheard()
+    with pytest.raises(PreflightError) as caught:
+        WamArm(rig.link, rig.clock).start()
+    assert f"`{caught.value.message}`" in PAGE
+
+
+def test_an_arm_that_is_not_zeroed_is_quoted():
+    assert f"`{CATALOGUE['not-zeroed'].what}`" in PAGE
+
+
+def test_a_silent_bus_looks_as_on_the_page(tmp_path):
+    (head, *lines) = listen(tmp_path).out.splitlines()
+    assert head.endswith("nothing is sent")
+    assert all(line in PAGE for line in lines)
+    assert len(lines) == 3
+
+
+def test_another_master_looks_as_on_the_page(tmp_path):
+    out = listen(tmp_path, 0x00A, 0x404).out
+    (line,) = [line for line in out.splitlines() if "another program" in line]
+    assert line in PAGE
+
+
+def test_zeroing_looks_as_on_the_page():
+    done = traction("zero", "--fake", "--yes")
+    lines = [line for line in done.out.splitlines() if "mech_at_home" not in line]
+    assert len(lines) == 3
+    assert all(line in PAGE for line in lines)
+
+
+def test_a_joint_that_is_turned_changes_the_positions_of_the_page():
+    transmission = Transmission(CONSTANTS.j2mp, CONSTANTS.cts, CONSTANTS.ipnm)
+    shown = [cells for cells in rows(PAGE) if re.match(r"J\d", cells[0])]
+    assert [cells[0][:2] for cells in shown] == [f"J{joint}" for joint in range(1, 8)]
+    for joint, cells in enumerate(shown):
+        q = np.zeros(7)
+        q[joint] = 0.1
+        counts = [round(count) for count in transmission.exact_counts(q).tolist()]
+        assert [int(number) for number in cells[1].split()] == counts

@@ -1,0 +1,112 @@
+"""Which arm `traction fake` serves."""
+
+import pytest
+
+import fakes.serving
+from tests.experiments.program import traction
+
+FOOT = """\
+mass = 0.3
+com = [0.0, 0.01, 0.05]
+inertia = [4e-4, 5e-4, 4e-4]
+sole = [0.0, 0.0, 0.09]
+"""
+
+
+@pytest.fixture
+def serve(monkeypatch, tmp_path):
+    """Return a function that serves an arm, ends at once and returns what it is."""
+    seen = []
+    build = fakes.serving.build_home_server
+
+    def keep(port, pose, clock):
+        seen.append(pose)
+        return build(port, pose, clock)
+
+    monkeypatch.setattr(fakes.serving, "build_home_server", keep)
+    script = tmp_path / "script"
+    script.write_text("quit\n")
+    where = ("--can", f"traction-fake:{tmp_path}/bus", "--script", script)
+
+    def start(*arguments):
+        done = traction("fake", *where, *arguments)
+        assert done.code == 0, done.err
+        return seen.pop()
+
+    return start
+
+
+def test_without_options_a_person_carries_the_arm_with_its_foot(serve):
+    pose = serve()
+    assert (pose.has_hand, pose.firmware) == (True, (200, 200))
+    assert pose.tool.foot.mass == 0.45
+
+
+def test_a_bare_arm_has_neither_hand_nor_tool(serve):
+    pose = serve("--bare")
+    assert (pose.has_hand, pose.tool) == (False, None)
+
+
+@pytest.mark.parametrize(("hand", "has_hand"), [("carry", True), ("none", False)])
+def test_the_hand_is_chosen_by_itself(serve, hand, has_hand):
+    pose = serve("--hand", hand)
+    assert pose.has_hand is has_hand
+    assert pose.tool is not None
+
+
+def test_what_is_named_counts_more_than_bare(serve):
+    assert serve("--bare", "--tool", "tread").tool.foot.mass == 0.45
+    assert serve("--bare", "--hand", "carry").has_hand
+
+
+def test_a_foot_comes_from_a_file_of_its_own(serve, tmp_path):
+    path = tmp_path / "foot.toml"
+    path.write_text(FOOT)
+    tool = serve("--tool", path).tool
+    assert (tool.foot.mass, tool.sole.tolist()) == (0.3, [0.0, 0.0, 0.09])
+    assert tool.sensor.mass > 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "firmware"), [("60", (60, 60)), ("200,40", (200, 40)), ("0", (0, 0))]
+)
+def test_firmware_is_of_pucks_and_safety_module(serve, text, firmware):
+    assert serve("--firmware", text).firmware == firmware
+
+
+@pytest.mark.parametrize("text", ["", "60,", "60,61,62", "-1", "6e1", "40000", "²"])
+def test_firmware_that_makes_no_sense_is_refused(text, tmp_path):
+    where = ("--can", f"traction-fake:{tmp_path}/bus")
+    done = traction("fake", *where, f"--firmware={text}")
+    assert done.code == 2
+    assert "200 or 60,61" in done.err
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [("mass = 0.3", "missing"), ("mass = -1\n" + FOOT[11:], "mass")],
+)
+def test_a_foot_that_makes_no_sense_starts_nothing(tmp_path, content, word):
+    path = tmp_path / "foot.toml"
+    path.write_text(content)
+    where = ("--can", f"traction-fake:{tmp_path}/bus", "--tool", path)
+    done = traction("fake", *where)
+    assert done.code == 2
+    assert "foot.toml" in done.err
+    assert word in done.err
+    assert not (tmp_path / "bus").exists()
+
+
+def test_a_foot_that_is_nowhere_is_named(tmp_path):
+    done = traction("fake", "--can", f"traction-fake:{tmp_path}/b", "--tool", "plough")
+    assert done.code == 2
+    assert "plough cannot be read" in done.err
+
+
+@pytest.mark.parametrize("arm", [(), ("--can", "traction-fake:{}/bus")])
+def test_a_serial_sensor_needs_a_tool(tmp_path, arm):
+    arm = [part.format(tmp_path) for part in arm]
+    done = traction("fake", *arm, "--serial", tmp_path / "s", "--tool", "none")
+    assert done.code == 2
+    assert "no wrist sensor" in done.err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,34 @@
+"""Simulated arms that differ from the usual one, under the whole program."""
+
+import fakes.world
+from fakes.pucks.options import NetworkOptions
+
+
+def serve(monkeypatch, options=None, prepare=None):
+    """Let every simulated rig have the network `options`, and what `prepare` does."""
+
+    class OtherRig(fakes.world.FakeRig):
+        def __init__(self, *arguments, **named):
+            super().__init__(*arguments, **{"network": options, **named})
+            if prepare is not None:
+                prepare(self.network)
+
+    monkeypatch.setattr(fakes.world, "FakeRig", OtherRig)
+
+
+def firmware(motor, safety=None):
+    """Return the options of an arm of one generation."""
+    safety = motor if safety is None else safety
+    return NetworkOptions(vers=(motor,) * 7, safety_vers=safety, monitor_vers=3)
+
+
+def deaf_to(*requests):
+    """Return what lets a network lose (identifier, first byte) on their way to it."""
+
+    def prepare(network):
+        receive = network.receive
+        network.receive = lambda t, i, d: (
+            None if (i, d[0]) in requests else receive(t, i, d)
+        )
+
+    return prepare

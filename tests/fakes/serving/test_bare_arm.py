@@ -1,0 +1,124 @@
+"""A program that knows the protocol and the weight of the arm moves a served one."""
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from fakes.bus.client import SocketBus
+from fakes.bus.hub import SocketHub
+from fakes.serving.home_arm import HomePose, StandingMotors, build_home_server
+from tests.fakes.buses import LimitedClock
+from tests.fakes.scenes import CONSTANTS, FRAME, TOOL
+from tests.fakes.stepped import Motors
+from tests.fakes.strict_client import (
+    HOME,
+    HOME_Q,
+    StrictClient,
+    holding_torques,
+    joints,
+    motor_units,
+)
+from wam.model.arm_model import ArmModel
+
+WANTED = (0.2, 0.2, 0.2, -0.2, 0.0, 0.0, 0.0)
+TARGET = [a + b for a, b in zip(HOME_Q, WANTED, strict=True)]
+MOVE = 1.5  # s
+ARRIVED = 5e-3  # rad
+
+
+class ServedArm:
+    """An arm served on a socket, on stepped time: a stall takes none of it."""
+
+    def __init__(self, folder, *, tool=None, has_hand=False):
+        self.clock = LimitedClock()
+        pose = HomePose(tool, FRAME, None, is_idle_first=True, has_hand=has_hand)
+        self.server = build_home_server(SocketHub(folder / "bus"), pose, self.clock)
+        self.bus = SocketBus(str(folder / "bus"))
+        self.client = StrictClient(self.bus, self.rest, has_sensor=tool is not None)
+
+    def rest(self, duration_ns):
+        self.clock.limit_ns = self.clock.t_ns + duration_ns
+        self.server.step()
+        while self.clock.t_ns < self.clock.limit_ns:
+            self.server.step()
+
+    def activate(self):
+        self.client.start()
+        self.server.press("activate")
+        self.client.expect_active()
+
+    def close(self):
+        self.bus.shutdown()
+        self.server.close()
+
+
+@pytest.fixture
+def serve(tmp_path):
+    opened = []
+
+    def start(**options):
+        opened.append(closing(ServedArm(tmp_path, **options)))
+        return opened[-1].thing
+
+    yield start
+    for arm in opened:
+        arm.__exit__(None, None, None)
+
+
+def test_four_joints_arrive_under_the_programs_own_control(serve):
+    arm = serve()
+    arm.activate()
+    found = arm.client.move(WANTED, MOVE)
+    assert found[:4] == pytest.approx(TARGET[:4], abs=ARRIVED)
+    assert arm.server.state == "active"
+    arm.client.finish()
+
+
+def test_a_person_who_carries_the_foot_is_in_the_way(serve):
+    arm = serve(tool=TOOL, has_hand=True)
+    arm.activate()
+    found = arm.client.move(WANTED, MOVE)
+    assert np.abs(np.subtract(found, TARGET)[:4]).max() > ARRIVED
+
+
+def test_a_bare_arm_falls_when_nothing_holds_it(serve):
+    arm = serve()
+    arm.activate()
+    held = arm.client.move(WANTED, MOVE)
+    arm.client.run(cycles=100)  # of zero torque
+    found = arm.client.read_joints()
+    assert np.abs(np.subtract(found, held)).max() > 0.02
+
+
+def test_a_bare_arm_stands_at_home_until_it_is_activated(serve):
+    arm = serve()
+    arm.client.start()
+    arm.client.run(cycles=100)
+    assert arm.client.read_joints() == pytest.approx(HOME_Q, abs=1e-3)
+
+
+def test_an_arm_that_nobody_carries_is_let_go_by_its_first_activation():
+    motors = Motors()
+    arm = StandingMotors(motors)
+    arm.set_braking(is_braked=False, is_powered=False)
+    assert (motors.is_braked, motors.is_powered) == (True, True)
+    arm.set_braking(is_braked=False, is_powered=True)
+    assert not motors.is_braked
+    arm.set_braking(is_braked=False, is_powered=False)
+    assert (motors.is_braked, motors.is_powered) == (False, False)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_program_weighs_the_arm_as_its_makers_do(seed):
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(CONSTANTS.q_lower, CONSTANTS.q_upper)
+    expected = ArmModel(CONSTANTS).gravity(q)
+    assert holding_torques(q.tolist()) == pytest.approx(expected, abs=0.01)
+
+
+def test_the_program_knows_gears_and_units():
+    assert joints(HOME) == pytest.approx(HOME_Q, abs=1e-3)
+    # The example of the protocol's description, floored.
+    units = motor_units([1.0, -15.0, 2.0, 5.0, 0.3, -0.2, 0.05])
+    assert units == [-65, -878, 556, -750, 167, 33, -59]

@@ -1,0 +1,326 @@
+import errno
+import socket
+import struct
+from pathlib import Path
+
+import can
+import pytest
+
+from acquisition.errors import LinkError, LinkFullError
+from tests.fakes.stepped import SteppedClock
+from tests.wam.bus.test_link import ScriptedBus, message
+from wam.bus import doors
+from wam.bus.doors import PythonCanDoor, open_door
+from wam.bus.kernel_door import (
+    AdapterClock,
+    InterfaceState,
+    KernelDoor,
+    interface_state,
+)
+from wam.bus.link import CanLink
+
+NS_PER_S = 1_000_000_000
+MS = 1_000_000
+AHEAD_NS = 1_000_000 * NS_PER_S  # of UTC before the monotonic clock
+
+
+def can_frame(can_id, data=b"", length=None):
+    return struct.pack("=IB3x8s", can_id, len(data) if length is None else length, data)
+
+
+class Apart(SteppedClock):
+    """A clock whose UTC is a million seconds ahead of its monotonic time."""
+
+    def utc_ns(self):
+        return self.t_ns + AHEAD_NS
+
+
+@pytest.fixture
+def pair():
+    """A door, and the far end of the datagrams that it takes for a bus."""
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    door = KernelDoor(near, "can0", SteppedClock())
+    yield door, far
+    door.close()
+    far.close()
+
+
+def stamps(software_ns=0, hardware_ns=0):
+    parts = (*divmod(software_ns, NS_PER_S), 0, 0, *divmod(hardware_ns, NS_PER_S))
+    return socket.SOL_SOCKET, 37, struct.pack("@6q", *parts)
+
+
+def lost(total):
+    return socket.SOL_SOCKET, 40, struct.pack("=I", total)
+
+
+class ScriptedSocket:
+    """Gives out (frame, ancillary data) and raises what stands between them."""
+
+    def __init__(self, *script):
+        self.script = list(script)
+        self.waiting = 0
+
+    def setblocking(self, flag):
+        pass
+
+    def setsockopt(self, *option):
+        raise OSError(errno.ENOPROTOOPT, "of an old kernel")
+
+    def getsockopt(self, *option):
+        raise OSError(errno.ENOPROTOOPT, "of an old kernel")
+
+    def recvmsg_into(self, buffers, room):
+        if not self.script:
+            raise BlockingIOError(errno.EAGAIN, "nothing")
+        step = self.script.pop(0)
+        if isinstance(step, Exception):
+            raise step
+        frame, ancillary = step
+        buffers[0][: len(frame)] = frame
+        return len(frame), ancillary, 0, ("can0",)
+
+
+def scripted(*script, clock=None):
+    return KernelDoor(ScriptedSocket(*script), "can0", clock or Apart())
+
+
+def test_what_is_sent_is_a_can_frame_of_linux(pair):
+    door, far = pair
+    door.send(0x404, b"\x30")
+    door.send(0x408, bytes(range(8)))
+    assert far.recv(99) == bytes.fromhex("04040000 01000000 3000000000000000")
+    assert far.recv(99) == bytes.fromhex("08040000 08000000 0001020304050607")
+
+
+def test_what_arrives_keeps_its_order_its_length_and_its_flags(pair):
+    door, far = pair
+    for frame in (
+        can_frame(0x426, b"\x00\x01\x02"),
+        can_frame(0x20000040, bytes(8)),
+        can_frame(0x80000426, b"\x01"),
+        can_frame(0x40000426),
+    ):
+        far.send(frame)
+    assert [(f.can_id, f.data) for f in door.receive()] == [
+        (0x426, b"\x00\x01\x02"),
+        (0x20000040, bytes(8)),
+        (0x80000426, b"\x01"),
+        (0x40000426, b""),
+    ]
+    assert door.receive() == []
+
+
+def test_a_link_sorts_what_the_kernel_hands_out(pair):
+    door, far = pair
+    link = CanLink(door)
+    for frame in (
+        can_frame(0x20000004, bytes((0, 4, 0, 0, 0, 0, 0, 0))),
+        can_frame(0x80000426, b"\x01"),
+        can_frame(0x40000426),
+        can_frame(0x404, b"\x30"),
+        can_frame(0x540),
+        can_frame(0x426, b"\x07"),
+    ):
+        far.send(frame)
+    assert [(f.can_id, f.data) for f in link.receive()] == [(0x426, b"\x07")]
+    assert (link.errors.text(), link.foreign_id, link.mode_hints) == (
+        "warning 1",
+        0x404,
+        1,
+    )
+
+
+def test_a_flood_of_error_frames_is_sorted_once_and_hides_no_frame():
+    heard = []
+    flood = [(can_frame(0x20000088, bytes(8)), [])] * 200
+    link = CanLink(scripted(*flood, (can_frame(0x426, b"\x07"), [])), heard.append)
+    assert [frame.can_id for frame in link.receive()] == [0x426]
+    assert link.errors.frames == 200
+    assert [[can_id for can_id, _, _ in frames] for frames in heard] == [[0x426]]
+
+
+@pytest.mark.parametrize("size", [0, 1, 15])
+def test_a_datagram_that_is_no_frame_is_dropped(pair, size):
+    door, far = pair
+    far.send(bytes(size))
+    far.send(can_frame(0x426, b"\x07"))
+    assert [frame.can_id for frame in door.receive()] == [0x426]
+
+
+def test_a_length_beyond_eight_bytes_takes_no_more_than_there_are(pair):
+    door, far = pair
+    far.send(can_frame(0x426, bytes(8), length=200))
+    assert [len(frame.data) for frame in door.receive()] == [8]
+
+
+def test_frames_that_have_not_left_are_known(pair):
+    door, far = pair
+    assert not door.has_unsent()
+    door.send(0x404, b"\x30")
+    assert door.has_unsent()
+    far.recv(99)
+    assert not door.has_unsent()
+
+
+def test_a_kernel_that_does_not_tell_what_has_left_stops_no_torque():
+    assert not scripted().has_unsent()
+
+
+def test_a_queue_that_is_full_is_told_from_a_bus_that_broke(pair):
+    door, far = pair
+    with pytest.raises(LinkFullError):
+        flood(door)
+    far.close()
+    with pytest.raises(LinkError) as broke:
+        door.send(0x404, b"\x30")
+    assert not isinstance(broke.value, LinkFullError)
+
+
+def flood(door):
+    for _ in range(10_000):
+        door.send(0x404, b"\x30")
+
+
+def test_a_flood_does_not_hold_the_reader():
+    arrived = (can_frame(0x426, b"\x07"), [])
+    door = scripted(*[arrived] * 2000)
+    assert 0 < len(door.receive()) < 1000
+
+
+@pytest.mark.parametrize("make", ["kernel", "python-can"])
+def test_what_came_before_an_error_is_not_lost_and_the_error_neither(make):
+    if make == "kernel":
+        down = OSError(errno.ENETDOWN, "Network is down")
+        door = scripted((can_frame(0x426, b"\x07"), []), down)
+    else:
+        bus = ScriptedBus([message(0x426)])
+        down = can.CanOperationError("Network is down", errno.ENETDOWN)
+        bus.recv = lambda _: breaking(bus, down)
+        door = PythonCanDoor(bus, SteppedClock())
+    assert [frame.can_id for frame in door.receive()] == [0x426]
+    with pytest.raises(LinkError, match="Network is down"):
+        door.receive()
+    if make == "kernel":
+        assert door.receive() == []  # Linux says it once
+    else:
+        bus.shutdown()
+
+
+def breaking(bus, error):
+    if bus.messages:
+        return bus.messages.pop(0)
+    raise error
+
+
+def test_frames_lost_on_the_socket_are_counted():
+    door = scripted((can_frame(1), []), (can_frame(2), [lost(7)]), (can_frame(3), []))
+    assert door.lost == 0
+    door.receive()
+    assert door.lost == 7
+    assert CanLink(door).metadata()["link:lost_frames"] == "7"
+
+
+def test_the_kernels_stamp_is_of_the_hosts_clock():
+    clock = Apart()
+    door = scripted(
+        (can_frame(1), [stamps(clock.utc_ns() - 3 * MS)]),
+        (can_frame(2), []),
+        (can_frame(3), [stamps()]),
+        (can_frame(4), [(1, 37, b"short")]),
+        (can_frame(5), [stamps(clock.utc_ns() + NS_PER_S)]),  # the future
+        (can_frame(6), [stamps(clock.utc_ns() - 60 * NS_PER_S)]),
+        clock=clock,
+    )
+    assert [f.t_ns for f in door.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0, 0, 0]
+    assert door.name == "kernel socket"
+
+
+def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
+    clock = Apart()
+    utc_ns, own_ns = clock.utc_ns() - 10 * MS, 77 * MS  # it counts from its start
+    delays = (900_000, 200_000, 1_500_000, 200_000)
+    rows = [
+        (can_frame(i), [stamps(utc_ns + i * MS + delay, own_ns + i * MS)])
+        for i, delay in enumerate(delays)
+    ]
+    door = scripted(*rows, clock=clock)
+    times = [frame.t_ns for frame in door.receive()]
+    assert times[2] - times[1] == pytest.approx(MS, abs=1000)
+    assert times[3] - times[2] == pytest.approx(MS, abs=1000)
+    assert "adapter" in door.name
+
+
+def test_an_adapters_clock_that_drifts_is_followed():
+    clock, drift = AdapterClock(), 50e-6
+    for second in range(3600):
+        kernel_ns = AHEAD_NS + second * NS_PER_S
+        own_ns = round(second * NS_PER_S * (1 - drift))
+        error_ns = clock.utc_ns(kernel_ns + 200_000, own_ns) - kernel_ns
+    assert abs(error_ns) < MS
+
+
+@pytest.mark.parametrize("step_ns", [4295 * NS_PER_S, -4295 * NS_PER_S, 100 * MS])
+def test_a_clock_that_is_set_or_wraps_begins_again(step_ns):
+    clock = AdapterClock()
+    clock.utc_ns(AHEAD_NS, 5 * NS_PER_S)
+    kernel_ns = AHEAD_NS + NS_PER_S
+    assert clock.utc_ns(kernel_ns, 6 * NS_PER_S + step_ns) == kernel_ns
+
+
+def test_a_stamp_of_the_adapter_alone_needs_one_of_the_kernel_before():
+    clock = AdapterClock()
+    assert clock.utc_ns(0, 5 * NS_PER_S) == 0
+    clock.utc_ns(AHEAD_NS, 5 * NS_PER_S)
+    assert clock.utc_ns(0, 6 * NS_PER_S) == AHEAD_NS + NS_PER_S
+
+
+@pytest.mark.parametrize(
+    ("stamp", "expected_ns"),
+    [
+        (0.0, 0),  # none
+        (0.999, 999 * MS),  # the monotonic clock
+        (1_000_000.998, 998 * MS),  # UTC
+        (5000.0, 0),  # a clock of the adapter's own
+        (1.5, 0),  # the future
+    ],
+)
+def test_a_stamp_of_python_can_counts_where_it_is_plausible(stamp, expected_ns):
+    door = PythonCanDoor(ScriptedBus([message(0x426, timestamp=stamp)]), Apart())
+    (frame,) = door.receive()
+    # A double holds UTC seconds to a quarter of a microsecond.
+    assert frame.t_ns == pytest.approx(expected_ns, abs=1000)
+
+
+@pytest.mark.parametrize("channel", ["", "nocan17", "a-name-that-is-too-long", "a\0b"])
+def test_an_interface_that_is_not_there_is_refused(channel):
+    with pytest.raises(OSError, match="No such device") as refused:
+        interface_state(channel)
+    assert refused.value.errno == errno.ENODEV
+    with pytest.raises(LinkError, match="does not exist"):
+        open_door("socketcan", channel, 1_000_000, SteppedClock())
+
+
+def test_an_interface_that_is_there_has_a_state():
+    name = socket.if_nameindex()[0][1]
+    told = Path("/sys/class/net", name)
+    flags = int((told / "flags").read_text(), 16)
+    state = interface_state(name)
+    assert state.is_up == bool(flags & 1)
+    assert state.queue_length == int((told / "tx_queue_len").read_text())
+
+
+def test_an_interface_that_is_down_is_not_opened(monkeypatch):
+    down = InterfaceState(is_up=False, has_carrier=False, queue_length=10)
+    monkeypatch.setattr(doors, "interface_state", lambda _: down)
+    with pytest.raises(LinkError, match="can0 is down"):
+        open_door("socketcan", "can0", 1_000_000, SteppedClock())
+
+
+def test_other_adapters_go_through_python_can(monkeypatch):
+    bus = ScriptedBus()
+    monkeypatch.setattr(doors.can, "Bus", lambda **_: bus)
+    door = open_door("pcan", "PCAN_USBBUS1", 1_000_000, SteppedClock())
+    assert door.name == "python-can"
+    door.close()
+    assert bus.shutdowns == 1

@@ -1,0 +1,175 @@
+"""The doors to a CAN bus: the kernel's own socket, and python-can for the rest.
+
+A door sends and drains and never waits. Frames carry Linux's flags in their identifier,
+and the time at which the bus had them on the host's monotonic clock.
+"""
+
+import errno
+from typing import Final
+
+import can
+
+from acquisition import NS_PER_S, Clock, LinkError
+from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
+from wam.bus.kernel_door import (
+    KernelDoor,
+    interface_state,
+    open_socket,
+    setup_command,
+)
+from wam.bus.link import (
+    DRAIN_AT_MOST,
+    Door,
+    Frame,
+    broken_link,
+    error_number,
+    is_plausible,
+)
+
+CanBus = can.BusABC
+SOCKETCAN: Final = "socketcan"
+
+
+def open_bus(interface: str, channel: str, bitrate: int) -> CanBus:
+    """Return an open bus of python-can.
+
+    Args:
+        interface: python-can's name of the adapter, such as "socketcan".
+        channel: the adapter's name, such as "can0".
+        bitrate: [bit/s]; a SocketCAN interface has its own and ignores it.
+
+    Raises:
+        LinkError: the adapter is missing, down or unknown to python-can.
+    """
+    try:
+        if interface == SOCKETCAN:
+            _require_up(channel)
+        return can.Bus(interface=interface, channel=channel, bitrate=bitrate)
+    except (can.CanError, OSError, ValueError, ImportError) as error:
+        raise _cannot_open(interface, channel, bitrate, error) from error
+
+
+def open_door(interface: str, channel: str, bitrate: int, clock: Clock) -> Door:
+    """Return an open door: the kernel's socket for "socketcan", else python-can.
+
+    Args:
+        interface: python-can's name of the adapter.
+        channel: the adapter's name, such as "can0".
+        bitrate: [bit/s]; a SocketCAN interface has its own and ignores it.
+        clock: which the times of frames are of.
+
+    Raises:
+        LinkError: the adapter is missing, down or unknown.
+    """
+    if interface != SOCKETCAN:
+        return PythonCanDoor(open_bus(interface, channel, bitrate), clock)
+    try:
+        _require_up(channel)
+        return KernelDoor(open_socket(channel), channel, clock)
+    except OSError as error:
+        raise _cannot_open(interface, channel, bitrate, error) from error
+
+
+class PythonCanDoor:
+    """A bus of python-can; implements `Door`.
+
+    An adapter stamps what it receives by UTC or by the monotonic clock [s], or not at
+    all; a stamp of neither is none.
+
+    Attributes:
+        name: what it is, for people.
+        lost: 0, python-can does not tell.
+    """
+
+    def __init__(self, bus: CanBus, clock: Clock) -> None:
+        """Take a bus over; times are of `clock`."""
+        self.name = "python-can"
+        self.lost = 0
+        self._bus = bus
+        self._clock = clock
+        self._error: Exception | None = None  # it came behind frames
+        try:
+            self._descriptor = bus.fileno()
+        except NotImplementedError:
+            self._descriptor = -1
+
+    def fileno(self) -> int:
+        """Return the bus's descriptor, -1 if it has none."""
+        return self._descriptor
+
+    def has_unsent(self) -> bool:
+        """Return False: python-can does not tell."""
+        return False
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Queue a data frame with an 11-bit identifier; raises LinkError."""
+        # positionally: stamp, identifier, is it an extended one
+        message = can.Message(0.0, can_id, False, data=data)
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError) as error:
+            raise broken_link(self._bus.channel_info, error) from error
+
+    def receive(self) -> list[Frame]:
+        """Return what has arrived, oldest first; raises LinkError."""
+        frames: list[Frame] = []
+        receive = self._bus.recv
+        try:
+            if self._error is not None:
+                error, self._error = self._error, None
+                raise error
+            for _ in range(DRAIN_AT_MOST):
+                message = receive(0)
+                if message is None:
+                    break
+                frames.append(self._frame(message))
+        except (can.CanError, OSError) as error:
+            if not frames:
+                raise broken_link(self._bus.channel_info, error) from error
+            self._error = error
+        return frames
+
+    def close(self) -> None:
+        """Shut the bus down."""
+        self._bus.shutdown()
+
+    def _frame(self, message: can.Message) -> Frame:
+        can_id = message.arbitration_id
+        if message.is_error_frame:
+            can_id |= ERROR_FLAG
+        elif message.is_extended_id:
+            can_id |= EXTENDED_FLAG
+        elif message.is_remote_frame:
+            can_id |= REMOTE_FLAG
+        return Frame(can_id, bytes(message.data), self._host_ns(message.timestamp))
+
+    def _host_ns(self, stamp: float) -> int:
+        if not stamp:
+            return 0
+        now_ns, t_ns = self._clock.now_ns(), round(stamp * NS_PER_S)
+        if is_plausible(t_ns, now_ns):
+            return t_ns
+        t_ns -= self._clock.utc_ns() - now_ns
+        return t_ns if is_plausible(t_ns, now_ns) else 0
+
+
+def _require_up(channel: str) -> None:
+    """Raise OSError unless an interface exists and is up."""
+    if not interface_state(channel).is_up:
+        raise OSError(errno.ENETDOWN, "Network is down")
+
+
+def _cannot_open(
+    interface: str, channel: str, bitrate: int, error: Exception
+) -> LinkError:
+    up = f"Fix: {setup_command(channel, bitrate)}. Arm not touched."
+    if interface == SOCKETCAN and error_number(error) == errno.ENETDOWN:
+        return LinkError(f"{channel} is down.", hint=up)
+    if interface == SOCKETCAN and error_number(error) == errno.ENODEV:
+        return LinkError(
+            f"{channel} does not exist.", hint=f"Is the adapter plugged in? {up}"
+        )
+    return LinkError(
+        f"CAN {interface}:{channel} cannot be opened: {error}.",
+        hint="Check the interface's name, its driver and its cable. Arm not touched.",
+    )
