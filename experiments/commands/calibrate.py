@@ -117,7 +117,7 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
     rig = console_loop.rig
     result = FrictionGuide(console_loop).run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
-    console_loop.console.say(f"Written: {out}.")
+    _say_use(console_loop, out, '[friction] model = "calibrated"', "rig.toml")
     if rig.simulation is None:
         return
     true = friction_of(rig.simulation.friction())
@@ -195,7 +195,7 @@ def _without_old(
     if what == "gravity":
         return settings.by_cad(), row
     if what == "friction":
-        return settings, row
+        return settings.without_friction(), row
     if what == "terrain":
         bare = row.model_copy(update={"calibration": None})
         return settings.with_row(bare), bare
@@ -204,17 +204,16 @@ def _without_old(
 
 def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> Path:
     """Return where the file goes, beside rig.toml; what is simulated is marked."""
-    from experiments.rig import gravity_path
+    from experiments.rig import friction_path, gravity_path
 
     names = {
-        "friction": "friction.toml",
         "sensor": "ft_sensor.toml",
         "foot": f"foot_{row.foot}.toml",
         "terrain": f"terrain_{row.name}.toml",
     }
-    path = gravity_path(settings)
-    if what != "gravity":
-        path = settings.folder / names[what]
+    places = {"gravity": gravity_path, "friction": friction_path}
+    place = places.get(what)
+    path = place(settings) if place else settings.folder / names[what]
     return path.with_name(f"{path.stem}.fake{path.suffix}") if is_fake else path
 
 

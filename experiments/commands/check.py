@@ -55,7 +55,7 @@ def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
     from experiments.operator import GOOD, Console
     from experiments.preflight import connect_rig, run_preflight
-    from experiments.rig import FakeOptions, logging_bus, read_gravity
+    from experiments.rig import FakeOptions, logging_bus, read_law_calibrations
     from experiments.settings import load_settings, origin_lines
 
     console = Console(color=not args.no_color)
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
         return _explain(args.explain, console)
     settings = load_settings(args.config)
     if args.config_only:
-        read_gravity(settings)
+        read_law_calibrations(settings)
         console.check(GOOD, "config", f"{settings.origin}")
         for line in origin_lines(settings):
             console.say(f"   {line}")

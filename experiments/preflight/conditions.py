@@ -29,7 +29,8 @@ FILE = "conditions.json"
 VERSION = 2  # of the file; 1 had no number
 FOOT = "terrain.foot"  # name of a condition
 _VERSION_KEY = "version"
-_GRAVITY, _NO_GRAVITY = "gravity calibration", "none"
+_GRAVITY, _FRICTION = "gravity calibration", "friction calibration"
+_NO_CALIBRATION = "none"
 _SENSOR = ("model", "serial_number", "firmware", "filter")
 # Settings that no recorded number depends on.
 _EXEMPT = (
@@ -67,8 +68,13 @@ def rig_conditions(rig: Rig) -> dict[str, str]:
             "terrain": rig.row.model_dump(mode="json"),
         }
     )
-    digest = hashlib.sha256(rig.gravity_text.encode()).hexdigest()
-    return {**values, _GRAVITY: digest if rig.gravity_text else _NO_GRAVITY}
+    texts = {_GRAVITY: rig.calibrations.gravity, _FRICTION: rig.calibrations.friction}
+    digests = {name: _digest(text) for name, text in texts.items()}
+    return {**values, **digests}
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest() if text else _NO_CALIBRATION
 
 
 def sensor_conditions(devices: Mapping[str, str]) -> dict[str, str]:
@@ -92,7 +98,8 @@ def default_conditions(sensor_kind: str = "") -> dict[str, str]:
     if sensor_kind in SECTIONS:
         rig["ft_sensor"] = _defaults(SECTIONS[sensor_kind])
     defaults = {"rig": rig, "terrain": _defaults(TerrainRow)}
-    return {**_texts(defaults), _GRAVITY: _NO_GRAVITY}
+    none = dict.fromkeys((_GRAVITY, _FRICTION), _NO_CALIBRATION)
+    return {**_texts(defaults), **none}
 
 
 def write_conditions(folder: SessionFolder, values: Mapping[str, str]) -> None:

@@ -2,7 +2,14 @@ from .backend import EXCHANGE_CYCLES
 from .build import build_tool, terrain_frame
 from .bus_log import logging_bus, open_bus_log
 from .fake import ServedArm, build_sensor_server, build_server
-from .gravity import gravity_path, gravity_words, read_gravity
+from .law_calibrations import (
+    LawCalibrations,
+    friction_path,
+    friction_words,
+    gravity_path,
+    gravity_words,
+    read_law_calibrations,
+)
 from .processes import MultiProcessBackend
 from .rig import FakeOptions, Rig, build_rig
 from .simulation import SimulatedHand
@@ -10,6 +17,7 @@ from .simulation import SimulatedHand
 __all__ = [
     "EXCHANGE_CYCLES",
     "FakeOptions",
+    "LawCalibrations",
     "MultiProcessBackend",
     "Rig",
     "ServedArm",
@@ -18,10 +26,12 @@ __all__ = [
     "build_sensor_server",
     "build_server",
     "build_tool",
+    "friction_path",
+    "friction_words",
     "gravity_path",
     "gravity_words",
     "logging_bus",
     "open_bus_log",
-    "read_gravity",
+    "read_law_calibrations",
     "terrain_frame",
 ]

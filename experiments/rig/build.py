@@ -23,7 +23,13 @@ from ft_sensor import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
 from ft_sensor.vendors import BarrettSensor
 from wam.bus import CanLink, Door, FrameTap
-from wam.control import FootController, LockGains, SoftWalls, Walls
+from wam.control import (
+    FootController,
+    FrictionCompensation,
+    LockGains,
+    SoftWalls,
+    Walls,
+)
 from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
 from wam.model import ArmConstants, ArmModel, Body, Tool, sensor_body
 
@@ -136,14 +142,28 @@ def build_sensor(
 
 
 @dataclass(frozen=True, slots=True)
+class LawParts:
+    """What the control law is made of, as far as it was calibrated.
+
+    Attributes:
+        model: the arm with its tool, for everything but its weight.
+        weighed: the arm as the control law weighs it.
+        compensation: of friction; None = none.
+    """
+
+    model: ArmModel
+    weighed: ArmModel
+    compensation: FrictionCompensation | None
+
+
+@dataclass(frozen=True, slots=True)
 class LoopConfig:
     """What a loop is made of.
 
     Attributes:
         rig: rig.toml.
         row: row of the matrix.
-        model: the arm with its tool, for everything but its weight.
-        law_model: the arm as the control law weighs it.
+        law: models and compensation.
         arm: driver of the arm.
         sensor: the wrist sensor as the loop polls it.
         shared: the memory that the processes share.
@@ -154,8 +174,7 @@ class LoopConfig:
 
     rig: RigSettings
     row: TerrainRow
-    model: ArmModel
-    law_model: ArmModel
+    law: LawParts
     arm: WamArm
     sensor: WrenchSensor
     shared: SharedLayout
@@ -166,7 +185,8 @@ class LoopConfig:
 
 def build_loop_server(parts: LoopConfig) -> LoopServer:
     """Join arm, sensor, law and guard into a cycle that is ready to run."""
-    control, model, shared = parts.rig.control, parts.model, parts.shared
+    control, shared = parts.rig.control, parts.shared
+    model = parts.law.model
     assert model.tool is not None
     is_shared = isinstance(parts.sensor, SharedSensor)
 
@@ -186,10 +206,11 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
         parts.arm,
         parts.sensor,
         FootController(
-            parts.law_model,
+            parts.law.weighed,
             control.virtual_mass,
             LockGains(kp=control.lock_kp, kd=control.lock_kd),
             SoftWalls(build_walls(parts.rig, model.constants)),
+            parts.law.compensation,
         ),
         LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
         build_limits(parts.rig, model.constants),

@@ -16,6 +16,7 @@ from acquisition import (
 from acquisition.ipc import SharedLayout
 from experiments.rig.backend import InProcessBackend, RigBackend
 from experiments.rig.build import (
+    LawParts,
     LoopConfig,
     build_arm,
     build_link,
@@ -29,7 +30,7 @@ from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
 from wam.bus import PythonCanDoor
-from wam.model import ArmModel, Tool, tool_metadata, tool_of
+from wam.model import Tool, tool_metadata, tool_of
 
 if TYPE_CHECKING:
     from fakes.serving import PuckServer, SensorLine, SensorServer
@@ -88,12 +89,12 @@ def stepped(
     world: SimulatedRig,
     settings: Settings,
     row: TerrainRow,
-    models: tuple[ArmModel, ArmModel],
+    law: LawParts,
     shared: SharedLayout,
 ) -> tuple[Clock, RigBackend, SimulationControl]:
     """Return (clock, crew, handle) of a simulation that runs in this thread.
 
-    `models`: the arm with its tool, and as the control law weighs it.
+    `law`: models and compensation of the control law.
     """
     from fakes import SteppedClock
     from fakes.plant import PACES, PlantOptions
@@ -101,17 +102,17 @@ def stepped(
     from fakes.world import FakeRig, LocalSimulation
 
     clock, fields = SteppedClock(), world.metadata()
-    model, law_model = models
+    constants = law.model.constants
     simulation = FakeRig(
         scene_of(fields["scene"]),
-        model.constants,
+        constants,
         tool_of(fields["tool"]),
         clock,
         options=PlantOptions(friction=fields["friction"], seed=world.seed),
     )
     clock.attach(simulation)
     link = build_link(PythonCanDoor(simulation.bus, clock), shared, clock)
-    arm = build_arm(settings.rig, model.constants, link, clock)
+    arm = build_arm(settings.rig, constants, link, clock)
 
     def sensor() -> WrenchSensor:
         if settings.rig.ft_sensor.is_on_bus:
@@ -122,8 +123,7 @@ def stepped(
         return LoopConfig(
             rig=settings.rig,
             row=row,
-            model=model,
-            law_model=law_model,
+            law=law,
             arm=arm,
             sensor=opened,
             shared=shared,

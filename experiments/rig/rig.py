@@ -11,17 +11,18 @@ from acquisition.ipc import SharedLayout
 from experiments.arguments import FRICTION
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
-from experiments.rig.build import (
-    build_tool,
-    terrain_frame,
-)
+from experiments.rig.build import build_tool, terrain_frame
 from experiments.rig.fake import SimulatedRig, stepped
-from experiments.rig.gravity import build_law_model, read_gravity
+from experiments.rig.law_calibrations import (
+    LawCalibrations,
+    build_law,
+    read_law_calibrations,
+)
 from experiments.rig.processes import MultiProcessBackend, WorkerConfigs
 from experiments.rig.simulation import connect_simulation
 from experiments.settings import Settings, TerrainRow, with_calibrations
 from ft_sensor import Payload, TerrainFrame, payload_of
-from wam.model import ArmModel, load_constants
+from wam.model import ArmModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Rig:
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
-        gravity_text: the gravity calibration in use; empty for none.
+        calibrations: of gravity and friction, as far as they are in use.
         simulation: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """
@@ -72,7 +73,7 @@ class Rig:
     frame: TerrainFrame
     row: TerrainRow
     settings: Settings
-    gravity_text: str
+    calibrations: LawCalibrations
     simulation: SimulationControl | None
     is_stepped: bool
     tared_ns: int = 0
@@ -97,39 +98,36 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         world = SimulatedRig(settings.rig, row, fake.seed, fake.friction, fake.pace)
     settings = with_calibrations(settings, is_simulated=world is not None)
     row = settings.row(row.name)
-    tool = build_tool(settings.rig, row.foot)
-    model = ArmModel(load_constants(), tool)
-    gravity_text = read_gravity(settings)
-    law_model = build_law_model(
-        settings.rig, gravity_text, row.foot, is_simulated=world is not None
+    calibrations = read_law_calibrations(settings)
+    law = build_law(
+        settings.rig, calibrations, row.foot, is_simulated=world is not None
     )
     shared = SharedLayout.create()
     simulation: SimulationControl | None = None
     is_stepped = fake is not None and fake.is_fast
     if world is not None and is_stepped:
-        models = model, law_model
-        clock, backend, simulation = stepped(world, settings, row, models, shared)
+        clock, backend, simulation = stepped(world, settings, row, law, shared)
     else:
         fields = world.metadata() if world is not None else None
         clock = SystemClock()
         shared.memory.touch()
-        jobs = _jobs(settings, row, gravity_text, fields)
+        jobs = _jobs(settings, row, calibrations, fields)
         backend = _start_processes(jobs, settings, shared, clock)
         if backend.fake is not None:
             simulation = connect_simulation(backend.fake)
-    payload = payload_of(tool)
+    payload = payload_of(build_tool(settings.rig, row.foot))
     return Rig(
         clock=clock,
         backend=backend,
         shared=shared,
-        model=model,
-        law_model=law_model,
+        model=law.model,
+        law_model=law.weighed,
         payload=payload,
         tared=payload,
         frame=terrain_frame(row),
         row=row,
         settings=settings,
-        gravity_text=gravity_text,
+        calibrations=calibrations,
         simulation=simulation,
         is_stepped=is_stepped,
     )
@@ -161,7 +159,7 @@ def _terminal() -> str:
 def _jobs(
     settings: Settings,
     row: TerrainRow,
-    gravity_text: str,
+    calibrations: LawCalibrations,
     world: dict[str, Any] | None,
 ) -> WorkerConfigs:
     """Return the settings of the processes; `world` is of the simulated rig."""
@@ -173,7 +171,8 @@ def _jobs(
     control = {
         **common,
         "row": row.model_dump(mode="json"),
-        "gravity": gravity_text,
+        "gravity": calibrations.gravity,
+        "friction": calibrations.friction,
         "can": rig.can.model_dump(mode="json"),
         "terminal": _terminal(),
     }

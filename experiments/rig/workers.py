@@ -29,11 +29,10 @@ from experiments.rig.build import (
     build_link,
     build_loop_server,
     build_sensor,
-    build_tool,
     open_bus_sensor,
 )
 from experiments.rig.claim import check_alone, check_inactive, release
-from experiments.rig.gravity import build_law_model
+from experiments.rig.law_calibrations import LawCalibrations, build_law
 from experiments.rig.services import ArmService, SensorService
 from experiments.settings import RigSettings, TerrainRow
 from ft_sensor.serial_line import (
@@ -44,7 +43,6 @@ from ft_sensor.serial_line import (
 )
 from wam.bus import CanLink, open_door
 from wam.driver import ArmInfo, WamArm
-from wam.model import ArmModel, load_constants
 
 CONTROL_PRIORITY = 80
 READER_PRIORITY = 60
@@ -67,16 +65,13 @@ class ControlWorker:
         self._clock = SystemClock(round(self._rig.loop.spin_us * 1e3))
         self._row = TerrainRow.model_validate(settings["row"])
         self._is_simulated = bool(settings["is_simulated"])
-        constants = load_constants()
-        tool = build_tool(self._rig, self._row.foot)
-        self._model = ArmModel(constants, tool)
-        self._law_model = build_law_model(
+        self._law = build_law(
             self._rig,
-            settings["gravity"],
+            LawCalibrations(settings["gravity"], settings["friction"]),
             self._row.foot,
             is_simulated=self._is_simulated,
         )
-        self._constants = constants
+        self._constants = self._law.model.constants
         self._arm: WamArm | None = None
         self._link: CanLink | None = None
         self._sensor: WrenchSensor = SharedSensor(context.shared.wrenches)
@@ -167,8 +162,7 @@ class ControlWorker:
         parts = LoopConfig(
             rig=self._rig,
             row=self._row,
-            model=self._model,
-            law_model=self._law_model,
+            law=self._law,
             arm=arm,
             sensor=self._sensor,
             shared=self._context.shared,

@@ -44,6 +44,11 @@ class Settings:
         cad = self.rig.gravity.model_copy(update={"model": "cad"})
         return replace(self, rig=self.rig.model_copy(update={"gravity": cad}))
 
+    def without_friction(self) -> "Settings":
+        """Return the same without compensation of friction, for a calibration."""
+        none = self.rig.friction.model_copy(update={"model": "none"})
+        return replace(self, rig=self.rig.model_copy(update={"friction": none}))
+
     def with_row(self, row: TerrainRow) -> "Settings":
         """Return the same with `row` in place of the one of its name."""
         rows = tuple(row if old.name == row.name else old for old in self._rows)

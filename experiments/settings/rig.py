@@ -82,6 +82,25 @@ class GravitySection(SettingsSection):
     file: File = Field(default="gravity.toml", examples=["gravity.toml"])
 
 
+class FrictionSection(SettingsSection):
+    """Which dry friction of the drives is taken off the hand while the arm floats.
+
+    Attributes:
+        model: "none"; "calibrated": that of `file`, a path from the folder of rig.toml.
+        file: the calibration.
+        compensation: share of what the calibration surely found.
+    """
+
+    model: Literal["none", "calibrated"] = Field(default="none", examples=["none"])
+    file: File = Field(default="friction.toml", examples=["friction.toml"])
+    compensation: Number = Field(default=0.7, ge=0, le=0.8, examples=[0.7])
+
+    @property
+    def share(self) -> float:
+        """Share that is taken off, 0 without a calibration."""
+        return self.compensation if self.model == "calibrated" else 0.0
+
+
 class LimitSection(SettingsSection):
     """Where the guard steps in, with the names and units of `GuardLimits`; and others.
 
@@ -183,6 +202,7 @@ class RigSettings(SettingsSection):
     control: ControlSection
     limits: LimitSection
     gravity: GravitySection = GravitySection(model="cad")
+    friction: FrictionSection = FrictionSection()
     loop: LoopSection = LoopSection()
     operator: OperatorSection = OperatorSection()
     safety: SafetySection = _POWER_UP

@@ -79,6 +79,7 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
         "foot_mass_kg": repr(rig.model.tool.foot.mass),
         "gravity_model": rig.settings.rig.gravity.model,
+        "friction_compensation": repr(rig.settings.rig.friction.share),
         "operator": details.operator,
         "notes": "",
         "simulated": "true" if rig.is_simulated else "false",
@@ -97,8 +98,7 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "diff.patch": details.diff,
     }
     attachments.update(rig.settings.calibrations)
-    if rig.gravity_text:
-        attachments["gravity.toml"] = rig.gravity_text
+    attachments.update(rig.calibrations.attachments())
     return TrialHeader(
         trial=trial,
         utc_offset_ns=offset,

@@ -36,7 +36,7 @@ from fakes.plant.model import (
 from fakes.plant.push import HandView
 from fakes.truth import Truth
 from ft_sensor import TerrainFrame
-from wam.model import GRAVITY, ArmConstants, Array, Tool
+from wam.model import GRAVITY, ArmConstants, Array, MotorFriction, Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
@@ -54,12 +54,14 @@ class PlantOptions:
             it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
         substeps: steps per 2 ms cycle.
         seed: draws the parameters of friction; None = the nominal ones.
+        rubbing: friction of the motors, given instead of drawn; None = drawn.
         has_hand: a person holds the arm by its forearm, from the beginning.
     """
 
     friction: float = 0.02
     substeps: int = 4
     seed: int | None = None
+    rubbing: MotorFriction | None = None
     has_hand: bool = True
 
 
@@ -95,7 +97,8 @@ class ArmPlant:
         self._substep_ns = PERIOD_NS // options.substeps
         self._dt = self._substep_ns * 1e-9
         borne = motor_weights(self._model, constants, q)
-        self.friction = draw_friction(constants, options.friction, options.seed, borne)
+        drawn = draw_friction(constants, options.friction, options.seed, borne)
+        self.friction = drawn if options.rubbing is None else options.rubbing
         # Forces act at the beginning of each substep, on average here in a cycle [s].
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]

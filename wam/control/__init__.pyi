@@ -1,14 +1,24 @@
 from .controller import FootController
+from .friction_compensation import (
+    LARGEST_SHARE,
+    FrictionCompensation,
+    KnownFriction,
+    known_friction,
+)
 from .joint_lock import LockGains
 from .position_control import TOP_SPEED, JointMove, move_reference
 from .soft_walls import SoftWalls, Walls
 
 __all__ = [
+    "LARGEST_SHARE",
     "TOP_SPEED",
     "FootController",
+    "FrictionCompensation",
     "JointMove",
+    "KnownFriction",
     "LockGains",
     "SoftWalls",
     "Walls",
+    "known_friction",
     "move_reference",
 ]

@@ -4,6 +4,7 @@ import numpy as np
 
 from acquisition import ArmReading, Vector
 from acquisition.control_loop import ArmState, ControlLaw
+from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
 from wam.control.position_control import (
     TOP_SPEED,
@@ -25,9 +26,10 @@ class FootController(ControlLaw):
     """Torques of float, guide, hold and damp.
 
     float: gravity of everything plus the virtual mass, no damping, or slips would lose
-    their bounce. hold and damp: gravity, joint damping and springs of bounded torque
-    that keep the joints where they are. guide: the same, weak enough for a hand that
-    carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
+    their bounce; where it was calibrated, most of the dry friction of the drives is
+    taken off the hand. hold and damp: gravity, joint damping and springs of bounded
+    torque that keep the joints where they are. guide: the same, weak enough for a hand
+    that carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
     locked in all four, and soft walls stand before the stops. In hold the arm can be
     sent somewhere; joint PD then follows the move and keeps the goal until a state is
     entered, hold included.
@@ -39,8 +41,10 @@ class FootController(ControlLaw):
         virtual_mass: float,
         gains: LockGains | None = None,
         walls: SoftWalls | None = None,
+        friction: FrictionCompensation | None = None,
     ) -> None:
         self._model = model
+        self._friction = friction
         self._target_mass = virtual_mass
         self._mass = VirtualMass()
         self._lock = JointLock(gains)
@@ -66,6 +70,8 @@ class FootController(ControlLaw):
             return
         else:
             self._hold.begin(reading.q, self._move_spring(reading))
+        if self._friction is not None and state is not ArmState.FLOAT:
+            self._friction.rest(now)
         self._move = None
         self._stuck_motor = 0
         self._state = state
@@ -132,6 +138,8 @@ class FootController(ControlLaw):
         else:
             tau = gravity + self._standing_torque(reading, gravity)
             tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
+        if self._friction is not None:
+            self._compensate(self._friction, tau, reading)
         if self._walls is not None:
             self._walls.apply(tau, reading)
         return tau, gravity
@@ -147,6 +155,20 @@ class FootController(ControlLaw):
     def joint7_offset(self, reading: ArmReading) -> float:
         """Return how far joint 7 is from where it was locked [rad]."""
         return self._lock.offset(float(reading.q[LOCKED_JOINT]), reading.host_ns)
+
+    def _compensate(
+        self, friction: FrictionCompensation, tau: Vector, reading: ArmReading
+    ) -> None:
+        """Add to `tau` [N m] what a bristle per motor takes of its dry friction.
+
+        Joint 7 is left to its lock.
+        """
+        if self._state is ArmState.FLOAT:
+            depth = None if self._walls is None else self._walls.depth(reading.q)
+            tau[:LOCKED_JOINT] += friction.torque(reading, tau, depth)[:LOCKED_JOINT]
+        elif (rest := friction.resting(reading.host_ns)) is not None:
+            tau[:LOCKED_JOINT] += rest[:LOCKED_JOINT]
+            np.clip(tau, -self._largest, self._largest, out=tau)
 
     def _standing_torque(self, reading: ArmReading, gravity: Vector) -> Vector:
         """Return what is added to `gravity` in a state without a move [N m], (7,).

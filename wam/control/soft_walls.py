@@ -7,6 +7,8 @@ position lies on or past two stops, and an arm that starts there is not thrown o
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from acquisition import ArmReading, Vector
 
 DEPTH = 0.1  # rad
@@ -40,12 +42,18 @@ class SoftWalls:
         self._walls = walls
         pairs = zip(walls.lower, walls.upper, strict=True)
         self._free = [(lower + DEPTH, upper - DEPTH) for lower, upper in pairs]
+        self._bounds = np.array(walls.lower) + DEPTH, np.array(walls.upper) - DEPTH
         self._armed = 0
 
     @property
     def limits(self) -> tuple[float, ...]:
         """The torque limits of the joints [N m], seven."""
         return self._walls.torque
+
+    def depth(self, q: Vector) -> Vector:
+        """Return how far joints are inside walls [rad], (7,), above 0 at a lower."""
+        lower, upper = self._bounds
+        return np.maximum(lower - q, 0.0) - np.maximum(q - upper, 0.0)
 
     def apply(self, tau: Vector, reading: ArmReading) -> None:
         """Add to joint torques `tau` [N m], shape (7,), what the walls push.

@@ -8,7 +8,11 @@ import pytest
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
 from experiments.rig.build import build_tool
-from experiments.rig.gravity import build_law_model, gravity_words, read_gravity
+from experiments.rig.law_calibrations import (
+    build_law_model,
+    gravity_words,
+    read_law_calibrations,
+)
 from experiments.settings.load import load_settings
 from tests.experiments.program import only_session, run_short, traction, write_config
 from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
@@ -58,7 +62,7 @@ def folder(tmp_path):
 
 def law(folder, foot, *, is_simulated=True):
     settings = load_settings(folder / "rig.toml")
-    text = read_gravity(settings)
+    text = read_law_calibrations(settings).gravity
     return build_law_model(settings.rig, text, foot, is_simulated=is_simulated)
 
 
@@ -117,7 +121,7 @@ def test_simulated_and_real_calibrations_do_not_mix(folder, was_simulated):
 def test_a_file_that_is_too_large_is_not_read(folder):
     (folder / "gravity.toml").write_bytes(b"#" * 1_000_001)
     with pytest.raises(SettingsError, match="cannot be read"):
-        read_gravity(load_settings(folder / "rig.toml"))
+        read_law_calibrations(load_settings(folder / "rig.toml"))
 
 
 def test_what_does_not_move_the_arm_needs_no_calibration(folder):
@@ -136,7 +140,7 @@ def test_a_model_nobody_knows_is_refused(tmp_path, model):
 
 def test_the_preflight_says_which_foot_was_corrected(folder):
     settings = load_settings(folder / "rig.toml")
-    text = read_gravity(settings)
+    text = read_law_calibrations(settings).gravity
     assert gravity_words(settings.rig, text, "tread") == (
         "calibrated 2027-01-15T08:00:00Z, rms 0.02 N m"
     )

@@ -65,14 +65,18 @@ def heavier(kg):
 class HoldBench:
     """An arm without a hand on it, in hold.
 
-    `error`: by how much rig.toml makes the foot too heavy [kg]. `sent`: the torques
-    beside gravity's [N m], cycle by cycle.
+    `error`: by how much rig.toml makes the foot too heavy [kg]. `compensation`: of
+    friction, in the law. `rubbing`: friction of the motors, given instead of drawn.
+    `late`: cycles by which torques arrive late. `sent`: the torques beside gravity's
+    [N m], cycle by cycle.
     """
 
-    def __init__(self, *, friction=0.02, error=0.0):
+    def __init__(
+        self, *, friction=0.02, error=0.0, compensation=None, rubbing=None, late=0
+    ):
         self.clock = SteppedClock()
         scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
-        options = PlantOptions(friction)
+        options = PlantOptions(friction, rubbing=rubbing)
         self.rig = FakeRig(scene, CONSTANTS, TOOL, self.clock, options)
         self.clock.attach(self.rig)
         finalize(self, self.rig.bus.shutdown)
@@ -85,15 +89,22 @@ class HoldBench:
         self.sent = []
         usual = self.arm.send
 
+        waiting = []
+
         def send(tau, tau_gravity):
-            sent = usual(tau, tau_gravity)
+            waiting.append((tau.copy(), tau_gravity))
+            sent = usual(*waiting[0])
+            if len(waiting) > late:
+                waiting.pop(0)
             self.sent.append(sent - tau_gravity)
             return sent
 
         self.arm.send = send
         kd = tuple(CONSTANTS.kd.tolist())
         walls = Walls(tuple(LIMITS.q_lower), tuple(LIMITS.q_upper), TORQUE, kd)
-        self.law = FootController(heavier(error), 0.0, walls=SoftWalls(walls))
+        self.law = FootController(
+            heavier(error), 0.0, walls=SoftWalls(walls), friction=compensation
+        )
         outputs = CycleOutputs(lambda payload: None, lambda samples: None)
         self.cycle = Cycle(self.arm, NoSensor(), self.law, NoFoot(), LIMITS, outputs)
         self.loop = Loop(self.cycle, self.clock)

@@ -1,0 +1,174 @@
+"""What floats the arm: [gravity] and [friction] of rig.toml, the files behind them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition import SettingsError
+from experiments.rig.build import LawParts, build_tool
+from experiments.settings import (
+    NOTHING,
+    RigSettings,
+    Settings,
+    check_kind,
+    read_calibration,
+)
+from wam.calibration import (
+    GravityCalibration,
+    fits_tool,
+    friction_from_toml,
+    gravity_from_toml,
+)
+from wam.control import FrictionCompensation, known_friction
+from wam.model import ArmModel, gravity_model, load_constants
+
+_INSTEAD = 'set [gravity] model = "cad" in rig.toml'
+_WITHOUT = 'set [friction] model = "none" in rig.toml'
+
+
+@dataclass(frozen=True, slots=True)
+class LawCalibrations:
+    """Texts of the calibrations in use.
+
+    Attributes:
+        gravity: of the gravity calibration; "" for none.
+        friction: of the friction calibration; "" for none.
+    """
+
+    gravity: str = ""
+    friction: str = ""
+
+    def attachments(self) -> dict[str, str]:
+        """Return the texts as files of a recording, by name."""
+        files = {"gravity.toml": self.gravity, "friction.toml": self.friction}
+        return {name: text for name, text in files.items() if text}
+
+
+def gravity_path(settings: Settings) -> Path:
+    """Return where rig.toml has its gravity calibration, from its own folder."""
+    return settings.folder / settings.rig.gravity.file
+
+
+def friction_path(settings: Settings) -> Path:
+    """Return where rig.toml has its friction calibration, from its own folder."""
+    return settings.folder / settings.rig.friction.file
+
+
+def read_law_calibrations(settings: Settings) -> LawCalibrations:
+    """Return the texts of the calibrations that rig.toml chooses.
+
+    Raises:
+        SettingsError: one cannot be read.
+    """
+    gravity = friction = ""
+    if settings.rig.gravity.model == "calibrated":
+        gravity = read_calibration(gravity_path(settings), "gravity", _INSTEAD)
+    if settings.rig.friction.model == "calibrated":
+        friction = read_calibration(friction_path(settings), "friction", _WITHOUT)
+    return LawCalibrations(gravity, friction)
+
+
+def build_law_model(
+    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool
+) -> ArmModel:
+    """Return the arm with `foot` on it as the control law weighs it.
+
+    A calibration contains the foot that was on. For another foot of rig.toml it is
+    corrected by the difference of the two. A foot or sensor whose numbers have changed
+    since is none that was fitted: which of them is wrong is not observable, so it is
+    refused.
+
+    Raises:
+        SettingsError: the calibration is none, was made with another tool, or with a
+            simulated arm for a real one or conversely.
+    """
+    constants, tool = load_constants(), build_tool(rig, foot)
+    if rig.gravity.model == "cad":
+        return ArmModel(constants, tool)
+    if rig.gravity.model == "shipped":
+        return gravity_model(constants, tool, constants.mus)
+    stored = gravity_from_toml(gravity_text, rig.gravity.file)
+    check_kind(
+        rig.gravity.file,
+        is_of_simulation=stored.is_simulated,
+        is_simulated=is_simulated,
+        instead=_INSTEAD,
+    )
+    _check_tool(rig, stored)
+    return gravity_model(constants, tool, stored.mus, stored.tool)
+
+
+def build_law(
+    rig: RigSettings, calibrations: LawCalibrations, foot: str, *, is_simulated: bool
+) -> LawParts:
+    """Return models and compensation of the control law with `foot` on the arm.
+
+    Raises:
+        SettingsError: a calibration is none, was made with another tool or gravity, or
+            with a simulated arm for a real one or conversely.
+    """
+    return LawParts(
+        ArmModel(load_constants(), build_tool(rig, foot)),
+        build_law_model(rig, calibrations.gravity, foot, is_simulated=is_simulated),
+        build_compensation(rig, calibrations.friction, is_simulated=is_simulated),
+    )
+
+
+def build_compensation(
+    rig: RigSettings, friction_text: str, *, is_simulated: bool
+) -> FrictionCompensation | None:
+    """Return what takes friction off the hand; None where rig.toml has none.
+
+    Raises:
+        SettingsError: the calibration is none, was made with another gravity, or with
+            a simulated arm for a real one or conversely.
+    """
+    section = rig.friction
+    if section.model == "none":
+        return None
+    stored = friction_from_toml(friction_text, section.file)
+    check_kind(
+        section.file,
+        is_of_simulation=stored.is_simulated,
+        is_simulated=is_simulated,
+        instead=_WITHOUT,
+    )
+    if stored.gravity != rig.gravity.model:
+        raise SettingsError(
+            f"{section.file} was measured with gravity {stored.gravity}, rig.toml has "
+            f"{rig.gravity.model}: what pulls one way would be taken for friction.",
+            hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
+        )
+    fit = stored.fit
+    known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
+    return FrictionCompensation(load_constants(), known, section.compensation)
+
+
+def friction_words(rig: RigSettings, friction_text: str) -> str:
+    """Return in words how friction is compensated."""
+    if rig.friction.model == "none":
+        return "not compensated"
+    stored = friction_from_toml(friction_text, rig.friction.file)
+    return f"calibrated {stored.measured_utc}, {rig.friction.share:.0%} taken off"
+
+
+def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
+    """Return the choice in words, for a session with `foot`."""
+    if rig.gravity.model != "calibrated":
+        return rig.gravity.model
+    stored = gravity_from_toml(gravity_text, rig.gravity.file)
+    moved = "" if stored.foot == foot else f", corrected from {stored.foot} to {foot}"
+    return f"calibrated {stored.measured_utc}, rms {stored.residual:.2f} N m{moved}"
+
+
+def _check_tool(rig: RigSettings, stored: GravityCalibration) -> None:
+    is_known = stored.foot in type(rig.feet).model_fields
+    if is_known and fits_tool(stored, build_tool(rig, stored.foot)):
+        return
+    sensor, body = stored.tool.sensor, stored.tool.foot
+    raise SettingsError(
+        f"{rig.gravity.file} was measured with another tool: foot {stored.foot} of "
+        f"{body.mass:.3f} kg at {body.com.tolist()}, sensor of {sensor.mass:.3f} kg; "
+        "rig.toml says otherwise.",
+        hint="Run traction calibrate gravity again, or set [gravity] model = "
+        f'"cad" in rig.toml. {NOTHING}',
+    )

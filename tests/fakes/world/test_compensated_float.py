@@ -1,0 +1,65 @@
+"""Friction that is compensated never makes a floating arm move by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fakes.plant.friction import draw_friction
+from fakes.plant.model import motor_weights
+from tests.fakes.scenes import CONSTANTS
+from tests.fakes.world.holding import HoldBench
+from wam.control.friction_compensation import FrictionCompensation, KnownFriction
+
+pytestmark = pytest.mark.slow
+NOTHING = np.zeros(7)
+STILL = 2e-4  # rad in a second: an encoder's counts
+KICK = 0.3  # rad/s
+
+
+def over(rubbing, factor):
+    """Return a compensation that takes the friction for so much larger."""
+    level = factor * rubbing.coulomb
+    return KnownFriction(level, level, NOTHING, NOTHING, NOTHING)
+
+
+def settled(rubbing, known, share=0.8, *, late=0, joint=1, held=False):
+    """Kick a joint of a floating arm; return its positions in the sixth second."""
+    compensation = FrictionCompensation(CONSTANTS, known, share)
+    bench = HoldBench(compensation=compensation, rubbing=rubbing, late=late)
+    if held:
+        bench.plant.hand.carry()
+    bench.throw(joint, KICK)
+    bench.run(4.9)
+    q = bench.run(1.0)
+    assert bench.cycle.status.verdict is None
+    assert compensation.swung_motor == 0
+    return q
+
+
+def whole(seed=None, presliding=1.0):
+    friction = draw_friction(CONSTANTS, 1.0, seed, np.zeros(7))
+    return replace(friction, presliding=presliding * friction.presliding)
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("late", [0, 2])
+def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
+    rubbing = whole()
+    q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=late)
+    assert np.ptp(q, axis=0)[:6].max() < STILL
+
+
+@pytest.mark.parametrize("presliding", [0.25, 0.5, 2.0, 4.0])
+@pytest.mark.parametrize("joint", [1, 3, 5])
+def test_bristles_that_are_softer_or_stiffer_leave_no_swing(joint, presliding):
+    rubbing = whole(presliding=presliding)
+    q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=2)
+    assert np.ptp(q, axis=0)[:6].max() < STILL
+
+
+@pytest.mark.parametrize("joint", [1, 3])
+def test_a_person_who_holds_the_arm_feels_no_swing(joint):
+    rubbing = whole()
+    q = settled(rubbing, over(rubbing, 1.2), joint=joint, held=True)
+    assert np.ptp(q, axis=0)[:6].max() < 5 * STILL

@@ -1,0 +1,243 @@
+"""A share of the dry friction is taken off, and never more than surely is there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition.control_loop.states import ArmState
+from acquisition.devices import ArmReading
+from fakes.plant.friction import MotorBristles, draw_friction
+from wam.control.controller import FootController
+from wam.control.friction_compensation import (
+    LARGEST_SHARE,
+    FrictionCompensation,
+    KnownFriction,
+    known_friction,
+)
+from wam.control.soft_walls import SoftWalls, Walls
+from wam.model.constants import load_constants
+from wam.model.friction import joint_coulomb
+
+CONSTANTS = load_constants()
+COUNTS = np.array(CONSTANTS.cts)
+CYCLE = 2_000_000  # ns
+POSE = np.array([0, 0.9, 0, 1.6, 0, np.pi - 2.5, 0.2])
+TRUE = draw_friction(CONSTANTS, 1.0, None, np.zeros(7))
+NOTHING = np.zeros(7)
+KNOWN = KnownFriction(TRUE.coulomb, TRUE.coulomb, NOTHING, NOTHING, NOTHING)
+
+
+def reading(number, angles, q=POSE):
+    """Return a reading of cycle `number` with the motors at `angles` [rad]."""
+    counts = np.round(np.asarray(angles) * COUNTS / (2.0 * np.pi))
+    return ArmReading(
+        host_ns=number * CYCLE,
+        arm_ns=0,
+        counts=[int(count) for count in counts],
+        q=q,
+        qd=np.zeros(7),
+        qd7_raw=0.0,
+        fresh=0x7F,
+        is_complete=True,
+        missing_cycles=0,
+    )
+
+
+def after(compensation, angles, start=0, q=POSE):
+    """Return the joint torques after a motor path, shape (n, 7)."""
+    cycles = enumerate(angles, start)
+    readings = [reading(n, row, q) for n, row in cycles]
+    return np.array([compensation.torque(each, NOTHING) for each in readings])
+
+
+def turning(joint, reach, cycles=200):
+    """Return the motors' path while one joint turns by `reach` [rad] at one speed."""
+    angles = np.zeros((cycles, 7))
+    angles[:, joint] = np.linspace(0.0, reach, cycles)
+    return angles @ CONSTANTS.j2mp.T
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_joint_that_turns_gets_its_share_in_the_sense_of_motion(joint, way):
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    tau = after(compensation, turning(joint, way * 0.3))[-1]
+    whole = joint_coulomb(CONSTANTS, TRUE.coulomb)[joint]
+    assert tau[joint] == pytest.approx(way * 0.7 * whole, rel=1e-3)
+
+
+def test_an_arm_that_never_moved_gets_nothing():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
+    assert not after(compensation, np.zeros((500, 7))).any()
+
+
+def test_one_count_to_and_fro_gets_next_to_nothing():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
+    angles = np.zeros((500, 7))
+    angles[::2] = 2.0 * np.pi / COUNTS
+    tau = np.abs(after(compensation, angles)).max(axis=0)
+    assert np.all(tau < 0.05 * joint_coulomb(CONSTANTS, TRUE.coulomb))
+
+
+def test_what_a_turned_joint_gets_stays_while_it_rests():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    angles = turning(1, 0.3)
+    moving = after(compensation, angles)[-1]
+    resting = after(compensation, np.tile(angles[-1], (500, 1)), 200)[-1]
+    assert np.allclose(resting, moving, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [-0.1, LARGEST_SHARE + 0.01, float("nan")])
+def test_shares_that_could_move_the_arm_are_refused(share):
+    with pytest.raises(ValueError, match="share"):
+        FrictionCompensation(CONSTANTS, KNOWN, share)
+
+
+def test_what_is_badly_known_is_compensated_less():
+    doubtful = replace(KNOWN, error=np.full(7, 0.5))
+    tau = after(FrictionCompensation(CONSTANTS, doubtful, 0.8), turning(1, 0.3))[-1]
+    whole = joint_coulomb(CONSTANTS, TRUE.coulomb)[1]
+    assert tau[1] * (1.0 + 0.5) <= 0.9 * whole * (1.0 + 1e-9)
+
+
+def test_the_known_part_lies_below_what_rubs_anywhere_and_either_way():
+    friction = replace(
+        TRUE,
+        asymmetry=0.1 * TRUE.coulomb,
+        ripple_sin=np.full(7, 0.05),
+        load=np.full(7, 0.03),
+        load_at=2.0 * TRUE.coulomb,
+    )
+    known = known_friction(friction, 0.02 * TRUE.coulomb, 0.02 * TRUE.coulomb)
+    angles = np.linspace(0.0, 2.0 * np.pi, 50)[:, None] * np.ones(7)
+    for sense, level in ((1.0, known.forward), (-1.0, known.backward)):
+        rubs = friction.dry(angles, friction.load_at, np.full(7, sense)).min(axis=0)
+        assert np.all(level <= rubs)
+        assert np.all(level >= 0.8 * rubs)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0, 2.0])
+def test_a_motor_that_bears_less_gets_less_as_its_friction_does(share):
+    at = np.abs(np.linalg.inv(CONSTANTS.j2mp).T @ np.array([0, 20.0, 0, 0, 0, 0, 0]))
+    friction = replace(TRUE, load=np.full(7, 0.04), load_at=at)
+    known = known_friction(friction, NOTHING, NOTHING)
+    compensation = FrictionCompensation(CONSTANTS, known, 0.7)
+    borne = np.array([0.0, share * 20.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for number, angles in enumerate(turning(1, 0.3)):
+        tau = compensation.torque(reading(number, angles), borne)
+    motors = np.linalg.inv(CONSTANTS.j2mp).T @ borne
+    rubs = friction.dry(angles, motors, np.sign(angles))
+    assert tau[1] <= 0.7 * joint_coulomb(CONSTANTS, rubs)[1] + 1e-9
+    if share <= 1.0:
+        assert tau[1] == pytest.approx(0.7 * joint_coulomb(CONSTANTS, rubs)[1])
+
+
+def test_a_friction_that_may_be_none_is_not_compensated():
+    known = known_friction(TRUE, TRUE.coulomb, NOTHING)
+    assert not known.forward.any()
+    assert not known.backward.any()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_ways_never_gain_energy_at_a_fifth_too_much(seed):
+    """Work of compensation and of true friction over ways that end where they began.
+
+    The margin is what the compensation's own bristles hold.
+    """
+    known = replace(KNOWN, forward=1.2 * TRUE.coulomb, backward=1.2 * TRUE.coulomb)
+    compensation = FrictionCompensation(CONSTANTS, known, LARGEST_SHARE)
+    random = np.random.default_rng(seed)
+    steps = random.normal(size=(3000, 7)).cumsum(axis=0)
+    steps *= random.uniform(1e-4, 1e-2) / np.abs(steps).max(axis=0)
+    way = np.concatenate((steps, steps[::-1]))
+    bristles = MotorBristles(TRUE, np.array(CONSTANTS.drive_inertia), 0.002)
+    gained, before = 0.0, np.zeros(7)
+    most = 0.0
+    for number, angles in enumerate(way):
+        turned = angles - before
+        speeds = (turned / 0.002).tolist()
+        bristles.take(speeds)
+        rubbing = np.array(bristles.torques(speeds))
+        bristles.follow(speeds)
+        tau = compensation.torque(reading(number, angles), NOTHING)
+        motors = np.linalg.solve(CONSTANTS.j2mp.T, tau)
+        gained += float((motors + rubbing) @ turned)
+        most = max(most, gained)
+        before = angles
+    held = float((0.96 * TRUE.coulomb * 4.0 * TRUE.presliding).sum())
+    assert gained <= 0.0
+    assert most <= held
+
+
+@pytest.mark.parametrize("state", [ArmState.HOLD, ArmState.DAMP, ArmState.IDLE])
+def test_leaving_float_lets_it_fade_within_a_tenth_of_a_second(foot_model, state):
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    law = FootController(foot_model, 0.0, friction=compensation)
+    law.enter(ArmState.FLOAT, reading(0, NOTHING))
+    for number, angles in enumerate(turning(1, 0.3)):
+        tau, gravity = law.torque(reading(number, angles))
+    pushed = tau - gravity
+    assert pushed[1] > 1.0
+    law.enter(state, reading(200, turning(1, 0.3)[-1]))
+    faded = [
+        law.torque(reading(number, turning(1, 0.3)[-1]))[0] - gravity
+        for number in range(200, 252)
+    ]
+    steps = np.abs(np.diff([pushed, *faded], axis=0)).max()
+    assert steps <= 0.03 * pushed.max() + 1e-9
+    assert np.abs(faded[-1]).max() < 1e-9
+
+
+def test_joint_7_is_left_to_its_lock(foot_model):
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    law = FootController(foot_model, 0.0, friction=compensation)
+    law.enter(ArmState.FLOAT, reading(0, NOTHING))
+    for number, angles in enumerate(turning(6, 0.02)):
+        tau, gravity = law.torque(reading(number, angles))
+    assert tau[6] == gravity[6]
+
+
+def test_it_ends_inside_a_soft_wall(foot_model):
+    upper = CONSTANTS.q_upper.copy()
+    upper[1] = POSE[1] + 0.05  # 50 mrad inside its wall
+    walls = Walls(
+        tuple(CONSTANTS.q_lower.tolist()),
+        tuple(upper.tolist()),
+        tuple([30.0] * 7),
+        tuple([0.0] * 7),
+    )
+    free = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), turning(1, 0.3))[-1]
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    depth = SoftWalls(walls).depth(POSE)
+    for number, angles in enumerate(turning(1, 0.3)):
+        tau = compensation.torque(reading(number, angles), NOTHING, depth)
+    assert free[1] > 1.0
+    assert tau[1] == 0.0
+
+
+def test_a_motor_that_swings_as_no_hand_does_ends_it_for_good():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
+    cycles = np.arange(1000)
+    angles = np.zeros((1000, 7))
+    angles[:, 0] = 0.02 * np.array(CONSTANTS.j2mp)[0, 0] * np.sin(cycles * 0.1)  # 8 Hz
+    after(compensation, angles)
+    assert compensation.swung_motor == 1
+    assert not after(compensation, turning(1, 0.3), 2000)[-1].any()
+
+
+def test_a_hand_that_shakes_the_arm_twice_a_second_does_not_end_it():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.8)
+    cycles = np.arange(2500)
+    angles = np.zeros((2500, 7))
+    angles[:, 0] = 0.2 * np.array(CONSTANTS.j2mp)[0, 0] * np.sin(cycles * 0.0251)
+    after(compensation, angles)
+    assert compensation.swung_motor == 0
+
+
+def test_a_motor_that_does_not_answer_goes_no_step():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    angles = turning(1, 0.3)
+    before = after(compensation, angles)[-1]
+    silent = after(compensation, np.tile(angles[-1], (5, 1)), 200)[-1]
+    assert np.allclose(silent, before)
