@@ -105,7 +105,7 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     guide = GravityGuide(console_loop)
     result = guide.run(args.poses, args.chosen, is_forced=args.force)
     write_new_text(out, gravity_to_toml(result))
-    _say_use(console_loop, out, '[gravity] model = "calibrated"', "rig.toml")
+    _say_use(console_loop, out, _section("gravity", out), "rig.toml")
 
 
 def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
@@ -117,7 +117,7 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
     rig = console_loop.rig
     result = FrictionGuide(console_loop).run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
-    _say_use(console_loop, out, '[friction] model = "calibrated"', "rig.toml")
+    _say_use(console_loop, out, _section("friction", out), "rig.toml")
     if rig.simulation is None:
         return
     true = friction_of(rig.simulation.friction())
@@ -172,6 +172,10 @@ def _terrain(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
     write_new_text(out, terrain_to_toml(rig.row.name, fit.frame, fields))
     line = f'calibration = "{out.name}" in the row of {rig.row.name}'
     _say_use(console_loop, out, line, "matrix.toml")
+
+
+def _section(name: str, out: Path) -> str:
+    return f'[{name}] model = "calibrated", file = "{out.name}"'
 
 
 def _say_use(console_loop: ConsoleLoop, out: Path, line: str, file: str) -> None:

@@ -29,14 +29,7 @@ from experiments.preflight.host_checks import (
     reach_words,
 )
 from experiments.preflight.page import Add, CheckResult, ChecksPage
-from experiments.rig import (
-    EXCHANGE_CYCLES,
-    FakeOptions,
-    Rig,
-    build_rig,
-    friction_words,
-    gravity_words,
-)
+from experiments.rig import EXCHANGE_CYCLES, FakeOptions, Rig, build_rig, law_words
 from experiments.settings import RigSettings, Settings, TerrainRow
 from wam.driver import (
     HOME_LIMIT,
@@ -127,10 +120,8 @@ def run_preflight(
 def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> None:
     """Grade what needs no device."""
     settings = rig.settings.rig
-    weight = gravity_words(settings, rig.calibrations.gravity, rig.row.foot)
-    rubbing = friction_words(settings, rig.calibrations.friction)
-    words = f"{rig.settings.origin}, {rig.row.name}, gravity {weight}"
-    page.add(GOOD, "config", f"{words}, friction {rubbing}")
+    law = law_words(settings, rig.calibrations, rig.row.foot)
+    page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, {law}")
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:
         page.add_result(check_governor())

@@ -5,9 +5,8 @@ from .fake import ServedArm, build_sensor_server, build_server
 from .law_calibrations import (
     LawCalibrations,
     friction_path,
-    friction_words,
     gravity_path,
-    gravity_words,
+    law_words,
     read_law_calibrations,
 )
 from .processes import MultiProcessBackend
@@ -27,9 +26,8 @@ __all__ = [
     "build_server",
     "build_tool",
     "friction_path",
-    "friction_words",
     "gravity_path",
-    "gravity_words",
+    "law_words",
     "logging_bus",
     "open_bus_log",
     "read_law_calibrations",

@@ -143,16 +143,18 @@ def build_compensation(
     return FrictionCompensation(load_constants(), known, section.compensation)
 
 
-def friction_words(rig: RigSettings, friction_text: str) -> str:
-    """Return in words how friction is compensated."""
+def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str:
+    """Return the choices in words, for a session with `foot`."""
+    weight = f"gravity {gravity_words(rig, calibrations.gravity, foot)}"
     if rig.friction.model == "none":
-        return "not compensated"
-    stored = friction_from_toml(friction_text, rig.friction.file)
-    return f"calibrated {stored.measured_utc}, {rig.friction.share:.0%} taken off"
+        return f"{weight}, friction not compensated"
+    stored = friction_from_toml(calibrations.friction, rig.friction.file)
+    share = f"{rig.friction.share:.0%} taken off"
+    return f"{weight}, friction calibrated {stored.measured_utc}, {share}"
 
 
 def gravity_words(rig: RigSettings, gravity_text: str, foot: str) -> str:
-    """Return the choice in words, for a session with `foot`."""
+    """Return how the arm is weighed in words, for a session with `foot`."""
     if rig.gravity.model != "calibrated":
         return rig.gravity.model
     stored = gravity_from_toml(gravity_text, rig.gravity.file)

@@ -82,7 +82,7 @@ class GravitySection(SettingsSection):
     file: File = Field(default="gravity.toml", examples=["gravity.toml"])
 
 
-class FrictionSection(SettingsSection):
+class FrictionSettings(SettingsSection):
     """Which dry friction of the drives is taken off the hand while the arm floats.
 
     Attributes:
@@ -202,7 +202,7 @@ class RigSettings(SettingsSection):
     control: ControlSection
     limits: LimitSection
     gravity: GravitySection = GravitySection(model="cad")
-    friction: FrictionSection = FrictionSection()
+    friction: FrictionSettings = FrictionSettings()
     loop: LoopSection = LoopSection()
     operator: OperatorSection = OperatorSection()
     safety: SafetySection = _POWER_UP

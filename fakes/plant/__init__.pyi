@@ -1,5 +1,6 @@
 # pyright: reportUnknownVariableType=false
-from .plant import ArmPlant, PlantOptions
+from .model import PlantOptions
+from .plant import ArmPlant
 from .push import PACES, Pace
 
 __all__ = [

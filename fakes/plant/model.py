@@ -1,6 +1,8 @@
 # pyright: basic, reportMissingImports=false
 """The body that the simulated arm is: links, sensor, foot and a person's forearm."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 
@@ -8,6 +10,7 @@ from ft_sensor import TerrainFrame
 from wam.model import (
     ArmConstants,
     Array,
+    MotorFriction,
     Tool,
     add_point,
     build_pinocchio,
@@ -16,6 +19,26 @@ from wam.model import (
 
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
+
+
+@dataclass(frozen=True, slots=True)
+class PlantOptions:
+    """How the simulated arm differs from an ideal one.
+
+    Attributes:
+        friction: share of the joint friction identified on another arm (1 = all of
+            it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
+        substeps: steps per 2 ms cycle.
+        seed: draws the parameters of friction; None = the nominal ones.
+        rubbing: friction of the motors, given instead of drawn; None = drawn.
+        has_hand: a person holds the arm by its forearm, from the beginning.
+    """
+
+    friction: float = 0.02
+    substeps: int = 4
+    seed: int | None = None
+    rubbing: MotorFriction | None = None
+    has_hand: bool = True
 
 
 def arm_and_hand(

@@ -15,7 +15,6 @@ Jacobians, D unless a motor is fast, and the force of the hand, of 10 Hz at most
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import floor
 
 import numpy as np
@@ -29,6 +28,7 @@ from fakes.plant.hand import Hand
 from fakes.plant.joints import JointDrives, JointLoads, JointState
 from fakes.plant.model import (
     FOREARM_MASS,
+    PlantOptions,
     arm_and_hand,
     motor_inertia,
     motor_weights,
@@ -36,33 +36,13 @@ from fakes.plant.model import (
 from fakes.plant.push import HandView
 from fakes.truth import Truth
 from ft_sensor import TerrainFrame
-from wam.model import GRAVITY, ArmConstants, Array, MotorFriction, Tool
+from wam.model import GRAVITY, ArmConstants, Array, Tool
 
 _AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 _GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
 _NO_GRIP = (0.0, 0.0)
 _NOTHING = (0.0,) * 6
 _NO_TORQUE = (0.0,) * 7
-
-
-@dataclass(frozen=True, slots=True)
-class PlantOptions:
-    """How the simulated arm differs from an ideal one.
-
-    Attributes:
-        friction: share of the joint friction identified on another arm (1 = all of
-            it). A real arm's is unknown; with more than 0.1 hardly a slip bounces.
-        substeps: steps per 2 ms cycle.
-        seed: draws the parameters of friction; None = the nominal ones.
-        rubbing: friction of the motors, given instead of drawn; None = drawn.
-        has_hand: a person holds the arm by its forearm, from the beginning.
-    """
-
-    friction: float = 0.02
-    substeps: int = 4
-    seed: int | None = None
-    rubbing: MotorFriction | None = None
-    has_hand: bool = True
 
 
 class ArmPlant:

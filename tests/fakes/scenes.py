@@ -3,7 +3,8 @@
 import numpy as np
 
 from fakes.clock import SteppedClock
-from fakes.plant.plant import ArmPlant, PlantOptions
+from fakes.plant.model import PlantOptions
+from fakes.plant.plant import ArmPlant
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
 from wam.model.arm_model import ArmModel

@@ -10,7 +10,7 @@ import pytest
 import fakes.world
 from acquisition.devices import SafetyMode
 from experiments.operator.prompts import AutoOperator, Prompt
-from fakes.plant.plant import PlantOptions
+from fakes.plant.model import PlantOptions
 from tests.experiments.program import traction
 from wam.calibration import excitation
 from wam.calibration.friction_fit import joint_breakaway, speed_curve

@@ -12,7 +12,8 @@ from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run import pose_walk as walk
-from fakes.plant.plant import ArmPlant, PlantOptions
+from fakes.plant.model import PlantOptions
+from fakes.plant.plant import ArmPlant
 from tests.experiments.program import traction, write_config
 from wam.calibration import poses as calibration_poses
 from wam.calibration.gravity_file import gravity_from_toml

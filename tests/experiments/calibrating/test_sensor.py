@@ -16,7 +16,7 @@ from experiments.run import pose_walk as walk
 from experiments.settings.calibrations import with_calibrations
 from experiments.settings.load import load_settings
 from fakes.plant import hand
-from fakes.plant.plant import PlantOptions
+from fakes.plant.model import PlantOptions
 from fakes.sensor.errors import FORCE_ERRORS as FORCE
 from fakes.sensor.errors import TORQUE_ERRORS as TORQUE
 from fakes.sensor.errors import SensorErrors

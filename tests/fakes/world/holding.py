@@ -10,7 +10,7 @@ from acquisition.control_loop.guard import GuardLimits
 from acquisition.control_loop.loop import Loop
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
-from fakes.plant.plant import PlantOptions
+from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene
 from tests.fakes.scenes import CONSTANTS, FRAME, START_Q, TOOL
 from wam.bus.doors import PythonCanDoor

@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.control_loop.states import ArmState
 from fakes.clock import SteppedClock
-from fakes.plant.plant import PlantOptions
+from fakes.plant.model import PlantOptions
 from fakes.world.rig import FakeRig, SimulatedScene, solve_start
 from ft_sensor.payload import TerrainFrame
 from wam.bus.doors import PythonCanDoor

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fakes.plant.friction import draw_friction
-from fakes.plant.model import motor_weights
 from tests.fakes.scenes import CONSTANTS
 from tests.fakes.world.holding import HoldBench
 from wam.control.friction_compensation import FrictionCompensation, KnownFriction

@@ -7,7 +7,7 @@ from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from experiments import arguments
 from fakes.plant.hand import HandPhase
-from fakes.plant.plant import PlantOptions
+from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
