@@ -195,8 +195,10 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             publish(samples, shared.wrenches)
 
     def metadata() -> dict[str, str]:
-        arm = parts.arm
+        arm, compensation = parts.arm, parts.law.compensation
+        rubbing = {} if compensation is None else compensation.metadata()
         return {
+            **rubbing,
             **health_metadata(arm.health(), parts.clock.now_ns()),
             **arm.counters.metadata(),
             "link": arm.counters.text(),

@@ -1,6 +1,6 @@
 """One trial on the loop: started, followed, ended, sealed, and what it is worth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from acquisition.trial_file import TrialHeader
 from experiments.fault_injection import FaultTrigger
 from experiments.messages import CATALOGUE, FaultContext
 from experiments.operator import (
+    WARNING,
     FeedbackSignal,
     Prompt,
     RecordingView,
@@ -23,6 +24,7 @@ from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import Event, TrialName, TrialOutcome
 from experiments.trial import EndDetector, PaceMonitor, review_trial, trial_header
+from wam.control import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
@@ -166,7 +168,11 @@ def _end(
     archive, recorder = context.archive, context.rig.backend.recorder
     context.loop_client.watch_trial(is_recording=False)
     context.loop_client.advance(TICK)  # the newest metadata is written down
-    recorder.event(20, "link", context.loop_client.device_metadata().get("link", ""))
+    devices = context.loop_client.device_metadata()
+    recorder.event(20, "link", devices.get("link", ""))
+    rubbing = _friction_lines(devices)
+    for line in rubbing:
+        recorder.event(30, "friction", line)
     recorder.event(20, "stop", outcome.reason)
     try:
         verified = context.console_loop.run_aside(
@@ -186,7 +192,8 @@ def _end(
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
         review = context.console_loop.run_aside(lambda: review_trial(path))
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
-        context.say_page([written, *lines])
+        warnings = [f" {WARNING} {line}" for line in rubbing]
+        context.say_page([written, *lines, *warnings])
         archive.write_sidecar(name, verified, outcome, review)
         return
     context.say(written)
@@ -194,6 +201,17 @@ def _end(
     context.say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
     if outcome.reason != "interrupted":
         context.say(archive.flight(header, name, outcome.reason))
+
+
+def _friction_lines(devices: Mapping[str, str]) -> list[str]:
+    """Return what to say of a compensation of friction that has ended itself."""
+    motor = devices.get(SWUNG_MOTOR, "0")
+    if motor == "0":
+        return []
+    return [
+        f"motor {motor} swung by itself: its friction is not as calibrated, nothing is "
+        "compensated any more. Run: traction calibrate friction"
+    ]
 
 
 def _lost(

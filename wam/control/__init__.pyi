@@ -1,6 +1,7 @@
 from .controller import FootController
 from .friction_compensation import (
     LARGEST_SHARE,
+    SWUNG_MOTOR,
     FrictionCompensation,
     KnownFriction,
     known_friction,
@@ -11,6 +12,7 @@ from .soft_walls import SoftWalls, Walls
 
 __all__ = [
     "LARGEST_SHARE",
+    "SWUNG_MOTOR",
     "TOP_SPEED",
     "FootController",
     "FrictionCompensation",

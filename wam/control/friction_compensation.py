@@ -20,6 +20,7 @@ from acquisition import ArmReading
 from wam.model import ArmConstants, Array, MotorFriction, motor_turns, plastic_share
 
 LARGEST_SHARE = 0.8
+SWUNG_MOTOR = "friction:swung_motor"  # in the recording
 SHARE = 0.7
 _MARGIN = 0.9  # of what surely rubs: share (1 + error) never exceeds it
 _SIGMAS = 1.96
@@ -107,6 +108,10 @@ class FrictionCompensation:
         self._fading = np.zeros(7)
         self._rested_ns = -_FADE_NS
         self._begin([])
+
+    def metadata(self) -> dict[str, str]:
+        """Return for the recording which motor ended the compensation, "0" = none."""
+        return {SWUNG_MOTOR: str(self.swung_motor)}
 
     def rest(self, now_ns: int) -> None:
         """Stop compensating; what is pushed fades within a tenth of a second."""
