@@ -31,6 +31,7 @@ _WARM = (
     "experiments.rig.processes",
     "experiments.run.session",
     "experiments.trial.quality",
+    "analysis.data",
     "scipy.signal",
     "fakes.serving.puck_server",
 )
@@ -51,6 +52,7 @@ _SYMBOLS = (
     "setup_boot_APIC_clock",
 )
 _PAUSE = 0.2  # s
+_OVER = 5.0  # s, in which what a failed scenario left behind lets go of the bus
 _LONGEST_OUTPUT = 8000  # characters of a failed scenario, its end
 
 
@@ -96,6 +98,8 @@ def _result(scenario: Scenario, *, is_echoed: bool) -> ScenarioResult:
         reason = str(error)
     except Exception:  # a defect of the scenario is a failure of its own
         reason = traceback.format_exc()
+    if reason:
+        wait(_OVER)
     verdict = Verdict.FAILED if reason else Verdict.PASSED
     if scenario.expected:
         verdict = Verdict.EXPECTED if reason else Verdict.SURPRISING

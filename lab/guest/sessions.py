@@ -11,6 +11,7 @@ from lab.guest.machine_room import MachineRoom
 
 _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
+_REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the host
 _REACTION = 0.3  # s from a prompt to the key
 _REST = 0.7  # s in which the foot comes to rest on the ground
 _PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
@@ -68,7 +69,7 @@ class LedSession:
     def review(self) -> None:
         """End the trial, wait until it is on the disk and to be judged."""
         self._press(" ")
-        self.program.expect("written and verified", _STEP)
+        self.program.expect("written and verified", _REVIEW)
         self.program.expect("[k]eep", _STEP)
         self.hand("rest")
 

@@ -177,7 +177,7 @@ def arrive(scene, phase):
             return set(NAMES.values()) <= set(children_of(seen.process.pid))
         return scene.marker.exists()
 
-    if not until(is_there, 60):
+    if not seen.arrives(is_there, 60):
         assert seen.has_stalled(), seen.output()
         return False
     children = children_of(seen.process.pid)

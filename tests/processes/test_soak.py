@@ -1,4 +1,4 @@
-"""Two minutes of the loop with its recorder: nothing is lost and nothing grows."""
+"""Minutes of the loop with its recorder: nothing is lost and nothing grows."""
 
 import json
 import subprocess
@@ -8,26 +8,26 @@ import pytest
 
 from tests.processes.watching import ROOT, START, children_of
 
-pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(240)]
-SECONDS = 120
+pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(700)]
 GROWTH_KB = 1024  # per process, second half of the time
 
 
-def test_two_minutes_lose_nothing_and_memory_stays(tmp_path):
+@pytest.mark.parametrize("seconds", [60, pytest.param(600, marks=pytest.mark.long)])
+def test_nothing_is_lost_and_memory_stays(tmp_path, seconds):
     command = [sys.executable, "-c", START, "bench", "--fake", "--json"]
     done = subprocess.run(
-        [*command, "--seconds", str(SECONDS)],
+        [*command, "--seconds", str(seconds)],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=False,
-        timeout=200,
+        timeout=seconds + 80,
     )
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     assert report["lost"] == 0
     # stalls of the machine may cost cycles, never more than one in a hundred
-    assert report["recorded"] >= 0.99 * SECONDS * 500
+    assert report["recorded"] >= 0.99 * seconds * 500
     assert report["is_powered"]
     for use in report["processes"]:
         assert use["growth_kb"] <= GROWTH_KB, use

@@ -92,13 +92,19 @@ class Session:
 
     def wait_for_trial(self):
         """Return when a trial is being recorded; False if the machine is too slow."""
-        if not until(self._is_recording, 40):
+        if not self.arrives(self._is_recording, 40):
             assert self.has_stalled(), self.output()
             return False
         children = children_of(self.process.pid)
         self.pids = {name: children[short] for name, short in NAMES.items()}
         self.attach()
         return True
+
+    def arrives(self, is_there, seconds):
+        """Wait until `is_there()` is true, not long when the machine stood still."""
+        if until(lambda: is_there() or self.has_stalled(), seconds) and is_there():
+            return True
+        return until(is_there, 5) is not None
 
     def attach(self):
         """Look at the memory that the processes share."""
