@@ -19,10 +19,11 @@ from wam.calibration import (
     gravity_from_toml,
 )
 from wam.control import FrictionCompensation, known_friction
-from wam.model import ArmModel, gravity_model, load_constants
+from wam.model import ArmModel, Array, gravity_model, joint_coulomb, load_constants
 
 _INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 _WITHOUT = 'set [friction] model = "none" in rig.toml'
+_LARGEST = 2.5  # of what was identified on another arm
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +139,22 @@ def build_compensation(
             f"{rig.gravity.model}: what pulls one way would be taken for friction.",
             hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
         )
-    fit = stored.fit
+    constants, fit = load_constants(), stored.fit
+    _check_size(section.file, joint_coulomb(constants, fit.friction.coulomb))
     known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
-    return FrictionCompensation(load_constants(), known, section.compensation)
+    return FrictionCompensation(constants, known, section.compensation)
+
+
+def _check_size(name: str, coulomb: Array) -> None:
+    """Refuse friction that no arm of this kind has: it would drive the arm."""
+    most = _LARGEST * load_constants().coulomb
+    for joint, (torque, limit) in enumerate(zip(coulomb, most, strict=True), 1):
+        if torque > limit:
+            raise SettingsError(
+                f"{name} says that {torque:.2f} N m rub at joint {joint}, more than "
+                f"{limit:.2f} N m.",
+                hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
+            )
 
 
 def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str:

@@ -14,6 +14,7 @@ from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
+from experiments.rig.law_calibrations import build_compensation
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import open_journal
@@ -22,6 +23,7 @@ from experiments.session.matrix_board import count_board
 from experiments.session.store import list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.load import load_settings
+from experiments.settings.rig import FrictionSettings
 from experiments.tools.pendant import read_script
 from ft_sensor.calibration.files import payload_from_toml, terrain_from_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml
@@ -93,6 +95,12 @@ def _settings(name: str) -> Callable[[bytes, Path], None]:
 def _text(parse: Callable[[str], object]) -> Callable[[bytes, Path], None]:
     """Return a reader of a text that another file holds or that was read as UTF-8."""
     return lambda data, _: parse(data.decode(errors="replace"))
+
+
+def _compensate(text: str) -> None:
+    used = FrictionSettings(model="calibrated")
+    rig = load_settings(None).rig.model_copy(update={"friction": used})
+    build_compensation(rig, text, is_simulated=True)
 
 
 def _table(name: str) -> Callable[[bytes, Path], None]:
@@ -194,6 +202,7 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "rig": _settings("rig.toml"),
     "matrix": _settings("matrix.toml"),
     "gravity": _text(lambda text: gravity_from_toml(text, "gravity.toml")),
+    "friction": _text(_compensate),
     "foot": _text(payload_from_toml),
     "terrain": _text(terrain_from_toml),
     "sensor-calibration": _text(lambda text: sensor_from_toml(text, "sensor.toml")),

@@ -8,6 +8,7 @@ from importlib import resources
 import numpy as np
 
 from analysis.terrains.database import FORMAT, VERSION
+from fakes.plant.friction import draw_friction
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit
@@ -16,8 +17,10 @@ from ft_sensor.payload import TerrainFrame, payload_of
 from tests.corpus.readers import RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
+from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
+from wam.calibration.friction_fit import FrictionFit
 from wam.calibration.gravity_file import GravityCalibration, gravity_to_toml
-from wam.model.constants import Body
+from wam.model.constants import Body, load_constants
 from wam.model.tool import Tool
 
 _TOOL = Tool(
@@ -68,6 +71,15 @@ def _gravity() -> str:
         torques=rng.normal(size=(10, 7)),
     )
     return gravity_to_toml(found)
+
+
+def _friction() -> str:
+    constants = load_constants()
+    friction = draw_friction(constants, 0.4, None, np.zeros(7))
+    little = 0.01 * friction.coulomb
+    fit = FrictionFit(friction, little, little, np.full(7, 0.02), (100,) * 7)
+    found = FrictionCalibration(fit, "tread", "cad", _UTC, is_simulated=True)
+    return friction_to_toml(found, constants)
 
 
 def _sensor_calibration() -> str:
@@ -129,6 +141,7 @@ def samples() -> dict[str, bytes]:
         "arm-model": (resources.files("wam.data") / "wam7.toml").read_text(),
         "matrix": (shipped / "matrix.toml").read_text(),
         "gravity": _gravity(),
+        "friction": _friction(),
         "foot": payload_to_toml(payload, _TOOL.sole),
         "terrain": terrain_to_toml("S10", frame, {"measured": _UTC}),
         "sensor-calibration": _sensor_calibration(),

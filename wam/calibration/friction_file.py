@@ -107,12 +107,15 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
 
 def _fit(motors: dict[str, Any], quality: dict[str, Any]) -> FrictionFit:
     friction = friction_of(motors)
-    rows = _seven(quality["rows"])
+    names = ("deviation", "asymmetry_deviation", "residual", "rows")
+    deviation, asymmetry, residual, rows = (_seven(quality[name]) for name in names)
+    if min(float(column.min()) for column in (deviation, asymmetry)) < 0.0:
+        raise ValueError("a deviation is below 0")
     return FrictionFit(
         friction=friction,
-        deviation=_seven(quality["deviation"]),
-        asymmetry_deviation=_seven(quality["asymmetry_deviation"]),
-        residual=_seven(quality["residual"]),
+        deviation=deviation,
+        asymmetry_deviation=asymmetry,
+        residual=residual,
         rows=tuple(int(count) for count in rows.tolist()),
     )
 
