@@ -765,6 +765,67 @@ ROWS: dict[str, dict[str, Fields]] = {
             (_ARM + "test_positions_are_defined_while_speed_faults_are_ignored",),
         ),
     },
+    "friction calibration": {
+        "lost": (
+            "dry friction is not compensated",
+            "file not there",
+            "settings",
+            "refused",
+            (),
+            "nothing is started",
+            (
+                "tests/experiments/rig/test_friction_compensation.py::test_a_missing_calibration_names_the_command_that_makes_it",
+            ),
+        ),
+        "stuck": (
+            "friction of the arm before",
+            "cables renewed, calibration not",
+            "a motor that swings to and fro six times a second: its friction is smaller than what is compensated",
+            "compensation ends for the session, told at the review",
+            (),
+            "1.2 times the friction at the largest share leaves no swing",
+            (
+                "tests/wam/control/test_friction_compensation.py::test_a_motor_that_swings_as_no_hand_does_ends_it_for_good",
+                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+            ),
+        ),
+        "drifting": (
+            "more is compensated than rubs",
+            "warm or worn drives",
+            "none; the share is 0.8 at most, of the lower end of what was found",
+            "none needed up to a fifth",
+            (),
+            "no energy gained on any closed way at 1.2 times the friction",
+            (
+                "tests/wam/control/test_friction_compensation.py::test_random_ways_never_gain_energy_at_a_fifth_too_much",
+                "tests/wam/control/test_friction_compensation.py::test_what_is_badly_known_is_compensated_less",
+            ),
+        ),
+        "implausible": (
+            "the arm moves by itself",
+            "another arm's file, a file edited by hand",
+            "no more than 2.5 times the friction of another arm at any joint; the same gravity; simulated or real as the arm is",
+            "refused",
+            (),
+            "nothing is started",
+            (
+                "tests/experiments/rig/test_friction_compensation.py::test_friction_that_no_arm_has_is_refused_with_its_joint",
+                "tests/experiments/rig/test_friction_compensation.py::test_a_calibration_of_the_simulated_arm_is_refused_on_a_real_one",
+                "tests/experiments/rig/test_friction_compensation.py::test_one_made_with_another_gravity_is_refused",
+            ),
+        ),
+        "late": (
+            "compensation lags behind the motion",
+            "torques two cycles late",
+            "none needed: it follows positions, not speeds",
+            "none",
+            (),
+            "no swing with 4 ms more",
+            (
+                "tests/fakes/world/test_compensated_float.py::test_an_overestimate_of_a_fifth_leaves_no_swing",
+            ),
+        ),
+    },
     "tool model": {
         "lost": (
             "no weight is compensated",

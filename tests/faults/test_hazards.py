@@ -24,6 +24,7 @@ SIGNALS = {
     "second command",
     "serial line",
     "zero",
+    "friction calibration",
     "tool model",
     "wall clock",
 }
