@@ -3,7 +3,7 @@ from .censored import Family
 from .fitting import BreakAwayOptions, fit_break_away
 from .model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 from .pushes import V_SLIP, FootPush, find_pushes
-from .survival import SurvivalCurve, kaplan_meier, pit_distance
+from .survival import SurvivalCurve, kaplan_meier, pit_distance, pit_limit
 
 __all__ = [
     "BREAK_AWAY",
@@ -21,4 +21,5 @@ __all__ = [
     "fit_break_away",
     "kaplan_meier",
     "pit_distance",
+    "pit_limit",
 ]

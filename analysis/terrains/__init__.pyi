@@ -1,5 +1,5 @@
-from .database import load
-from .export import database_of
+from .database import TerrainDatabase, load
+from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .recognition import Recognition, recognise
 from .table import SlipRisk, TractionEstimate, TractionEstimates
@@ -10,8 +10,10 @@ __all__ = [
     "Identification",
     "Recognition",
     "SlipRisk",
+    "TerrainDatabase",
     "TractionEstimate",
     "TractionEstimates",
+    "break_away_of",
     "database_of",
     "identify_study",
     "load",

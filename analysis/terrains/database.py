@@ -7,6 +7,7 @@ A JSON object, nothing that is executed:
     terrains NAME: kind, trials, samples, rho (correlation of neighbouring residuals),
         limits {window: mean strain that 99 % of its own windows stay below},
         models MODEL: title, parameters, mean [N] and sd [N], one row per F_n
+        break_away: a `BreakAwayModel` where there is one
 
 Between the points of a table values are linear; outside of it they are those of its
 edge. `load` checks everything before it believes it.
@@ -23,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError
+from analysis.breakaway import BreakAwayModel, BreakAwayRisk
 from analysis.data import Array
 from analysis.study import Prediction
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
@@ -48,6 +50,7 @@ class KnownTerrain:
         tables: by name of the model.
         parameters: of every model, as fitted.
         default: name of the model that answers.
+        break_away: the force before it slips from rest; None where it is not known.
     """
 
     name: str
@@ -59,6 +62,7 @@ class KnownTerrain:
     tables: Mapping[str, Table]
     parameters: Mapping[str, Any]
     default: str
+    break_away: BreakAwayModel | None = None
 
     def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
         """Return the traction to expect.
@@ -93,13 +97,33 @@ class KnownTerrain:
         """Return the default model's answer as a model of the study gives it."""
         return self._table("").over(F_n, v_t)
 
-    def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
-        """Return the probability that less than `required` [N] of traction is there.
+    def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:
+        """Return `BreakAwayModel.slip_risk`: of a push from rest at a load F_n [N].
 
-        What a walking controller asks before it puts its weight on: at a load F_n [N],
-        is the traction that the step needs available? Velocities below the slowest one
-        that was measured count as that. A load or velocity outside the table is marked
-        by `is_extrapolated` of the answer.
+        Raises:
+            SettingsError: a value is negative or no finite number, or it is not known.
+        """
+        return self.from_rest.slip_risk(required, F_n)
+
+    @property
+    def from_rest(self) -> BreakAwayModel:
+        """What it gives before it slips.
+
+        Raises:
+            SettingsError: it is not known.
+        """
+        if self.break_away is None:
+            raise SettingsError(
+                f"{self.name}: the force before it slips from rest is not known.",
+                hint="Record three trials or more; risk_in_motion answers for sliding.",
+            )
+        return self.break_away
+
+    def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
+        """Return the probability that a sliding foot meets less than `required` [N].
+
+        Velocities below the slowest one that was measured count as that. A load or
+        velocity outside the table is marked by `is_extrapolated` of the answer.
 
         Raises:
             SettingsError: a value is no finite number.
@@ -231,6 +255,9 @@ def _terrain(
         tables=tables,
         parameters={str(key): model["parameters"] for key, model in models.items()},
         default=default,
+        break_away=BreakAwayModel.from_dict(content["break_away"])
+        if "break_away" in content
+        else None,
     )
 
 

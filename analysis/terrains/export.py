@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError, TractionError
+from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_break_away
 from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
 from analysis.study import (
     GP_SE,
@@ -100,7 +101,7 @@ def database_of(
     """
     axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
-    models = study.options.fit.models
+    models, from_rest = study.options.fit.models, break_away_of(study)
     default = GP_SE if GP_SE in models else models[0]
     content = {
         "format": FORMAT,
@@ -114,6 +115,7 @@ def database_of(
             task.terrain: {
                 "kind": study.kinds[task.terrain],
                 **_record(task, identification),
+                **_from_rest(from_rest.get(task.terrain)),
                 "models": fitted,
             }
             for task, fitted in zip(tasks, tables, strict=True)
@@ -121,6 +123,17 @@ def database_of(
         },
     }
     return json.dumps(content, default=str)
+
+
+def break_away_of(study: Study) -> dict[str, BreakAwayModel]:
+    """Return the break-away model of every terrain of a study that has one."""
+    trials = {name: result.trials for name, result in study.terrains.items()}
+    options = BreakAwayOptions(seed=study.options.fit.seed)
+    return fit_break_away(trials, study.kinds, options)
+
+
+def _from_rest(model: BreakAwayModel | None) -> dict[str, Any]:
+    return {} if model is None else {"break_away": model.to_dict()}
 
 
 def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
