@@ -225,13 +225,14 @@ def _fit_sliding(
     sums = np.array([_sums(F_n, F_t) for F_n, F_t in slow if F_n.size])
     if len(sums) < LEAST_TRIALS:
         return None
+    law = PushLaw(*_line(sums).tolist())
     rng = _random([recorded.name], options)
     picks = rng.integers(len(sums), size=(options.draws, len(sums)))
     draws = np.array([_line(sums[pick]) for pick in picks]).reshape(-1, 4)
     return BreakAwayModel(
         kind=SLIDING,
         family=Family.LOGNORMAL,
-        law=PushLaw(*_line(sums).tolist()),
+        law=law,
         draws=draws,
         v_slip=options.v_slip,
         slips=recorded.slips,
@@ -239,6 +240,7 @@ def _fit_sliding(
         trials=len(sums),
         loads=_spanned(np.concatenate([F_n for F_n, _ in slow])),
         forces=_spanned(np.concatenate([F_t for _, F_t in slow])),
+        is_trial_seen=law.trial_sd > 0.0,
     )
 
 

@@ -33,7 +33,7 @@ def draw_available(results: StudyResults) -> Figure | None:
             )
         _draw_interval(ax, found)
         _name(ax, found)
-    axes[0].set_ylim(bottom=0.0)
+    axes[0].set_ylim(0.0, 1.15 * max(float(found.forces[-1]) for found in shown))
     axes[0].set_xlim(left=0.0)
     figure.supxlabel(LOAD_LABEL, fontsize=8)
     figure.supylabel("traction force from rest [N]", fontsize=8)
@@ -79,7 +79,8 @@ def draw_risk(results: StudyResults) -> Figure | None:
             label="model, mean over the loads",
         )
         _name(ax, found)
-    axes[0].set_ylim(0.0, 1.02)
+    axes[0].set_ylim(0.0, 1.25)  # room for the words
+    axes[0].set_yticks(np.linspace(0.0, 1.0, 6))
     axes[0].set_xlim(left=0.0)
     figure.supxlabel("traction force asked for [N]", fontsize=8)
     figure.supylabel("probability of a slip before it", fontsize=8)
@@ -147,11 +148,11 @@ def _draw_survival(ax: Axes, found: TerrainBreakAway) -> None:
 def _name(ax: Axes, found: TerrainBreakAway) -> None:
     ax.set_title(plain(found.title), loc="left")
     ax.text(
-        0.97,
         0.03,
-        f"{found.model.kind}, {found.model.slips} slipped, {found.model.held} held",
+        0.97,
+        f"{found.model.kind}\n{found.model.slips} slipped, {found.model.held} held",
         transform=ax.transAxes,
-        ha="right",
+        va="top",
         fontsize=6,
     )
 

@@ -1,5 +1,6 @@
 """Tables of what terrains give and of how they are told apart."""
 
+from analysis.breakaway import SLIDING
 from analysis.data import LEVELS
 from analysis.figures import ReportSection
 from analysis.findings import RISKS, StudyResults, TerrainBreakAway
@@ -36,7 +37,8 @@ def break_away_table(results: StudyResults) -> ReportTable:
         "motion: the force at the slowest velocity of the window is below it with that "
         "probability, by GP-SE. F_n: median of the pushes. Distance: of the model from "
         "Kaplan and Meier's curve, and what chance exceeds in 5 %. The effect of the "
-        "trial is the standard deviation of log force between trials.",
+        "trial is the standard deviation of log force between trials, of force where "
+        "sliding.",
         section=ReportSection.BEYOND,
     )
 
@@ -47,7 +49,8 @@ def _break_away_row(found: TerrainBreakAway) -> list[str]:
     motion = [found.motion_quantile(risk) for risk in RISKS]
     limit = found.limit
     distance = "–" if limit is None else f"{model.distance:.2f} ({limit:.2f})"
-    trial_sd = f"{model.law.trial_sd:.2f}"
+    unit = " N" if model.kind == SLIDING else ""
+    trial_sd = f"{model.law.trial_sd:.2f}{unit}"
     return [
         found.terrain,
         model.kind,
