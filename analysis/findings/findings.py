@@ -34,7 +34,7 @@ from analysis.findings.trends import (
     trends_of,
 )
 from analysis.study import GP_SE, TUSTIN, CsvRow, Study
-from analysis.terrains import Confusion, Identification, identify_study
+from analysis.terrains import Identification, identify_study
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 
@@ -112,7 +112,9 @@ _DIGITS = 5  # of the surfaces in fits.json
 def plain_findings(results: StudyResults) -> dict[str, Any]:
     """Return the findings as plain values for fits.json, with units."""
     return {
-        "identification": _identification(results.identification),
+        "identification": None
+        if results.identification is None
+        else results.identification.numbers(),
         "break_away": {n: found.numbers() for n, found in results.break_away.items()},
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
         "trends": {
@@ -172,16 +174,12 @@ def _recognised(
 ) -> list[CsvRow]:
     if identification is None:
         return []
-    rules = {
-        "log density": identification.by_density,
-        "smallest error": identification.by_error,
-    }
     return [
         CsvRow("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
-        for rule, sizes in rules.items()
+        for rule, sizes in identification.rules.items()
         for size, levels in sizes.items()
         for level in LEVELS
-        if np.isfinite(share := levels[level].accuracy)
+        if level in levels and np.isfinite(share := levels[level].accuracy)
     ]
 
 
@@ -254,31 +252,6 @@ def _coverage(results: StudyResults) -> dict[str, Any]:
             c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
             for c in results.coverage
         },
-    }
-
-
-def _identification(identification: Identification | None) -> dict[str, Any] | None:
-    if identification is None:
-        return None
-    return {
-        "windows_samples": list(identification.by_density),
-        "by_density": _confusions(identification.by_density),
-        "by_error": _confusions(identification.by_error),
-        "neighbour_correlation": dict(identification.rho),
-    }
-
-
-def _confusions(sizes: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
-    return {
-        str(size): {
-            level: {
-                "names": list(confusion.names),
-                "counts": confusion.counts.tolist(),
-                "recognised": confusion.accuracy,
-            }
-            for level, confusion in levels.items()
-        }
-        for size, levels in sizes.items()
     }
 
 

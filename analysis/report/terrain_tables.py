@@ -5,7 +5,7 @@ from analysis.data import LEVELS
 from analysis.figures import ReportSection
 from analysis.findings import RISKS, StudyResults, TerrainBreakAway
 from analysis.report.page_model import ReportTable
-from analysis.terrains import KEPT_PER_SECOND
+from analysis.terrains import KEPT_PER_SECOND, Exclusion, Identification
 
 
 def terrain_tables(results: StudyResults) -> list[ReportTable]:
@@ -93,7 +93,79 @@ def recognition_tables(results: StudyResults) -> list[ReportTable]:
             rows,
             note="Share of windows recognised by models that never saw the trial, mean "
             "over kinds. By error, the paper's rule: the model with the smallest mean "
-            "absolute error.",
+            f"absolute error. {_stones_note(identification)}",
             section=ReportSection.BEYOND,
-        )
+        ),
+        surface_table(identification),
     ]
+
+
+def surface_table(identification: Identification) -> ReportTable:
+    """Return how well flat and rocky ground and ground that is not known are told."""
+    rows = [
+        (
+            f"{size / KEPT_PER_SECOND:g} s",
+            *_surface_cells(identification, size),
+            *_exclusion_cells(identification.exclusions[size]),
+        )
+        for size in identification.sizes
+    ]
+    return ReportTable(
+        name="Flat, rocky or none of the known",
+        header=(
+            "window",
+            "flat or rocky, right",
+            "calibration error",
+            "sure (98 %)",
+            "sure and wrong",
+            "known, called none",
+            "flat, only rocky known: none",
+            "rocky, only flat known: none",
+        ),
+        rows=rows,
+        note="Flat or rocky: logistic regression on features of the window, fitted to "
+        "trials of other numbers; right: mean over the two; calibration error: mean "
+        "difference of probability and share. None: a window that strains the "
+        "likeliest terrain's model more than 99 % of its own windows, or is smoother "
+        "than 98.75 % of them; limits from trials of other numbers.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def _surface_cells(identification: Identification, size: int) -> list[str]:
+    if size not in identification.by_features:
+        return ["–"] * 4
+    calibration = identification.calibrations[size]
+    return [
+        f"{identification.by_features[size]['surface'].accuracy:.3f}",
+        f"{calibration.error:.3f}",
+        f"{calibration.sure:.2f}",
+        f"{calibration.sure_and_wrong:.3f}",
+    ]
+
+
+def _exclusion_cells(exclusion: Exclusion) -> list[str]:
+    shares = (
+        exclusion.false_alarms,
+        exclusion.flat_among_rocky,
+        exclusion.rocky_among_flat,
+    )
+    return ["–" if share is None else f"{share:.3f}" for share in shares]
+
+
+def _stones_note(identification: Identification) -> str:
+    """Return that terrains of stones are one family; empty with fewer than two."""
+    shares = {
+        size: share
+        for size in identification.sizes
+        if (share := identification.exact_stones(size)) is not None
+    }
+    if not shares:
+        return ""
+    size = max(shares)
+    return (
+        "Terrains of stones are a family: which one it is comes out right in "
+        f"{shares[size]:.2f} of their windows of {size / KEPT_PER_SECOND:g} s "
+        f"({1.0 / identification.stones:.2f} by chance), so the name of a single one "
+        "is no answer; flat or rocky is."
+    )

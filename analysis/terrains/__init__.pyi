@@ -1,18 +1,21 @@
 from .database import TerrainDatabase, load
+from .evidence import Exclusion
 from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
-from .recognition import Recognition, recognise
+from .recognition import Recognition, WindowEvidence, recognise
 from .table import SlipRisk, TractionEstimate, TractionEstimates
 
 __all__ = [
     "KEPT_PER_SECOND",
     "Confusion",
+    "Exclusion",
     "Identification",
     "Recognition",
     "SlipRisk",
     "TerrainDatabase",
     "TractionEstimate",
     "TractionEstimates",
+    "WindowEvidence",
     "break_away_of",
     "database_of",
     "identify_study",

@@ -13,13 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
-from analysis.terrains.windows import (
-    FEATURES,
-    WINDOWS,
-    window_features,
-    windows_of,
-)
+from analysis.data import Array
+from analysis.terrains.windows import FEATURES, WINDOWS
 
 FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"
 _RIDGE = 1.0
@@ -66,6 +61,22 @@ class LogisticModel:
             curvature = (X.T * (balance * p * (1.0 - p))) @ X + np.diag(ridge)
             w = w - np.linalg.solve(curvature, gradient)
         return cls(mean, scale, w)
+
+    @classmethod
+    def of_trials(
+        cls, trials: Sequence[tuple[Mapping[int, Array], str]], size: int
+    ) -> "LogisticModel | None":
+        """Return the fit of trials' windows of one size; None with one kind only."""
+        parts = [
+            (features[size], surface == ROCKY_GROUND)
+            for features, surface in trials
+            if surface in (FLAT_GROUND, ROCKY_GROUND) and len(features[size])
+        ]
+        if len({is_rocky for _, is_rocky in parts}) < 2:
+            return None
+        features = np.concatenate([part for part, _ in parts])
+        is_rocky = np.concatenate([np.full(len(part), kind) for part, kind in parts])
+        return cls.fit(features, is_rocky)
 
     def probability(self, features: Array) -> Array:
         """Return the probability of rocky ground of every window, shape (m,).
@@ -120,13 +131,6 @@ class SurfaceClassifier:
 
     models: Mapping[int, LogisticModel]
 
-    def probability(self, trial: PreparedTrial, windows: list[slice]) -> Array:
-        """Return the probability of rocky ground of windows of one size, (n,)."""
-        if not windows:
-            return np.zeros(0)
-        size = windows[0].stop - windows[0].start
-        return self.models[size].probability(window_features(trial, windows))
-
     def to_dict(self) -> dict[str, Any]:
         """Return the classifier as plain values, for JSON."""
         return {
@@ -155,24 +159,14 @@ class SurfaceClassifier:
 
 
 def fit_surfaces(
-    trials: Sequence[tuple[PreparedTrial, str]],
+    trials: Sequence[tuple[Mapping[int, Array], str]],
 ) -> SurfaceClassifier | None:
     """Return the classifier of trials with their surfaces; None with one kind only.
 
     Args:
-        trials: each with "flat" or "rocky"; other surfaces are left out.
+        trials: each with the features of its overlapping windows by size, and "flat"
+            or "rocky"; other surfaces are left out.
     """
-    known = [(t, s) for t, s in trials if s in (FLAT_GROUND, ROCKY_GROUND)]
-    models: dict[int, LogisticModel] = {}
-    for size in WINDOWS:
-        parts = [
-            (window_features(trial, windows), surface == ROCKY_GROUND)
-            for trial, surface in known
-            if (windows := windows_of(trial.kept, size, overlap=True))
-        ]
-        if len({is_rocky for _, is_rocky in parts}) < 2:
-            continue
-        features = np.concatenate([part for part, _ in parts])
-        is_rocky = np.concatenate([np.full(len(f), r) for f, r in parts])
-        models[size] = LogisticModel.fit(features, is_rocky)
+    fitted = {size: LogisticModel.of_trials(trials, size) for size in WINDOWS}
+    models = {size: model for size, model in fitted.items() if model is not None}
     return SurfaceClassifier(models) if models else None

@@ -7,7 +7,8 @@ A JSON object, nothing that is executed:
     terrains NAME: kind, trials, samples, rho (correlation of neighbouring residuals),
         limits {window: mean strain that 99 % of its own windows stay below},
         models MODEL: title, parameters, mean [N] and sd [N], one row per F_n
-        break_away: a `BreakAwayModel` where there is one
+        parts  NAME: anything else that is known of the terrain
+    parts NAME: anything else that is known of all
 
 Between the points of a table values are linear; outside of it they are those of its
 edge. `load` checks everything before it believes it.
@@ -17,7 +18,7 @@ import json
 import math
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from acquisition import SettingsError
 from analysis.breakaway import BreakAwayModel, BreakAwayRisk
 from analysis.data import Array
 from analysis.study import Prediction
+from analysis.terrains.parts import Parts, break_away_in, checked_parts
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
 FORMAT, VERSION = "traction-terrain-db", 1
@@ -50,7 +52,7 @@ class KnownTerrain:
         tables: by name of the model.
         parameters: of every model, as fitted.
         default: name of the model that answers.
-        break_away: the force before it slips from rest; None where it is not known.
+        parts: what else is known of it, by name; see `analysis.terrains.parts`.
     """
 
     name: str
@@ -62,7 +64,7 @@ class KnownTerrain:
     tables: Mapping[str, Table]
     parameters: Mapping[str, Any]
     default: str
-    break_away: BreakAwayModel | None = None
+    parts: Parts = field(default_factory=dict)
 
     def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
         """Return the traction to expect.
@@ -107,17 +109,12 @@ class KnownTerrain:
 
     @property
     def from_rest(self) -> BreakAwayModel:
-        """What it gives before it slips.
+        """What it gives before it slips; read anew every time.
 
         Raises:
             SettingsError: it is not known.
         """
-        if self.break_away is None:
-            raise SettingsError(
-                f"{self.name}: the force before it slips from rest is not known.",
-                hint="Record three trials or more; risk_in_motion answers for sliding.",
-            )
-        return self.break_away
+        return break_away_in(self.parts, self.name)
 
     def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
         """Return the probability that a sliding foot meets less than `required` [N].
@@ -164,11 +161,13 @@ class TerrainDatabase:
         terrains: every terrain.
         is_simulated: the trials were simulated.
         made_utc: when.
+        parts: what else is known of all of them, by name.
     """
 
     terrains: Mapping[str, KnownTerrain]
     is_simulated: bool
     made_utc: str
+    parts: Parts = field(default_factory=dict)
 
     def terrain(self, name: str) -> KnownTerrain:
         """Return a terrain.
@@ -223,6 +222,7 @@ def _database(content: Any) -> TerrainDatabase:  # noqa: ANN401
         {str(n): _terrain(str(n), t, axes, default) for n, t in terrains.items()},
         bool(content["simulated"]),
         str(content["made_utc"]),
+        checked_parts(content.get("parts", {})),
     )
 
 
@@ -255,9 +255,7 @@ def _terrain(
         tables=tables,
         parameters={str(key): model["parameters"] for key, model in models.items()},
         default=default,
-        break_away=BreakAwayModel.from_dict(content["break_away"])
-        if "break_away" in content
-        else None,
+        parts=checked_parts(content.get("parts", {})),
     )
 
 

@@ -9,6 +9,12 @@ the next
 (a first-order process; after a gap, and at first, log N(z_i; 0, 1)). Single terms are
 held above a floor, which keeps one spike from deciding. The posterior is the softmax of
 ll / tau: what is left of the correlation makes plain sums overconfident.
+
+A window is of none of the known terrains where it strains the likeliest one's model
+more than nearly all of its own windows do, or is smoother than nearly all of them: a
+plate fits into the wide bands of stones and shows itself only by what it lacks. Among
+stones the likeliest terrain is a name for a family: they are alike, and `surface`, flat
+or rocky, is what can be told.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,9 +22,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.data import Array, PreparedTrial
+from analysis.data import Array, PreparedTrial, groups_of
 from analysis.study import Prediction
+from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND, SurfaceClassifier
 from analysis.terrains.database import KnownTerrain, TerrainDatabase
+from analysis.terrains.parts import roughness_in, surfaces_in
+from analysis.terrains.windows import RESID, window_features, windows_of
 
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N
@@ -88,9 +97,7 @@ class TerrainScores:
 
     def windows(self, size: int) -> "list[slice]":
         """Return consecutive windows of `size` kept samples; a rest is left out."""
-        return [
-            slice(k, k + size) for k in range(0, len(self.log_density) - size + 1, size)
-        ]
+        return windows_of(len(self.log_density), size)
 
     def posterior(self, rows: slice) -> Array:
         """Return the probability of each terrain after the samples `rows`, (m,)."""
@@ -151,11 +158,15 @@ class WindowEvidence:
         t: time of its last sample [s].
         posterior: probability of each terrain, in the database's order.
         best: the likeliest terrain, or "none".
+        surface: "flat", "rocky" or "none"; or the likeliest terrain's own kind.
+        rocky: probability of rocky ground by the classifier; None without one.
     """
 
     t: float
     posterior: tuple[float, ...]
     best: str
+    surface: str
+    rocky: float | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +179,7 @@ class Recognition:
         posterior: probability of each terrain after the whole trial.
         best: the verdict on the whole trial: a terrain or "none".
         least_error: the paper's rule: the terrain with the smallest error.
+        surface: the answer of most windows: "flat", "rocky", "none".
     """
 
     terrains: tuple[str, ...]
@@ -175,6 +187,24 @@ class Recognition:
     posterior: tuple[float, ...]
     best: str
     least_error: str
+    surface: str
+
+
+@dataclass(frozen=True, slots=True)
+class WindowLimits:
+    """What hardly any of a terrain's own windows of one size goes beyond.
+
+    Attributes:
+        roughness: smallest log sd of F_t about a line in F_n [log N].
+        strain: largest mean squared error over the predicted variance.
+    """
+
+    roughness: float = -np.inf
+    strain: float = np.inf
+
+    def exclude(self, roughness: float, strain: float) -> bool:
+        """Whether a window is too smooth, or strains the model too much."""
+        return roughness < self.roughness or strain > self.strain
 
 
 def recognise(
@@ -182,8 +212,7 @@ def recognise(
 ) -> Recognition | None:
     """Return which terrain of `database` a trial is from; None without a window.
 
-    The verdict is "none" when most windows strain even the likeliest terrain's model
-    more than 99 % of its own windows do.
+    The verdict is "none" when most windows are of none of the known terrains.
 
     Args:
         trial: its kept samples count.
@@ -200,32 +229,66 @@ def recognise(
     windows = scores.windows(window)
     if not windows:
         return None
-    known = list(database.terrains.values())
+    features = window_features(trial, windows)
     moments = [
-        WindowEvidence(
-            t=float(trial.smooth.t[trial.indices[rows.stop - 1]]),
-            posterior=tuple(scores.posterior(rows).tolist()),
-            best=_best(scores, rows, known, window),
-        )
-        for rows in windows
+        _moment(_Judged(trial, scores, rows, row), database, window)
+        for rows, row in zip(windows, features, strict=True)
     ]
     whole = slice(0, len(scores.log_density))
     strange = sum(moment.best == NONE for moment in moments)
     is_none = strange > 0.5 * len(moments)
+    surfaces = [moment.surface for moment in moments]
     return Recognition(
         terrains=scores.terrains,
         moments=tuple(moments),
         posterior=tuple(scores.posterior(whole).tolist()),
         best=NONE if is_none else scores.likeliest(whole),
         least_error=scores.least_error(whole),
+        surface=max(dict.fromkeys(surfaces), key=surfaces.count),
     )
 
 
-def _best(
-    scores: TerrainScores, rows: slice, known: list[KnownTerrain], window: int
-) -> str:
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """A window of a trial: its kept samples and its features."""
+
+    trial: PreparedTrial
+    scores: TerrainScores
+    rows: slice
+    features: Array
+
+
+def _moment(judged: _Judged, database: TerrainDatabase, window: int) -> WindowEvidence:
+    scores, rows = judged.scores, judged.rows
     best = scores.likeliest(rows)
-    place = scores.terrains.index(best)
-    limit = known[place].limits.get(window)
-    strain = float(scores.strain[rows, place].mean())
-    return NONE if limit is not None and strain > limit else best
+    limits = limits_of(database.terrains[best], window)
+    strain = float(scores.strain[rows, scores.terrains.index(best)].mean())
+    is_none = limits.exclude(float(judged.features[RESID]), strain)
+    rocky = _rocky(surfaces_in(database.parts), window, judged.features)
+    surface = FLAT_GROUND if rocky is not None and rocky < 0.5 else ROCKY_GROUND
+    if rocky is None:
+        kinds = {name: terrain.kind for name, terrain in database.terrains.items()}
+        surface = scores.likeliest_group(rows, groups_of(kinds)["surface"])
+    return WindowEvidence(
+        t=float(judged.trial.smooth.t[judged.trial.indices[rows.stop - 1]]),
+        posterior=tuple(scores.posterior(rows).tolist()),
+        best=NONE if is_none else best,
+        surface=NONE if is_none else surface,
+        rocky=rocky,
+    )
+
+
+def limits_of(terrain: KnownTerrain, window: int) -> WindowLimits:
+    """Return the limits of a known terrain's windows; none where they are not known."""
+    return WindowLimits(
+        roughness=roughness_in(terrain.parts).get(window, -np.inf),
+        strain=terrain.limits.get(window, np.inf),
+    )
+
+
+def _rocky(
+    classifier: SurfaceClassifier | None, window: int, features: Array
+) -> float | None:
+    if classifier is None or window not in classifier.models:
+        return None
+    return float(classifier.models[window].probability(features[None, :])[0])
