@@ -2,8 +2,8 @@ from .database import TerrainDatabase, load
 from .evidence import Exclusion
 from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
-from .recognition import Recognition, WindowEvidence, recognise
 from .table import SlipRisk, TractionEstimate, TractionEstimates
+from .verdict import Recognition, WindowEvidence, recognise
 
 __all__ = [
     "KEPT_PER_SECOND",

@@ -15,12 +15,8 @@ from analysis.terrains.classifier import (
     ROCKY_GROUND,
     LogisticModel,
 )
-from analysis.terrains.recognition import (
-    Expert,
-    TerrainScores,
-    WindowLimits,
-    score_trial,
-)
+from analysis.terrains.recognition import Expert, TerrainScores, score_trial
+from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import RESID, WINDOWS, window_features, windows_of
 
 RARE = 0.01  # share of windows that strain a terrain of their own beyond its limit

@@ -30,9 +30,9 @@ from analysis.terrains.evidence import (
 from analysis.terrains.recognition import (
     Expert,
     Predictor,
-    WindowLimits,
     neighbour_correlation,
 )
+from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import WINDOWS
 
 KEPT_PER_SECOND = 100  # kept samples of a second of motion

@@ -22,10 +22,10 @@ from analysis.terrains.recognition import (
     TerrainScores,
     log_densities,
     neighbour_correlation,
-    recognise,
     score_trial,
 )
 from analysis.terrains.table import Table
+from analysis.terrains.verdict import recognise
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
 
