@@ -16,6 +16,7 @@ log s ~ N(log 0.35, 0.5), b1 ~ N(0.5, 0.5), su half-normal 0.3.
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 
 import numpy as np
 
@@ -44,10 +45,14 @@ class Family(Enum):
     LOGNORMAL = "lognormal"
 
 
+@cache
 def nodes() -> tuple[Array, Array]:
     """Return points and weights for a mean over a standard normal, shape (15,)."""
     points, weights = np.polynomial.hermite.hermgauss(NODES)
-    return np.sqrt(2.0) * points, weights / np.sqrt(np.pi)
+    points, weights = np.sqrt(2.0) * points, weights / np.sqrt(np.pi)
+    points.setflags(write=False)
+    weights.setflags(write=False)
+    return points, weights
 
 
 def share_below(family: Family, z: Array) -> Array:
