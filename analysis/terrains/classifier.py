@@ -19,6 +19,7 @@ from analysis.terrains.windows import FEATURES, WINDOWS
 FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"
 _RIDGE = 1.0
 _STEPS = 25
+_HALVINGS = 20
 _SMALL = 1e-8
 _LARGEST = 5.0  # standard deviations beyond which a feature says no more
 _LARGEST_LOGIT = 30.0
@@ -54,12 +55,10 @@ class LogisticModel:
         balance = np.where(is_rocky, 0.5 / rocky, 0.5 / (1.0 - rocky)) * _NEW
         ridge = np.full(X.shape[1], _RIDGE)
         ridge[0] = _SMALL
+        problem = _Problem(X, is_rocky, balance, ridge)
         w = np.zeros(X.shape[1])
         for _ in range(_STEPS):
-            p = _logistic(X @ w)
-            gradient = X.T @ (balance * (p - is_rocky)) + ridge * w
-            curvature = (X.T * (balance * p * (1.0 - p))) @ X + np.diag(ridge)
-            w = w - np.linalg.solve(curvature, gradient)
+            w = problem.improved(w)
         return cls(mean, scale, w)
 
     @classmethod
@@ -119,6 +118,41 @@ def _logistic(logit: Array) -> Array:
 def _design(features: Array, mean: Array, scale: Array) -> Array:
     z = np.clip((features - mean) / scale, -_LARGEST, _LARGEST)
     return np.column_stack([np.ones(len(z)), z, z * z])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Problem:
+    """A weighted ridge logistic regression.
+
+    Attributes:
+        X: columns, shape (m, k).
+        is_rocky: the truth, shape (m,).
+        balance: weight of every window, shape (m,).
+        ridge: penalty of every weight, shape (k,).
+    """
+
+    X: Array
+    is_rocky: np.ndarray
+    balance: Array
+    ridge: Array
+
+    def loss(self, w: Array) -> float:
+        logit = self.X @ w
+        lost = np.logaddexp(0.0, np.where(self.is_rocky, -logit, logit))
+        return float(self.balance @ lost + 0.5 * self.ridge @ w**2)
+
+    def improved(self, w: Array) -> Array:
+        """Return the weights after a Newton step, halved until nothing is lost."""
+        p = _logistic(self.X @ w)
+        gradient = self.X.T @ (self.balance * (p - self.is_rocky)) + self.ridge * w
+        bend = (self.X.T * (self.balance * p * (1.0 - p))) @ self.X
+        step = np.linalg.solve(bend + np.diag(self.ridge), gradient)
+        before = self.loss(w)
+        for halvings in range(_HALVINGS):
+            after = w - 0.5**halvings * step
+            if self.loss(after) <= before:
+                return after
+        return w
 
 
 @dataclass(frozen=True, slots=True, eq=False)

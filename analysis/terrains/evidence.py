@@ -230,15 +230,16 @@ def _excluded(
     evidence: StudyEvidence, known: Sequence[str], tested: Sequence[str], size: int
 ) -> float | None:
     """Return the share of windows of `tested` that are of none of `known`."""
-    if not known:
-        return None
     limits: dict[tuple[str, int], WindowLimits] = {}
     verdicts: list[bool] = []
     for trial in (trial for name in tested for trial in evidence.trials[name]):
+        # a terrain of fewer trials has no model of this number
         strains = {
             name: trial.strains(name, size) for name in known if _has(trial, name)
         }
         for k, rows in enumerate(trial.scores.windows(size)):
+            if not strains:
+                continue
             best = _likeliest(trial.scores, rows, strains)
             key = best, trial.number
             if key not in limits:

@@ -134,6 +134,13 @@ def test_the_fit_is_that_of_an_independent_program():
     assert model.weights[0] == pytest.approx(other.intercept_[0], abs=1e-4)
 
 
+def test_kinds_that_never_overlap_have_finite_weights():
+    X = np.linspace(-1.0, 1.0, 200)[:, None] * np.ones(len(FEATURES))
+    model = LogisticModel.fit(1e6 * X, X[:, 0] > 0.0)
+    assert np.isfinite(model.weights).all()
+    assert ((model.probability(1e6 * X) > 0.5) == (X[:, 0] > 0.0)).all()
+
+
 def labelled(rough=0.6, smooth=0.1, trials=4):
     made = [(record(rough, k), ROCKY_GROUND) for k in range(trials)]
     made += [(record(smooth, 100 + k), FLAT_GROUND) for k in range(trials)]
@@ -225,8 +232,8 @@ def evidence(rough, number, densities, terrains=("S0", "TF"), strain=1.0):
     scores = TerrainScores(
         terrains,
         np.tile(np.array(densities), (n, 1)),
-        np.ones((n, 2)),
-        np.tile(np.array([1.0, strain]), (n, 1)),
+        np.ones((n, len(terrains))),
+        np.tile(np.array([1.0, strain])[: len(terrains)], (n, 1)),
     )
     features = {s: window_features(trial, windows_of(n, s)) for s in WINDOWS}
     more = {s: window_features(trial, windows_of(n, s, overlap=True)) for s in WINDOWS}
@@ -273,6 +280,18 @@ def test_limits_leave_out_the_trial_that_is_judged(study_evidence):
     with_it, without = more.limits("S0", 100), more.limits("S0", 100, without=9)
     assert with_it.roughness < without.roughness - 1.0
     assert without == study_evidence.limits("S0", 100)
+
+
+def test_trials_beyond_the_number_of_the_other_kind_s_are_left_out(study_evidence):
+    alone = evidence(0.1, 9, (0.0,), terrains=("TF",))
+    more = StudyEvidence(
+        {**study_evidence.trials, "TF": [*study_evidence.trials["TF"], alone]},
+        study_evidence.surface,
+    )
+    here, there = exclusion_of(more, 50), exclusion_of(study_evidence, 50)
+    assert here.flat_among_rocky == there.flat_among_rocky
+    one_kind = StudyEvidence({"TF": [alone]}, {"TF": FLAT_GROUND})
+    assert exclusion_of(one_kind, 50).flat_among_rocky is None
 
 
 @pytest.mark.parametrize(
