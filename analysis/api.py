@@ -1,4 +1,4 @@
-"""The analysis for notebooks: from a file to models, in five functions.
+"""The analysis for notebooks: from a file to models, in seven functions.
 
     trial = load_trial(Path("T04.mcap"))            # a recorded trial, or
     trials = load_tables([Path("trials.npz")])      # tables, by terrain
@@ -6,16 +6,28 @@
     curve = fit_tustin(kept)                        # eq. 1
     process = fit_gp(kept)                          # eqs. 4 to 7
     folds = crossvalidate({"TF": kept})             # one whole trial left out at a time
+    rest = fit_break_away({"TF": kept})["TF"]       # before a foot at rest slips
+    known = load_terrains("terrains.json")          # of traction export --terrain-db
 
 Forces are in N, velocities in m/s; v_t and F_t are positive in ordinary slip, F_n in
 compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean and standard
-deviation of a measurement. All functions are pure but for the loading ones.
+deviation of a measurement. `rest.slip_risk(required, F_n)` and
+`rest.available(F_n, risk)` answer for a push from rest, `risk_in_motion` of a terrain
+of `known` for a foot that slides. All functions are pure but for the loading ones.
 """
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 
+from analysis.breakaway import (
+    AvailableForce,
+    BreakAwayModel,
+    BreakAwayOptions,
+    BreakAwayRisk,
+)
+from analysis.breakaway import fit_break_away as fit_of_terrains
 from analysis.data import (
     PreparedTrial,
     PrepareOptions,
@@ -26,6 +38,7 @@ from analysis.data import (
     load_tables,
     load_trial,
     prepare_trial,
+    terrain_kind,
 )
 from analysis.study import (
     FITTERS,
@@ -44,6 +57,7 @@ from analysis.study import (
     run_fold,
     run_tasks,
 )
+from analysis.terrains import SlipRisk, TerrainDatabase, load
 
 __all__ = [
     "FITTERS",
@@ -53,17 +67,25 @@ __all__ = [
     "GP_SE_NOISE",
     "GP_SE_TUSTIN",
     "TUSTIN",
+    "AvailableForce",
+    "BreakAwayModel",
+    "BreakAwayOptions",
+    "BreakAwayRisk",
     "FitOptions",
     "FittedModel",
     "FoldResult",
     "PrepareOptions",
     "PreparedTrial",
     "RecordedTrial",
+    "SlipRisk",
+    "TerrainDatabase",
     "TractionSeries",
     "crossvalidate",
+    "fit_break_away",
     "fit_gp",
     "fit_tustin",
     "load_tables",
+    "load_terrains",
     "load_trial",
     "prepare",
 ]
@@ -128,6 +150,31 @@ def crossvalidate(
     """
     tasks, _ = plan_folds(trials, options or FitOptions())
     return run_tasks(run_fold, tasks, n_jobs)
+
+
+def fit_break_away(
+    trials: Mapping[str, Sequence[PreparedTrial]],
+    kinds: Mapping[str, str] | None = None,
+    options: BreakAwayOptions | None = None,
+) -> dict[str, BreakAwayModel]:
+    """Return what every terrain of three trials or more gives before a foot slips.
+
+    Args:
+        trials: prepared trials by terrain; stones share what they have in common.
+        kinds: "small", "big" or "flat" by terrain; by default the paper's, by name.
+        options: velocity that makes a slip, and number of resampled fits.
+    """
+    known = {name: terrain_kind(name) for name in trials} | dict(kinds or {})
+    return fit_of_terrains(trials, known, options)
+
+
+def load_terrains(path: Path | str) -> TerrainDatabase:
+    """Return a terrain database: `slip_risk` from rest, `risk_in_motion` of sliding.
+
+    Raises:
+        SettingsError: the file cannot be read or is none.
+    """
+    return load(path)
 
 
 def _training(trials: Sequence[PreparedTrial], options: FitOptions) -> TrainingSet:

@@ -1,5 +1,15 @@
 # pyright: reportUnknownVariableType=false
-from . import confusion, curves, errors, excerpts, rig, surfaces, trials, uncertainty
+from . import (
+    break_away,
+    confusion,
+    curves,
+    errors,
+    excerpts,
+    rig,
+    surfaces,
+    trials,
+    uncertainty,
+)
 from .sections import ReportSection
 from .spec import FigureSpec
 from .style import Picture, render, styled
@@ -8,6 +18,7 @@ __all__ = [
     "FigureSpec",
     "Picture",
     "ReportSection",
+    "break_away",
     "confusion",
     "curves",
     "errors",

@@ -14,18 +14,22 @@ from analysis.figures.style import (
     shade_table,
 )
 from analysis.findings import StudyResults
-from analysis.terrains import KEPT_PER_SECOND, Confusion
+from analysis.terrains import KEPT_PER_SECOND, Confusion, Identification
 
 _SIDE = 2.25  # inches of one matrix of terrains
 _SMALL_SIDE = 1.55  # of a matrix of two or three kinds
 _MANY = 5  # kinds from which a matrix is a large one
-_RULES = (("by log density", "by_density"), ("smallest error (paper)", "by_error"))
+_RULES = {
+    "log density": "by log density",
+    "smallest error": "smallest error (paper)",
+    "features": "by features",
+}
 
 
 def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
     """Return a function that draws the matrices of a level for every window length.
 
-    Above the log density's, below the paper's rule.
+    Above the log density's, below it the paper's rule, then the classifier's.
     """
 
     def draw(results: StudyResults) -> Figure | None:
@@ -37,15 +41,16 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
         if len(kinds) < 2:
             return None
         side = _SIDE if len(kinds) >= _MANY else _SMALL_SIDE
-        figure = new_figure(side * len(_RULES) + 0.3)
-        grid = figure.subplots(len(_RULES), len(sizes), squeeze=False)
-        for row, (rule, attribute) in enumerate(_RULES):
+        rules = rules_of(identification, level)
+        figure = new_figure(side * len(rules) + 0.3)
+        grid = figure.subplots(len(rules), len(sizes), squeeze=False)
+        for row, rule in enumerate(rules):
             for ax, size in zip(grid[row], sizes, strict=True):
-                confusion = getattr(identification, attribute)[size][level]
+                confusion = identification.rules[rule][size][level]
                 _draw_matrix(ax, confusion)
                 seconds = size / KEPT_PER_SECOND
                 ax.set_title(
-                    f"{seconds:g} s, {rule}: {confusion.accuracy:.0%}",
+                    f"{seconds:g} s, {_RULES[rule]}: {confusion.accuracy:.0%}",
                     loc="left",
                     fontsize=7.5,
                 )
@@ -55,6 +60,15 @@ def draw_confusion(level: str) -> Callable[[StudyResults], Figure | None]:
         return figure
 
     return draw
+
+
+def rules_of(identification: Identification, level: str) -> list[str]:
+    """Return the rules that answer at a level for every size of window."""
+    return [
+        rule
+        for rule, sizes in identification.rules.items()
+        if all(level in sizes.get(size, {}) for size in identification.sizes)
+    ]
 
 
 def caption_confusion(level: str, results: StudyResults) -> str:
@@ -68,10 +82,18 @@ def caption_confusion(level: str, results: StudyResults) -> str:
         f"({identification.by_error[size][level].accuracy:.2f})"
         for size in identification.sizes
     ]
+    third = ""
+    if "features" in rules_of(identification, level):
+        right = [
+            f"{identification.by_features[size][level].accuracy:.3f}"
+            for size in identification.sizes
+        ]
+        third = f" Lowest: by features of the window, {', '.join(right)}."
     return (
         "Shares of the windows of each row in percent, by models that never saw the "
         "trial. Above: the largest log density; below: the paper's rule, the smallest "
         f"mean absolute error. Recognised (by the paper's rule): {', '.join(shares)}."
+        + third
     )
 
 

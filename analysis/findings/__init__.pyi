@@ -1,3 +1,4 @@
+from .break_away import RISKS, TerrainBreakAway
 from .findings import (
     RESIDUAL_MODELS,
     StudyResults,
@@ -16,6 +17,7 @@ __all__ = [
     "MEAN_LOAD",
     "PERIOD_EDGES",
     "RESIDUAL_MODELS",
+    "RISKS",
     "SKEW_EDGES",
     "TRACTION_RATIO",
     "ForceUncertainty",
@@ -23,6 +25,7 @@ __all__ = [
     "RigTrial",
     "StudyResults",
     "Surface",
+    "TerrainBreakAway",
     "Trend",
     "common_range",
     "compute_results",

@@ -7,6 +7,11 @@ from typing import Any
 import numpy as np
 
 from analysis.data import LEVELS
+from analysis.findings.break_away import (
+    BREAK_AWAY_UNITS,
+    TerrainBreakAway,
+    break_away_findings,
+)
 from analysis.findings.paper_claims import PaperClaim, paper_claims
 from analysis.findings.paper_measures import gather_evidence
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
@@ -29,7 +34,7 @@ from analysis.findings.trends import (
     trends_of,
 )
 from analysis.study import GP_SE, TUSTIN, CsvRow, Study
-from analysis.terrains import Confusion, Identification, identify_study
+from analysis.terrains import Identification, identify_study
 
 RESIDUAL_MODELS = (TUSTIN, GP_SE)
 
@@ -41,6 +46,7 @@ class StudyResults:
     Attributes:
         study: the study.
         identification: how well the terrains can be told apart; None for one terrain.
+        break_away: what a terrain gives before it slips from rest, where it is known.
         noise: constant against chosen noise, by terrain.
         trends: of the trial means, by terrain and measure.
         residuals: by terrain and model.
@@ -54,6 +60,7 @@ class StudyResults:
 
     study: Study
     identification: Identification | None
+    break_away: Mapping[str, TerrainBreakAway]
     noise: Sequence[NoiseSummary]
     trends: Mapping[str, Mapping[str, Trend]]
     residuals: Mapping[str, Mapping[str, ResidualBand]]
@@ -66,7 +73,7 @@ class StudyResults:
 
 
 def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
-    """Return what follows from a study; models are only asked, nothing is fitted."""
+    """Return what follows from a study; of models only those of break-away are fit."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # small matrices: more threads lose time
@@ -79,6 +86,7 @@ def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
     return StudyResults(
         study=study,
         identification=identification,
+        break_away=break_away_findings(study),
         noise=noise,
         trends={name: trends_of(result) for name, result in results.items()},
         residuals={
@@ -104,7 +112,10 @@ _DIGITS = 5  # of the surfaces in fits.json
 def plain_findings(results: StudyResults) -> dict[str, Any]:
     """Return the findings as plain values for fits.json, with units."""
     return {
-        "identification": _identification(results.identification),
+        "identification": None
+        if results.identification is None
+        else results.identification.numbers(),
+        "break_away": {n: found.numbers() for n, found in results.break_away.items()},
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
@@ -127,6 +138,7 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
             "F_n": "N",
             "v_t": "m/s",
             "mean": "N",
+            "break_away": BREAK_AWAY_UNITS,
             "variance": "N^2",
             "rig": HEALTH_UNITS,
         },
@@ -162,16 +174,12 @@ def _recognised(
 ) -> list[CsvRow]:
     if identification is None:
         return []
-    rules = {
-        "log density": identification.by_density,
-        "smallest error": identification.by_error,
-    }
     return [
         CsvRow("", "", "", f"recognised by {rule}, {level}, {size} samples", share, "1")
-        for rule, sizes in rules.items()
+        for rule, sizes in identification.rules.items()
         for size, levels in sizes.items()
         for level in LEVELS
-        if np.isfinite(share := levels[level].accuracy)
+        if level in levels and np.isfinite(share := levels[level].accuracy)
     ]
 
 
@@ -244,31 +252,6 @@ def _coverage(results: StudyResults) -> dict[str, Any]:
             c.terrain: {"counts": c.counts.astype(int).tolist(), "beyond": c.outside}
             for c in results.coverage
         },
-    }
-
-
-def _identification(identification: Identification | None) -> dict[str, Any] | None:
-    if identification is None:
-        return None
-    return {
-        "windows_samples": list(identification.by_density),
-        "by_density": _confusions(identification.by_density),
-        "by_error": _confusions(identification.by_error),
-        "neighbour_correlation": dict(identification.rho),
-    }
-
-
-def _confusions(sizes: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
-    return {
-        str(size): {
-            level: {
-                "names": list(confusion.names),
-                "counts": confusion.counts.tolist(),
-                "recognised": confusion.accuracy,
-            }
-            for level, confusion in levels.items()
-        }
-        for size, levels in sizes.items()
     }
 
 

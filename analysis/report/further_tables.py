@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from statistics import median
 
-from analysis.data import LATEST_MS, LEVELS
+from analysis.data import LATEST_MS
 from analysis.figures import ReportSection
 from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
 from analysis.report.page_model import ReportTable
 from analysis.report.paper_tables import with_error
+from analysis.report.terrain_tables import terrain_tables
 from analysis.study import (
     TITLES,
     PairedComparison,
@@ -17,7 +18,6 @@ from analysis.study import (
     compare,
     smallest_adjusted,
 )
-from analysis.terrains import KEPT_PER_SECOND
 
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (
@@ -40,7 +40,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
         lag_table(study),
-        *recognition_tables(results),
+        *terrain_tables(results),
         trend_table(results),
     ]
     return [table for table in tables if table.rows]
@@ -205,41 +205,6 @@ def noise_table(results: StudyResults) -> ReportTable:
         note=_holm_note(pairs),
         section=ReportSection.BEYOND,
     )
-
-
-def recognition_tables(results: StudyResults) -> list[ReportTable]:
-    """Return how well windows of motion tell the terrains apart; none for one."""
-    identification = results.identification
-    if identification is None:
-        return []
-    rules = (identification.by_density, identification.by_error)
-    rows = [
-        (
-            f"{size / KEPT_PER_SECOND:g} s",
-            *(
-                f"{rule[size][level].accuracy:.2f}"
-                for rule in rules
-                for level in LEVELS
-            ),
-        )
-        for size in identification.sizes
-    ]
-    names = ("each terrain", "size of stones", "flat or rocky")
-    return [
-        ReportTable(
-            "Telling terrains apart",
-            (
-                "window",
-                *(f"by density: {name}" for name in names),
-                *(f"by error: {name}" for name in names),
-            ),
-            rows,
-            note="Share of windows recognised by models that never saw the trial, mean "
-            "over kinds. By error, the paper's rule: the model with the smallest mean "
-            "absolute error.",
-            section=ReportSection.BEYOND,
-        )
-    ]
 
 
 def trend_table(results: StudyResults) -> ReportTable:

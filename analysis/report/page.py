@@ -15,6 +15,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from analysis.figures import (
     FigureSpec,
     ReportSection,
+    break_away,
     confusion,
     curves,
     errors,
@@ -54,7 +55,10 @@ from analysis.study import (
     write_atomic,
 )
 
-_FAMILIES = (excerpts, curves, surfaces, errors, uncertainty, confusion, trials, rig)
+_FAMILIES = (
+    *(excerpts, curves, surfaces, errors, uncertainty),
+    *(break_away, confusion, trials, rig),
+)
 _PAGE_ORDER = (
     "fig2_tustin_model",
     "fig4_excerpts",
@@ -67,6 +71,8 @@ _PAGE_ORDER = (
     "fig10_cross_map",
     "calibration",
     "noise",
+    "break_away",
+    "break_away_risk",
     "confusion_terrains",
     "confusion_stones",
     "confusion_surface",

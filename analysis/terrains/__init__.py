@@ -1,7 +1,7 @@
 """Which terrain is it, and what traction does it give.
 
-`identify` tells terrains apart by the models of a study, `database` is the table that a
-locomotion controller queries.
+`identify` tells terrains apart by the models of a study, `verdict` says which one a
+trial is from, `database` is what a locomotion controller queries.
 """
 
 import lazy_loader

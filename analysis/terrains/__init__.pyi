@@ -1,17 +1,22 @@
-from .database import load
-from .export import database_of
+from .database import TerrainDatabase, load
+from .evidence import Exclusion
+from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
-from .recognition import Recognition, recognise
 from .table import SlipRisk, TractionEstimate, TractionEstimates
+from .verdict import Recognition, WindowEvidence, recognise
 
 __all__ = [
     "KEPT_PER_SECOND",
     "Confusion",
+    "Exclusion",
     "Identification",
     "Recognition",
     "SlipRisk",
+    "TerrainDatabase",
     "TractionEstimate",
     "TractionEstimates",
+    "WindowEvidence",
+    "break_away_of",
     "database_of",
     "identify_study",
     "load",

@@ -7,6 +7,8 @@ A JSON object, nothing that is executed:
     terrains NAME: kind, trials, samples, rho (correlation of neighbouring residuals),
         limits {window: mean strain that 99 % of its own windows stay below},
         models MODEL: title, parameters, mean [N] and sd [N], one row per F_n
+        parts  NAME: anything else that is known of the terrain
+    parts NAME: anything else that is known of all
 
 Between the points of a table values are linear; outside of it they are those of its
 edge. `load` checks everything before it believes it.
@@ -16,15 +18,17 @@ import json
 import math
 import stat
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquisition import SettingsError
+from analysis.breakaway import BreakAwayModel, BreakAwayRisk
 from analysis.data import Array
 from analysis.study import Prediction
+from analysis.terrains.parts import Parts, break_away_in, checked_parts
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
 FORMAT, VERSION = "traction-terrain-db", 1
@@ -48,6 +52,7 @@ class KnownTerrain:
         tables: by name of the model.
         parameters: of every model, as fitted.
         default: name of the model that answers.
+        parts: what else is known of it, by name; see `analysis.terrains.parts`.
     """
 
     name: str
@@ -59,6 +64,7 @@ class KnownTerrain:
     tables: Mapping[str, Table]
     parameters: Mapping[str, Any]
     default: str
+    parts: Parts = field(default_factory=dict)
 
     def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
         """Return the traction to expect.
@@ -93,13 +99,28 @@ class KnownTerrain:
         """Return the default model's answer as a model of the study gives it."""
         return self._table("").over(F_n, v_t)
 
-    def slip_risk(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
-        """Return the probability that less than `required` [N] of traction is there.
+    def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:
+        """Return `BreakAwayModel.slip_risk`: of a push from rest at a load F_n [N].
 
-        What a walking controller asks before it puts its weight on: at a load F_n [N],
-        is the traction that the step needs available? Velocities below the slowest one
-        that was measured count as that. A load or velocity outside the table is marked
-        by `is_extrapolated` of the answer.
+        Raises:
+            SettingsError: a value is negative or no finite number, or it is not known.
+        """
+        return self.from_rest.slip_risk(required, F_n)
+
+    @property
+    def from_rest(self) -> BreakAwayModel:
+        """What it gives before it slips; read anew every time.
+
+        Raises:
+            SettingsError: it is not known.
+        """
+        return break_away_in(self.parts, self.name)
+
+    def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
+        """Return the probability that a sliding foot meets less than `required` [N].
+
+        Velocities below the slowest one that was measured count as that. A load or
+        velocity outside the table is marked by `is_extrapolated` of the answer.
 
         Raises:
             SettingsError: a value is no finite number.
@@ -140,11 +161,13 @@ class TerrainDatabase:
         terrains: every terrain.
         is_simulated: the trials were simulated.
         made_utc: when.
+        parts: what else is known of all of them, by name.
     """
 
     terrains: Mapping[str, KnownTerrain]
     is_simulated: bool
     made_utc: str
+    parts: Parts = field(default_factory=dict)
 
     def terrain(self, name: str) -> KnownTerrain:
         """Return a terrain.
@@ -199,6 +222,7 @@ def _database(content: Any) -> TerrainDatabase:  # noqa: ANN401
         {str(n): _terrain(str(n), t, axes, default) for n, t in terrains.items()},
         bool(content["simulated"]),
         str(content["made_utc"]),
+        checked_parts(content.get("parts", {})),
     )
 
 
@@ -231,6 +255,7 @@ def _terrain(
         tables=tables,
         parameters={str(key): model["parameters"] for key, model in models.items()},
         default=default,
+        parts=checked_parts(content.get("parts", {})),
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError, TractionError
+from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_break_away
 from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
 from analysis.study import (
     GP_SE,
@@ -22,6 +23,7 @@ from analysis.study import (
 )
 from analysis.terrains.database import FORMAT, VERSION
 from analysis.terrains.identify import Identification
+from analysis.terrains.parts import BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART
 
 POINTS = 48  # of each axis
 _REACH = 99.8  # percentile of F_n up to which the tables reach, with a margin
@@ -100,7 +102,7 @@ def database_of(
     """
     axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
-    models = study.options.fit.models
+    models, from_rest = study.options.fit.models, break_away_of(study)
     default = GP_SE if GP_SE in models else models[0]
     content = {
         "format": FORMAT,
@@ -114,13 +116,49 @@ def database_of(
             task.terrain: {
                 "kind": study.kinds[task.terrain],
                 **_record(task, identification),
+                "parts": _parts(from_rest.get(task.terrain), identification, task),
                 "models": fitted,
             }
             for task, fitted in zip(tasks, tables, strict=True)
             if default in fitted
         },
+        "parts": _of_all(identification),
     }
     return json.dumps(content, default=str)
+
+
+def break_away_of(study: Study) -> dict[str, BreakAwayModel]:
+    """Return the break-away model of every terrain of a study that has one."""
+    trials = {name: result.trials for name, result in study.terrains.items()}
+    options = BreakAwayOptions(seed=study.options.fit.seed)
+    return fit_break_away(trials, study.kinds, options)
+
+
+def _parts(
+    from_rest: BreakAwayModel | None,
+    identification: Identification | None,
+    task: TableTask,
+) -> dict[str, Any]:
+    """Return what the database says of a terrain besides its tables."""
+    parts: dict[str, Any] = {}
+    if from_rest is not None:
+        parts[BREAK_AWAY_PART] = from_rest.to_dict()
+    if identification is not None:
+        parts[ROUGHNESS_PART] = _finite(
+            {
+                size: limits[task.terrain].roughness
+                for size, limits in identification.limits.items()
+                if task.terrain in limits
+            }
+        )
+    return parts
+
+
+def _of_all(identification: Identification | None) -> dict[str, Any]:
+    """Return what the database says of all terrains together."""
+    if identification is None or identification.classifier is None:
+        return {}
+    return {SURFACES_PART: identification.classifier.to_dict()}
 
 
 def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
@@ -170,11 +208,17 @@ def _axes(
 def _limits(identification: Identification | None, terrain: str) -> Mapping[str, float]:
     if identification is None:
         return {}
-    return {
-        str(size): round(limits[terrain], 4)
-        for size, limits in identification.limits.items()
-        if terrain in limits and np.isfinite(limits[terrain])
-    }
+    return _finite(
+        {
+            size: limits[terrain].strain
+            for size, limits in identification.limits.items()
+            if terrain in limits
+        }
+    )
+
+
+def _finite(limits: Mapping[int, float]) -> dict[str, float]:
+    return {str(k): round(v, 4) for k, v in limits.items() if np.isfinite(v)}
 
 
 def _rounded(values: Array, axes: tuple[Array, Array]) -> list[list[float]]:

@@ -1,27 +1,41 @@
 """How well the terrains of a study can be told apart, by models that never saw a trial.
 
 Windows of motion are attributed to a terrain by two rules: the largest log density of
-`recognition`, and the smallest mean absolute error, which is the paper's.
+`recognition`, and the smallest mean absolute error, which is the paper's. Flat or rocky
+is told by a third, the `classifier` of the trials of other numbers.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-from analysis.data import PreparedTrial, groups_of
+from analysis.data import LEVELS, PreparedTrial, groups_of
 from analysis.study import GP_SE, Study, TerrainResult, run_tasks
+from analysis.terrains.classifier import (
+    ROCKY_GROUND,
+    SurfaceClassifier,
+    fit_surfaces,
+)
+from analysis.terrains.evidence import (
+    Calibration,
+    Exclusion,
+    StudyEvidence,
+    TrialEvidence,
+    calibration_of,
+    exclusion_of,
+    surface_probabilities,
+)
 from analysis.terrains.recognition import (
     Expert,
     Predictor,
-    TerrainScores,
     neighbour_correlation,
-    score_trial,
 )
+from analysis.terrains.verdict import WindowLimits
+from analysis.terrains.windows import WINDOWS
 
-WINDOWS = (50, 100, 200)  # kept samples: 0.5, 1 and 2 s of motion
 KEPT_PER_SECOND = 100  # kept samples of a second of motion
-RARE = 0.01  # share of a terrain's own windows that strain it beyond the limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +80,41 @@ class Identification:
         by_density: confusions by window size [kept samples] and level ("terrain",
             "stones", "surface"), by posterior.
         by_error: the same by the smallest mean absolute error: the paper's rule.
-        limits: by window size and terrain: the mean strain that nearly none of the
-            terrain's own windows exceed.
+        by_features: the same by the classifier, level "surface" only.
+        limits: by window size and terrain: what hardly any of its own windows exceed.
+        calibrations: of the classifier's probabilities, by window size.
+        exclusions: how well ground that is not known is excluded, by window size.
+        classifier: of flat and rocky ground, of all trials; None with one of them only.
+        rocky: names of the terrains of stones.
     """
 
     rho: Mapping[str, float]
     by_density: Mapping[int, Mapping[str, Confusion]]
     by_error: Mapping[int, Mapping[str, Confusion]]
-    limits: Mapping[int, Mapping[str, float]]
+    by_features: Mapping[int, Mapping[str, Confusion]]
+    limits: Mapping[int, Mapping[str, WindowLimits]]
+    calibrations: Mapping[int, Calibration]
+    exclusions: Mapping[int, Exclusion]
+    classifier: SurfaceClassifier | None
+    rocky: tuple[str, ...]
+
+    @property
+    def stones(self) -> int:
+        """Number of the terrains of stones."""
+        return len(self.rocky)
+
+    def exact_stones(self, size: int) -> float | None:
+        """Return the share of windows of stones whose own terrain is the likeliest.
+
+        By the log density, of all windows on stones; None with fewer than two terrains
+        of stones or without a window.
+        """
+        confusion = self.by_density[size]["terrain"]
+        rows = [k for k, name in enumerate(confusion.names) if name in self.rocky]
+        total = float(confusion.counts[rows].sum())
+        if len(rows) < 2 or total == 0.0:
+            return None
+        return float(confusion.counts[rows, rows].sum()) / total
 
     @property
     def sizes(self) -> tuple[int, ...]:
@@ -84,6 +125,41 @@ class Identification:
             if levels["terrain"].counts.any()
         )
 
+    @property
+    def rules(self) -> dict[str, Mapping[int, Mapping[str, Confusion]]]:
+        """Confusions by the name of the rule."""
+        return {
+            "log density": self.by_density,
+            "smallest error": self.by_error,
+            "features": self.by_features,
+        }
+
+    def numbers(self) -> dict[str, Any]:
+        """Return everything as plain values, for fits.json."""
+        return {
+            "windows_samples": list(self.by_density),
+            "by_density": _plain(self.by_density),
+            "by_error": _plain(self.by_error),
+            "by_features": _plain(self.by_features),
+            "neighbour_correlation": dict(self.rho),
+            "calibration": {str(k): asdict(c) for k, c in self.calibrations.items()},
+            "exclusion": {str(k): asdict(e) for k, e in self.exclusions.items()},
+        }
+
+
+def _plain(rule: Mapping[int, Mapping[str, Confusion]]) -> dict[str, Any]:
+    return {
+        str(size): {
+            level: {
+                "names": list(confusion.names),
+                "counts": confusion.counts.tolist(),
+                "recognised": confusion.accuracy,
+            }
+            for level, confusion in levels.items()
+        }
+        for size, levels in rule.items()
+    }
+
 
 def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     """Return how well windows of trials are recognised by models that never saw them.
@@ -92,39 +168,64 @@ def identify_study(study: Study, model: str = GP_SE) -> Identification | None:
     the model for two terrains or more.
     """
     rho = _correlations(study, model)
-    scored = _score_folds(study, model, rho)
-    names = tuple(name for name in study.terrains if name in scored)
-    if len(names) < 2:
+    evidence = _evidence(study, model, rho)
+    if len(evidence.trials) < 2:
         return None
     groups = groups_of(study.kinds)
-    density, error, limits = {}, {}, {}
+    density, error = _by_models(evidence, groups)
+    probabilities = {size: surface_probabilities(evidence, size) for size in WINDOWS}
+    known = {size: found for size, found in probabilities.items() if found}
+    return Identification(
+        rho=rho,
+        by_density=density,
+        by_error=error,
+        by_features={
+            size: {"surface": confusion_of([(p.surface, p.answer) for p in found])}
+            for size, found in known.items()
+        },
+        limits={
+            size: {name: evidence.limits(name, size) for name in evidence.trials}
+            for size in WINDOWS
+        },
+        calibrations={size: calibration_of(found) for size, found in known.items()},
+        exclusions={size: exclusion_of(evidence, size) for size in WINDOWS},
+        classifier=fit_surfaces(evidence.labelled()),
+        rocky=evidence.of_surface(ROCKY_GROUND),
+    )
+
+
+def _by_models(
+    evidence: StudyEvidence, groups: Mapping[str, Mapping[str, str]]
+) -> tuple[dict[int, dict[str, Confusion]], dict[int, dict[str, Confusion]]]:
+    """Return the confusions by log density and by the smallest error."""
+    density: dict[int, dict[str, Confusion]] = {}
+    error: dict[int, dict[str, Confusion]] = {}
     for size in WINDOWS:
         windows = [
-            (truth, scores, rows)
-            for truth in names
-            for scores in scored[truth]
-            for rows in scores.windows(size)
+            (truth, trial.scores, rows)
+            for truth, trials in evidence.trials.items()
+            for trial in trials
+            for rows in trial.scores.windows(size)
         ]
-        density[size], error[size] = {}, {}
-        for level, group in groups.items():
-            density[size][level] = confusion_of(
-                [(group[t], s.likeliest_group(r, group)) for t, s, r in windows]
+        density[size] = {
+            level: confusion_of(
+                [
+                    (groups[level][t], s.likeliest_group(r, groups[level]))
+                    for t, s, r in windows
+                ]
             )
-            error[size][level] = confusion_of(
-                [(group[t], group[s.least_error(r)]) for t, s, r in windows]
+            for level in LEVELS
+        }
+        error[size] = {
+            level: confusion_of(
+                [
+                    (groups[level][t], groups[level][s.least_error(r)])
+                    for t, s, r in windows
+                ]
             )
-        limits[size] = {name: own_limit(scored[name], name, size) for name in names}
-    return Identification(rho, density, error, limits)
-
-
-def own_limit(scored: Sequence[TerrainScores], terrain: str, size: int) -> float:
-    """Return the mean strain that 99 % of a terrain's own windows stay below."""
-    means = [
-        float(scores.strain[rows, scores.terrains.index(terrain)].mean())
-        for scores in scored
-        for rows in scores.windows(size)
-    ]
-    return float(np.quantile(means, 1.0 - RARE)) if means else np.inf
+            for level in LEVELS
+        }
+    return density, error
 
 
 def _correlations(study: Study, model: str) -> dict[str, float]:
@@ -150,9 +251,8 @@ def _held_out(
     ]
 
 
-def _score_folds(
-    study: Study, model: str, rho: Mapping[str, float]
-) -> dict[str, list[TerrainScores]]:
+def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEvidence:
+    """Return every trial scored by the models of its own number's folds."""
     experts: dict[int, dict[str, Expert]] = {}
     for name, result in study.terrains.items():
         for fold in result.folds:
@@ -160,26 +260,27 @@ def _score_folds(
                 of_fold = experts.setdefault(fold.fold, {})
                 of_fold[name] = Expert(fold.models[model].model.predict, rho[name])
     tasks = [
-        ScoreTask(trial, experts[k])
+        ScoreTask(trial, k, experts[k])
         for name, result in study.terrains.items()
         for k, trial in enumerate(result.trials)
         if name in experts.get(k, {}) and len(experts[k]) > 1 and trial.kept
     ]
-    scored: dict[str, list[TerrainScores]] = {}
+    scored: dict[str, list[TrialEvidence]] = {}
     done = run_tasks(run_score, tasks, study.options.n_jobs)
-    for task, scores in zip(tasks, done, strict=True):
-        scored.setdefault(task.trial.terrain, []).append(scores)
-    return scored
+    for task, evidence in zip(tasks, done, strict=True):
+        scored.setdefault(task.trial.terrain, []).append(evidence)
+    return StudyEvidence(scored, groups_of(study.kinds)["surface"])
 
 
 @dataclass(frozen=True, slots=True)
 class ScoreTask:
-    """A trial and the experts that score it."""
+    """A trial, its number and the experts that score it."""
 
     trial: PreparedTrial
+    number: int
     experts: Mapping[str, Expert]
 
 
-def run_score(task: ScoreTask) -> TerrainScores:
-    """Return how the trial fits the prediction of every expert."""
-    return score_trial(task.trial, task.experts)
+def run_score(task: ScoreTask) -> TrialEvidence:
+    """Return how the trial fits every expert, and what its windows show without."""
+    return TrialEvidence.of(task.trial, task.number, task.experts)

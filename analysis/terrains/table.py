@@ -118,14 +118,16 @@ class TractionEstimates:
 
 
 class SlipRisk(float):
-    """A probability of slipping, a number that knows where it comes from.
+    """A probability of too little traction, a number that knows where it comes from.
 
     Attributes:
+        kind: "in motion": of a foot that slides, not of one at rest.
         is_extrapolated: the point lies outside the table: the risk is that of its edge,
             and nobody has measured it.
     """
 
     __slots__ = ("is_extrapolated",)
+    kind = "in motion"
     is_extrapolated: bool
 
     def __new__(cls, probability: float, *, is_extrapolated: bool) -> "SlipRisk":

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from analysis.data import TractionSeries
-    from analysis.terrains import Recognition
+    from analysis.terrains import Recognition, WindowEvidence
     from experiments.operator import Console
 
 EXAMPLES = """\
@@ -94,9 +94,23 @@ def _print(
         return
     console.say(f"{series.name} ({series.terrain}), {seconds:g} s windows")
     rows = [
-        [f"{moment.t:.1f} s", *(f"{p:.2f}" for p in moment.posterior), moment.best]
+        [
+            f"{moment.t:.1f} s",
+            *(f"{p:.2f}" for p in moment.posterior),
+            moment.best,
+            _surface(moment),
+        ]
         for moment in result.moments
     ]
-    rows.append(["whole", *(f"{p:.2f}" for p in result.posterior), result.best])
-    console.table(["", *result.terrains, "answer"], rows)
+    rows.append(
+        ["whole", *(f"{p:.2f}" for p in result.posterior), result.best, result.surface]
+    )
+    console.table(["", *result.terrains, "answer", "surface"], rows)
     console.say(f"smallest error: {result.least_error}")
+
+
+def _surface(moment: WindowEvidence) -> str:
+    """Return flat, rocky or none, and the probability of rocky ground if known."""
+    if moment.rocky is None:
+        return moment.surface
+    return f"{moment.surface} (rocky {moment.rocky:.2f})"

@@ -117,6 +117,7 @@ def _database(data: bytes, folder: Path) -> None:
     database = terrain_db.load(path)
     for name in database.terrains:
         database.terrain(name).predict(3.0, 0.05)
+        database.terrain(name).slip_risk(3.0, 3.0)
 
 
 def _script(data: bytes, folder: Path) -> None:

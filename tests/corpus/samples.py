@@ -7,6 +7,8 @@ from importlib import resources
 
 import numpy as np
 
+from analysis.breakaway.censored import Family
+from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.terrains.database import FORMAT, VERSION
 from fakes.plant.friction import draw_friction
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
@@ -94,6 +96,20 @@ def _database() -> dict[str, object]:
     table = [[1.0, 2.0], [2.0, 3.0]]
     model = {"mean": table, "sd": table, "parameters": {"mu": 0.6}}
     terrain = {"kind": "stones", "trials": 3, "samples": 90, "rho": 0.5}
+    law = PushLaw(2.2, 0.5, 0.3, 0.1)
+    rest = BreakAwayModel(
+        kind=BREAK_AWAY,
+        family=Family.WEIBULL,
+        law=law,
+        draws=np.array([law.values]),
+        v_slip=0.06,
+        slips=20,
+        held=3,
+        trials=3,
+        loads=(1.0, 5.0),
+        forces=(3.0, 12.0),
+    )
+    terrain["parts"] = {"break_away": rest.to_dict(), "roughness": {"50": -1.0}}
     return {
         "format": FORMAT,
         "version": VERSION,

@@ -17,7 +17,7 @@ def test_a_value_that_is_no_finite_number_is_refused(point):
     with pytest.raises(SettingsError, match="finite"):
         TERRAIN.predict(*point)
     with pytest.raises(SettingsError, match="finite"):
-        TERRAIN.slip_risk(1.0, *point)
+        TERRAIN.risk_in_motion(1.0, *point)
     with pytest.raises(SettingsError, match="finite"):
         TERRAIN.predict_many(np.array(point[:1]), np.array(point[1:]))
 
@@ -50,6 +50,13 @@ def test_many_estimates_say_which_of_them_lie_outside_the_table():
     ],
 )
 def test_a_risk_says_whether_it_lies_outside_the_table(point, is_outside):
-    risk = TERRAIN.slip_risk(1.0, *point)
+    risk = TERRAIN.risk_in_motion(1.0, *point)
     assert risk.is_extrapolated is is_outside
+    assert risk.kind == "in motion"
     assert 0.0 <= risk <= 1.0
+
+
+def test_without_a_break_away_model_a_push_from_rest_has_no_risk():
+    with pytest.raises(SettingsError, match="not known") as refused:
+        TERRAIN.slip_risk(1.0, 2.0)
+    assert "risk_in_motion" in refused.value.hint

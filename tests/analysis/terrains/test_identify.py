@@ -22,10 +22,10 @@ from analysis.terrains.recognition import (
     TerrainScores,
     log_densities,
     neighbour_correlation,
-    recognise,
     score_trial,
 )
 from analysis.terrains.table import Table
+from analysis.terrains.verdict import recognise
 
 LEVELS = {"S0": (1.5, 1.2), "TF": (0.8, 0.15), "Tf": (0.3, 0.15)}  # ratio, spread [N]
 
@@ -229,9 +229,9 @@ def test_one_point_and_many_points_agree(path):
 def test_more_traction_than_there_is_is_a_risk(path):
     known = load(path).terrain("TF")
     mean = known.predict(3.5, 0.005).mean
-    assert known.slip_risk(0.5 * mean, 3.5) < 0.01
-    assert known.slip_risk(mean, 3.5) == pytest.approx(0.5, abs=1e-6)
-    assert known.slip_risk(1.5 * mean, 3.5) > 0.99
+    assert known.risk_in_motion(0.5 * mean, 3.5) < 0.01
+    assert known.risk_in_motion(mean, 3.5) == pytest.approx(0.5, abs=1e-6)
+    assert known.risk_in_motion(1.5 * mean, 3.5) > 0.99
 
 
 def test_the_tables_are_close_to_the_model_between_their_points(study, path):
@@ -324,6 +324,64 @@ def test_probabilities_come_over_time(path):
 def test_ground_that_nobody_knows_is_none_of_the_known(path):
     seen = recognise(kept(push("moon", 1, ratio=4.0, spread=0.1)), load(path))
     assert seen.best == "none"
+
+
+def test_the_surface_of_a_trial_that_was_never_seen_is_told(path):
+    database = load(path)
+    for name, surface in (("S0", "rocky"), ("TF", "flat"), ("Tf", "flat")):
+        seen = recognise(kept(push(name, 79)), database)
+        assert seen.surface == surface
+        assert all((m.rocky > 0.5) == (surface == "rocky") for m in seen.moments)
+
+
+def test_a_database_without_a_classifier_tells_surfaces_by_its_models(path, tmp_path):
+    content = json.loads(path.read_text())
+    del content["parts"]
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps(content))
+    seen = recognise(kept(push("Tf", 80)), load(old))
+    assert seen.surface == "flat"
+    assert {moment.rocky for moment in seen.moments} == {None}
+
+
+def test_a_plate_is_none_of_the_stones(path, tmp_path):
+    content = json.loads(path.read_text())
+    content["terrains"] = {"S0": content["terrains"]["S0"]}
+    stones = tmp_path / "stones.json"
+    stones.write_text(json.dumps(content))
+    seen = recognise(kept(push("S0", 81, spread=0.05)), load(stones))
+    assert (seen.best, seen.surface) == ("none", "none")
+    del content["terrains"]["S0"]["parts"]["roughness"]
+    stones.write_text(json.dumps(content))
+    assert recognise(kept(push("S0", 81, spread=0.05)), load(stones)).best == "S0"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda c: c["parts"]["surfaces"].update(models=3),
+        lambda c: c.update(parts=[1]),
+        lambda c: c["terrains"]["S0"]["parts"].update(roughness={"50": float("nan")}),
+    ],
+)
+def test_a_damaged_part_of_a_database_is_refused(path, tmp_path, change):
+    content = json.loads(path.read_text())
+    change(content)
+    bad = tmp_path / "bad.json"
+    bad.write_text(json.dumps(content))
+    with pytest.raises(SettingsError, match="no terrain database"):
+        load(bad)
+
+
+def test_stones_of_one_kind_are_a_family(study, found):
+    assert found.exact_stones(100) is None  # of a single terrain
+    assert found.rocky == ("S0",)
+
+
+def test_features_tell_flat_from_rocky_with_honest_probabilities(found):
+    for size, levels in found.by_features.items():
+        assert levels["surface"].accuracy > 0.95
+        assert found.calibrations[size].error < 0.06
 
 
 def test_a_trial_too_short_for_a_window_has_no_answer(path):

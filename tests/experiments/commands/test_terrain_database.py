@@ -42,6 +42,9 @@ def test_a_recorded_trial_is_recognised(exported):
     (answer,) = json.loads(told.out)
     assert answer["terrain"] == "Tf"
     assert answer["recognition"]["terrains"] == ["S0", "Tf"]
+    assert answer["recognition"]["surface"] in {"flat", "rocky", "none"}
+    assert all(0.0 < m["rocky"] < 1.0 for m in answer["recognition"]["moments"])
+    assert "(rocky 0." in done.out or "(rocky 1." in done.out
 
 
 def test_a_database_is_never_overwritten(exported):

@@ -1,0 +1,258 @@
+"""What the windows of a study show, each trial judged by what never saw it.
+
+The classifier of a trial's number is fitted to the trials of all other numbers, and so
+are the limits beyond which a window is of none of the known terrains.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.data import Array, PreparedTrial
+from analysis.terrains.classifier import (
+    FLAT_GROUND,
+    ROCKY_GROUND,
+    LogisticModel,
+)
+from analysis.terrains.recognition import Expert, TerrainScores, score_trial
+from analysis.terrains.verdict import WindowLimits
+from analysis.terrains.windows import RESID, WINDOWS, window_features, windows_of
+
+RARE = 0.01  # share of windows that strain a terrain of their own beyond its limit
+SMOOTH = 0.0125  # share of a terrain's own windows that are smoother than its limit
+SURE = 0.98  # probability from which an answer counts as sure
+_BINS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class TrialEvidence:
+    """One trial: how it fits models that never saw it, and what it shows without.
+
+    Attributes:
+        number: of the trial on its terrain, from 0.
+        scores: sample by sample, by every terrain's model.
+        features: of consecutive windows by size, shape (windows, features).
+        overlapping: the same of windows that overlap.
+    """
+
+    number: int
+    scores: TerrainScores
+    features: Mapping[int, Array]
+    overlapping: Mapping[int, Array]
+
+    @classmethod
+    def of(
+        cls, trial: PreparedTrial, number: int, experts: Mapping[str, Expert]
+    ) -> "TrialEvidence":
+        """Return the evidence of a trial."""
+        windows = {size: windows_of(trial.kept, size) for size in WINDOWS}
+        more = {size: windows_of(trial.kept, size, overlap=True) for size in WINDOWS}
+        return cls(
+            number=number,
+            scores=score_trial(trial, experts),
+            features={s: window_features(trial, rows) for s, rows in windows.items()},
+            overlapping={s: window_features(trial, rows) for s, rows in more.items()},
+        )
+
+    def strains(self, terrain: str, size: int, *, overlap: bool = False) -> Array:
+        """Return the mean strain of windows under a terrain's model, shape (n,)."""
+        column = self.scores.strain[:, self.scores.terrains.index(terrain)]
+        windows = windows_of(column.size, size, overlap=overlap)
+        return np.array([column[rows].mean() for rows in windows])
+
+
+@dataclass(frozen=True, slots=True)
+class StudyEvidence:
+    """All trials of a study.
+
+    Attributes:
+        trials: evidence by terrain.
+        surface: "flat", "rocky" or a kind of its own, by terrain.
+    """
+
+    trials: Mapping[str, Sequence[TrialEvidence]]
+    surface: Mapping[str, str]
+
+    def labelled(
+        self, without: int | None = None
+    ) -> list[tuple[Mapping[int, Array], str]]:
+        """Return overlapping features and surface of every trial but one number's."""
+        return [
+            (trial.overlapping, self.surface[name])
+            for name, trials in self.trials.items()
+            for trial in trials
+            if trial.number != without
+        ]
+
+    def limits(
+        self, terrain: str, size: int, without: int | None = None
+    ) -> WindowLimits:
+        """Return the limits of a terrain's windows.
+
+        Stones strain their models alike and share that limit; every terrain has its own
+        least roughness.
+        """
+        own = [t for t in self.trials[terrain] if t.number != without]
+        roughness = [trial.overlapping[size][:, RESID] for trial in own]
+        strain = [
+            trial.strains(name, size, overlap=True)
+            for name in self._alike(terrain)
+            for trial in self.trials[name]
+            if trial.number != without
+        ]
+        return WindowLimits(
+            _quantile(roughness, SMOOTH, -np.inf),
+            _quantile(strain, 1.0 - RARE, np.inf),
+        )
+
+    def _alike(self, terrain: str) -> tuple[str, ...]:
+        if self.surface[terrain] != ROCKY_GROUND:
+            return (terrain,)
+        return self.of_surface(ROCKY_GROUND)
+
+    def of_surface(self, surface: str) -> tuple[str, ...]:
+        """Return the terrains of a surface."""
+        return tuple(name for name in self.trials if self.surface[name] == surface)
+
+
+def _quantile(parts: Sequence[Array], share: float, empty: float) -> float:
+    values = np.concatenate([np.zeros(0), *parts])
+    return float(np.quantile(values, share)) if values.size else empty
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceProbability:
+    """What the classifier says of a window of a trial that it has not seen.
+
+    Attributes:
+        terrain: of the trial.
+        surface: the truth, "flat" or "rocky".
+        rocky: probability of rocky ground.
+    """
+
+    terrain: str
+    surface: str
+    rocky: float
+
+    @property
+    def answer(self) -> str:
+        """The likelier surface."""
+        return ROCKY_GROUND if self.rocky > 0.5 else FLAT_GROUND
+
+
+def surface_probabilities(
+    evidence: StudyEvidence, size: int
+) -> list[SurfaceProbability]:
+    """Return the classifier's probabilities of all windows of a size, held out."""
+    known = {
+        name: trials
+        for name, trials in evidence.trials.items()
+        if evidence.surface[name] in (FLAT_GROUND, ROCKY_GROUND)
+    }
+    probabilities = []
+    for number in sorted({t.number for trials in known.values() for t in trials}):
+        model = LogisticModel.of_trials(evidence.labelled(number), size)
+        if model is None:
+            continue
+        probabilities += [
+            SurfaceProbability(name, evidence.surface[name], float(rocky))
+            for name, trials in known.items()
+            for trial in trials
+            if trial.number == number and len(trial.features[size])
+            for rocky in model.probability(trial.features[size])
+        ]
+    return probabilities
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """How honest probabilities of flat and rocky ground are.
+
+    Attributes:
+        error: mean difference of probability and share over ten bins, both surfaces
+            weighing alike.
+        sure: share of windows answered with 98 % or more.
+        sure_and_wrong: share of windows so answered, and wrong.
+    """
+
+    error: float
+    sure: float
+    sure_and_wrong: float
+
+
+def calibration_of(windows: Sequence[SurfaceProbability]) -> Calibration:
+    """Return the calibration of the probabilities of windows."""
+    p = np.array([window.rocky for window in windows])
+    is_rocky = np.array([window.surface == ROCKY_GROUND for window in windows])
+    share = float(is_rocky.mean())
+    weight = np.where(is_rocky, 0.5 / max(share, 1e-9), 0.5 / max(1.0 - share, 1e-9))
+    place = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    off = np.bincount(place, weight * (p - is_rocky), _BINS)
+    is_sure = np.maximum(p, 1.0 - p) >= SURE
+    return Calibration(
+        error=float(np.abs(off).sum() / weight.sum()),
+        sure=float(is_sure.mean()),
+        sure_and_wrong=float((is_sure & ((p > 0.5) != is_rocky)).mean()),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Exclusion:
+    """How often windows count as of none of the known terrains.
+
+    Attributes:
+        false_alarms: share of windows, their own terrain being known.
+        flat_among_rocky: share of windows of flat ground where only rocky is known;
+            None without either.
+        rocky_among_flat: the other way round.
+    """
+
+    false_alarms: float | None
+    flat_among_rocky: float | None
+    rocky_among_flat: float | None
+
+
+def exclusion_of(evidence: StudyEvidence, size: int) -> Exclusion:
+    """Return how often windows of a size are excluded, by limits of other trials."""
+    rocky, flat = (
+        evidence.of_surface(surface) for surface in (ROCKY_GROUND, FLAT_GROUND)
+    )
+    every = list(evidence.trials)
+    return Exclusion(
+        false_alarms=_excluded(evidence, every, every, size),
+        flat_among_rocky=_excluded(evidence, rocky, flat, size),
+        rocky_among_flat=_excluded(evidence, flat, rocky, size),
+    )
+
+
+def _excluded(
+    evidence: StudyEvidence, known: Sequence[str], tested: Sequence[str], size: int
+) -> float | None:
+    """Return the share of windows of `tested` that are of none of `known`."""
+    limits: dict[tuple[str, int], WindowLimits] = {}
+    verdicts: list[bool] = []
+    for trial in (trial for name in tested for trial in evidence.trials[name]):
+        # a terrain of fewer trials has no model of this number
+        strains = {
+            name: trial.strains(name, size) for name in known if _has(trial, name)
+        }
+        for k, rows in enumerate(trial.scores.windows(size)):
+            if not strains:
+                continue
+            best = _likeliest(trial.scores, rows, strains)
+            key = best, trial.number
+            if key not in limits:
+                limits[key] = evidence.limits(best, size, trial.number)
+            roughness = float(trial.features[size][k, RESID])
+            verdicts.append(limits[key].exclude(roughness, float(strains[best][k])))
+    return float(np.mean(verdicts)) if verdicts else None
+
+
+def _has(trial: TrialEvidence, terrain: str) -> bool:
+    return terrain in trial.scores.terrains
+
+
+def _likeliest(scores: TerrainScores, rows: slice, known: Iterable[str]) -> str:
+    total = scores.log_density[rows].sum(axis=0)
+    return max(known, key=lambda name: float(total[scores.terrains.index(name)]))

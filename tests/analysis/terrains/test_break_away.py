@@ -1,0 +1,91 @@
+"""Forces from rest in a terrain database: written, read back, refused."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from acquisition.errors import SettingsError
+from analysis.study.models import TUSTIN
+from analysis.terrains.database import load
+from analysis.terrains.export import break_away_of, database_of
+
+
+@pytest.fixture(scope="module")
+def fitted(small_study):
+    return break_away_of(small_study)
+
+
+@pytest.fixture(scope="module")
+def path(small_study, tmp_path_factory):
+    fit = replace(small_study.options.fit, models=(TUSTIN,))
+    study = replace(small_study, options=replace(small_study.options, fit=fit))
+    path = tmp_path_factory.mktemp("db") / "terrains.json"
+    path.write_text(database_of(study, None, "2027-01-15T08:00:00Z", 1))
+    return path
+
+
+def changed(path, tmp_path, change):
+    """Return the database with every terrain changed by a function."""
+    content = json.loads(path.read_text())
+    for terrain in content["terrains"].values():
+        change(terrain)
+    file = tmp_path / "changed.json"
+    file.write_text(json.dumps(content))
+    return file
+
+
+@pytest.mark.parametrize("name", ["S0", "B0", "TF"])
+def test_the_database_answers_from_rest_as_the_fit_does(fitted, path, name):
+    known = load(path).terrain(name)
+    here, there = known.slip_risk(4.0, 3.5), fitted[name].slip_risk(4.0, 3.5)
+    assert here.risk == pytest.approx(there.risk, abs=1e-4)
+    assert (here.low, here.high) == pytest.approx((there.low, there.high), abs=1e-4)
+    assert (here.kind, here.slips, here.held, here.v_slip) == (
+        there.kind,
+        there.slips,
+        there.held,
+        there.v_slip,
+    )
+
+
+def test_stones_break_away_and_a_plate_that_hardly_slips_slides(fitted, path):
+    database = load(path)
+    kinds = {name: database.terrain(name).slip_risk(4.0, 3.5).kind for name in fitted}
+    assert kinds == {"S0": "break-away", "B0": "break-away", "TF": "sliding"}
+
+
+def test_the_force_available_has_the_risk_that_was_asked_for(path):
+    known = load(path).terrain("S0")
+    force = known.from_rest.available(3.5, 0.1).force
+    assert known.slip_risk(force, 3.5).risk == pytest.approx(0.1, abs=1e-6)
+
+
+def test_a_foot_in_motion_meets_less_than_one_at_rest_may_ask_for(path):
+    known = load(path).terrain("S0")
+    assert known.risk_in_motion(6.0, 3.5) > 1.5 * known.slip_risk(6.0, 3.5).risk
+
+
+def test_a_database_of_before_break_away_is_still_read(path, tmp_path):
+    old = changed(path, tmp_path, lambda terrain: terrain.pop("parts"))
+    known = load(old).terrain("TF")
+    assert 0.0 < known.risk_in_motion(2.6, 3.5) < 1.0
+    with pytest.raises(SettingsError, match="not known"):
+        known.slip_risk(2.6, 3.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"law": [1.0, 1.0, -1.0, 0.0]}, "spread"),
+        ({"kind": "magic"}, "magic"),
+        ({"v_slip": float("inf")}, "positive"),
+        ({"draws": 3}, "no terrain database"),
+    ],
+)
+def test_a_damaged_break_away_model_is_refused(path, tmp_path, change, said):
+    bad = changed(
+        path, tmp_path, lambda terrain: terrain["parts"]["break_away"].update(change)
+    )
+    with pytest.raises(SettingsError, match=said):
+        load(bad)
