@@ -11,13 +11,23 @@ from scipy.linalg import solve_triangular
 from acquisition import SettingsError
 from analysis.data import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
-from analysis.gp.likelihood import Likelihood, factorise, split
+from analysis.gp.likelihood import Factor, Likelihood, factorise, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import Optimum, Start, StartScores, maximise, spread
+from analysis.gp.search import (
+    Objective,
+    Optimum,
+    Start,
+    StartScores,
+    climb_from,
+    maximise,
+    spread,
+)
+from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
 
 _ROUGH = 150  # rows by which the first starts are chosen
+_SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
@@ -38,6 +48,7 @@ class GaussianProcess:
         starts: where every start of the search ended.
         jitter: what the factorisation needed on the diagonal.
         at_bound: hyperparameters at the edge of the search.
+        trials: where the training rows come from, for noise that trials share.
     """
 
     kernel: Kernel
@@ -52,6 +63,7 @@ class GaussianProcess:
     starts: tuple[Start, ...]
     jitter: float
     at_bound: tuple[str, ...]
+    trials: TrialRows | None = None
 
     def mean(self, inputs: Array) -> Array:
         """Return the predictive mean at `inputs`, shape (m, d), in y's unit."""
@@ -64,7 +76,9 @@ class GaussianProcess:
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
 
-    def given(self, inputs: Array, y: Array) -> "GaussianProcess":
+    def given(
+        self, inputs: Array, y: Array, trials: TrialRows | None = None
+    ) -> "GaussianProcess":
         """Return the process with these hyperparameters, given other training rows.
 
         Standardisation and offset stay those of the rows it was fitted to.
@@ -72,16 +86,18 @@ class GaussianProcess:
         Args:
             inputs: training inputs in their units, shape (n, d).
             y: training outputs, shape (n,).
+            trials: where these rows come from.
         """
-        theta, theta_noise = split(self.kernel, self.theta)
+        _, theta_noise = split(self.kernel, self.theta)
         X, r = (inputs - self.centre) / self.scale, y - self.offset
-        S = self.noise.variance(theta_noise, X)
-        factor = factorise(self.kernel.matrix(theta, X, X), S)
+        factor = _factor((self.kernel, self.noise), self.theta, X, trials)
         alpha = factor.solve(r)
         spread = float(np.log(np.diagonal(factor.L)).sum())
         prior = self.noise.log_prior(theta_noise)[0]
         lml = prior - 0.5 * float(r @ alpha + r.size * np.log(2.0 * np.pi)) - spread
-        return replace(self, X=X, alpha=alpha, lml=lml, jitter=factor.jitter)
+        return replace(
+            self, X=X, alpha=alpha, lml=lml, jitter=factor.jitter, trials=trials
+        )
 
     def predict(
         self, inputs: Array, *, include_noise: bool = True
@@ -98,8 +114,7 @@ class GaussianProcess:
         """
         theta, theta_noise = split(self.kernel, self.theta)
         Z = (inputs - self.centre) / self.scale
-        S = self.noise.variance(theta_noise, self.X) + self.jitter
-        L = factorise(self.kernel.matrix(theta, self.X, self.X), S).L
+        L = _factor((self.kernel, self.noise), self.theta, self.X, self.trials).L
         mean, variance = np.empty(Z.shape[0]), self.kernel.diagonal(theta, Z)
         for i in range(0, Z.shape[0], _BLOCK):
             cross = self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
@@ -112,10 +127,23 @@ class GaussianProcess:
         return mean, variance
 
 
-def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum:
+def posterior_search(
+    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
+) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
+    likelihood = Likelihood(model, X, r, trials)
+    thin = slice(None, None, -(-r.size // _ROUGH))
+    rough = Likelihood(
+        model, X[thin], r[thin], None if trials is None else trials.take(thin)
+    )
+    scores = StartScores(rough.value, likelihood.value)
+    objective = _with_prior(model, likelihood)
+    return maximise(model, objective, X, float(np.std(r)), scores)
+
+
+def _with_prior(model: tuple[Kernel, Noise], likelihood: Likelihood) -> Objective:
+    """Return the likelihood with the noise's prior, and its slope."""
     kernel, noise = model
-    likelihood = Likelihood(model, X, r)
 
     def objective(theta: Array) -> tuple[float, Array]:
         lml, slope = likelihood(theta)
@@ -123,10 +151,18 @@ def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum
         slope[-prior_slope.size :] += prior_slope
         return lml + prior, slope
 
-    every = -(-r.size // _ROUGH)
-    rough = Likelihood(model, X[::every], r[::every])
-    scores = StartScores(rough.value, likelihood.value)
-    return maximise(model, objective, X, float(np.std(r)), scores)
+    return objective
+
+
+def _factor(
+    model: tuple[Kernel, Noise], theta: Array, X: Array, trials: TrialRows | None
+) -> Factor:
+    """Return the factor of the covariance of training rows."""
+    kernel, noise = model
+    theta_kernel, theta_noise = split(kernel, theta)
+    S, _ = noise.evaluate(theta_noise, X)
+    blocks = shared_over(noise, X, trials)(theta_noise).blocks
+    return factorise(kernel.matrix(theta_kernel, X, X), S, blocks=blocks)
 
 
 def fit_gp(
@@ -136,6 +172,7 @@ def fit_gp(
     noise: Noise | None = None,
     *,
     is_centred: bool = True,
+    trials: TrialRows | None = None,
 ) -> GaussianProcess:
     """Return a Gaussian process fitted to `y`.
 
@@ -146,6 +183,7 @@ def fit_gp(
         noise: noise of the measurements, by default constant.
         is_centred: take the mean of `y` off first; False where another mean function
             already was.
+        trials: where the rows come from, for noise that trials share.
 
     Raises:
         SettingsError: fewer than 20 rows, or outputs that do not vary.
@@ -155,10 +193,8 @@ def fit_gp(
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
     X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
-    optimum = posterior_search((kernel, noise), X, y - offset)
-    theta_kernel, theta_noise = split(kernel, optimum.theta)
-    K = kernel.matrix(theta_kernel, X, X)
-    factor = factorise(K, noise.variance(theta_noise, X))
+    optimum = posterior_search((kernel, noise), X, y - offset, trials)
+    factor = _factor((kernel, noise), optimum.theta, X, trials)
     return GaussianProcess(
         kernel=kernel,
         noise=noise,
@@ -168,6 +204,44 @@ def fit_gp(
         offset=offset,
         centre=centre,
         scale=scale,
+        lml=optimum.lml,
+        starts=optimum.starts,
+        jitter=factor.jitter,
+        at_bound=optimum.at_bound,
+        trials=trials,
+    )
+
+
+def refit_gp(
+    process: GaussianProcess, y: Array, ratio: float = 1.0, noise: Noise | None = None
+) -> GaussianProcess:
+    """Return a process of other outputs over the same rows, by a climb from this one.
+
+    For outputs or a noise so alike that the best top is nearly known.
+
+    Args:
+        process: what to begin with.
+        y: training outputs, shape (n,).
+        ratio: standard deviation of `y` over that of the outputs of `process`.
+        noise: noise of the measurements; by default that of `process`.
+    """
+    model = (process.kernel, noise or process.noise)
+    before = dict(
+        zip((*process.kernel.names, *process.noise.names), process.theta, strict=True)
+    )
+    names = (*model[0].names, *model[1].names)
+    start = np.array([before.get(name, 0.0) for name in names])
+    start[[name.rpartition("_")[2] in _SIZES for name in names]] += np.log(ratio)
+    r = y - (offset := float(y.mean()) if process.offset else 0.0)
+    objective = _with_prior(model, Likelihood(model, process.X, r, process.trials))
+    optimum = climb_from(model, objective, process.X, float(np.std(r)), start)
+    factor = _factor(model, optimum.theta, process.X, process.trials)
+    return replace(
+        process,
+        noise=model[1],
+        theta=optimum.theta,
+        alpha=factor.solve(r),
+        offset=offset,
         lml=optimum.lml,
         starts=optimum.starts,
         jitter=factor.jitter,

@@ -1,4 +1,5 @@
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
+from .distribution import SHARES, Distribution, NewTrialPrediction
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
 from .jobs import Store, Workers, available_cores, run_tasks
 from .metrics import (
@@ -12,10 +13,14 @@ from .metrics import (
 from .models import (
     FITTERS,
     GP_NN,
+    GP_NN_TRIAL,
     GP_NN_TUSTIN,
+    GP_NN_TUSTIN_TRIAL,
     GP_SE,
     GP_SE_NOISE,
+    GP_SE_TRIAL,
     GP_SE_TUSTIN,
+    GP_SE_TUSTIN_TRIAL,
     TITLES,
     TUSTIN,
     FitOptions,
@@ -24,6 +29,7 @@ from .models import (
     ModelFitter,
     TustinModel,
 )
+from .new_trial import NewTrialModel, family_counts
 from .noise_selection import NAMES
 from .store import ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
@@ -32,20 +38,28 @@ from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
 __all__ = [
     "FITTERS",
     "GP_NN",
+    "GP_NN_TRIAL",
     "GP_NN_TUSTIN",
+    "GP_NN_TUSTIN_TRIAL",
     "GP_SE",
     "GP_SE_NOISE",
+    "GP_SE_TRIAL",
     "GP_SE_TUSTIN",
+    "GP_SE_TUSTIN_TRIAL",
     "NAMES",
+    "SHARES",
     "TITLES",
     "TUSTIN",
     "CsvRow",
+    "Distribution",
     "FitOptions",
     "FittedModel",
     "FoldResult",
     "GpModel",
     "ModelFitter",
     "ModelFold",
+    "NewTrialModel",
+    "NewTrialPrediction",
     "PairedComparison",
     "PooledTustinFit",
     "Prediction",
@@ -59,6 +73,7 @@ __all__ = [
     "adjusted_by_holm",
     "available_cores",
     "compare",
+    "family_counts",
     "flag_counts",
     "mean_of",
     "plan_folds",

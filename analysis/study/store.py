@@ -29,10 +29,20 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import SampleTable
-from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise
+from analysis.gp import (
+    Arcsine,
+    GaussianProcess,
+    Start,
+    TrialNoise,
+    TrialRows,
+    kernels,
+    noise,
+)
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
+from analysis.study.distribution import ShapeMap
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
+from analysis.study.new_trial import FamilyChoice, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
 from analysis.tustin import Interval, Profiles
@@ -44,12 +54,13 @@ _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
-VERSION = 3  # of the numbers: higher whenever the same task gives another result
+VERSION = 4  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
     kind.__name__: kind
     for kind in (
         Arcsine,
+        FamilyChoice,
         FitOptions,
         FoldResult,
         FoldTask,
@@ -57,14 +68,18 @@ TYPES = {
         GpModel,
         Interval,
         ModelFold,
+        NewTrialModel,
         NoiseChoice,
         Profiles,
         SampleTable,
         Score,
+        ShapeMap,
         Start,
         TailedNoise,
         PooledTustinFit,
         TerrainTask,
+        TrialNoise,
+        TrialRows,
         TustinModel,
         kernels.Product,
         kernels.SquaredExponential,

@@ -1,4 +1,5 @@
-from .database import load
+from .database import KnownTerrain, TerrainDatabase
+from .database_file import load, to_text
 from .export import database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .recognition import Recognition, recognise
@@ -8,12 +9,15 @@ __all__ = [
     "KEPT_PER_SECOND",
     "Confusion",
     "Identification",
+    "KnownTerrain",
     "Recognition",
     "SlipRisk",
+    "TerrainDatabase",
     "TractionEstimate",
     "TractionEstimates",
     "database_of",
     "identify_study",
     "load",
     "recognise",
+    "to_text",
 ]

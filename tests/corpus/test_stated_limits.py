@@ -20,7 +20,7 @@ from acquisition.trial_file.salvage import SoundRecords
 from analysis.data.columns import LONGEST_LINE
 from analysis.data.tables import LARGEST_FILE, MOST_TRIALS, load_tables
 from analysis.study.store import LARGEST, MOST_BYTES
-from analysis.terrains import database
+from analysis.terrains import database_file as database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import parse_object
 from experiments.session.store import MOST_EVENTS, create_session
@@ -241,7 +241,7 @@ def stored(path, *, terrains=1, points=2):
     content["axes"]["v_t"] = [0.1 * k for k in range(points)]
     terrain = content["terrains"].pop("S0")
     table = [[1.0] * points] * 2
-    terrain["models"]["gp"] |= {"mean": table, "sd": table}
+    terrain["models"]["gp"]["quantiles"] = [table, table]
     content["terrains"] = {f"S{number}": terrain for number in range(terrains)}
     path.write_text(json.dumps(content))
     return path
