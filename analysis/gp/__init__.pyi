@@ -2,7 +2,7 @@ from . import kernels, noise, trial_noise
 from .arcsine import Arcsine
 from .kernels import Kernel, SquaredExponential
 from .noise import ConstantNoise, LogLinearNoise
-from .regression import GaussianProcess, fit_gp, refit_gp
+from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
 from .search import Start
 from .trial_noise import TrialNoise, TrialRows
 
@@ -21,4 +21,5 @@ __all__ = [
     "noise",
     "refit_gp",
     "trial_noise",
+    "without_idle_inputs",
 ]

@@ -28,6 +28,7 @@ MINIMUM_ROWS = 20
 
 _ROUGH = 150  # rows by which the first starts are chosen
 _SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
+_LONG = 1.0  # logarithm of a length from which on an input may be idle
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
@@ -212,38 +213,55 @@ def fit_gp(
     )
 
 
-def refit_gp(
-    process: GaussianProcess, y: Array, ratio: float = 1.0, noise: Noise | None = None
-) -> GaussianProcess:
+def refit_gp(process: GaussianProcess, y: Array, ratio: float) -> GaussianProcess:
     """Return a process of other outputs over the same rows, by a climb from this one.
 
-    For outputs or a noise so alike that the best top is nearly known.
+    For outputs so alike that the best top is nearly known.
 
     Args:
         process: what to begin with.
         y: training outputs, shape (n,).
         ratio: standard deviation of `y` over that of the outputs of `process`.
-        noise: noise of the measurements; by default that of `process`.
     """
-    model = (process.kernel, noise or process.noise)
-    before = dict(
-        zip((*process.kernel.names, *process.noise.names), process.theta, strict=True)
-    )
-    names = (*model[0].names, *model[1].names)
-    start = np.array([before.get(name, 0.0) for name in names])
-    start[[name.rpartition("_")[2] in _SIZES for name in names]] += np.log(ratio)
-    r = y - (offset := float(y.mean()) if process.offset else 0.0)
-    objective = _with_prior(model, Likelihood(model, process.X, r, process.trials))
-    optimum = climb_from(model, objective, process.X, float(np.std(r)), start)
+    names = (*process.kernel.names, *process.noise.names)
+    is_size = [name.rpartition("_")[2] in _SIZES for name in names]
+    return _climbed(process, y, process.theta + np.log(ratio) * np.array(is_size))
+
+
+def without_idle_inputs(process: GaussianProcess, y: Array) -> GaussianProcess:
+    """Return the process, or a likelier one that makes no use of one of its inputs.
+
+    On a straight trend a long length and an endless one are two tops, and the search
+    offers the second only where the likelihood is flat between them.
+
+    Args:
+        process: what to begin with.
+        y: its training outputs, shape (n,).
+    """
+    best = process
+    for k, name in enumerate(process.kernel.names):
+        if name.rpartition("_")[2].startswith("l") and process.theta[k] > _LONG:
+            start = process.theta.copy()
+            start[k] = np.inf  # the climb begins at the bound
+            best = max(best, _climbed(process, y, start), key=lambda gp: gp.lml)
+    return best
+
+
+def _climbed(process: GaussianProcess, y: Array, start: Array) -> GaussianProcess:
+    """Return the process of outputs y that a climb from `start` leads to."""
+    model = (process.kernel, process.noise)
+    offset = float(y.mean()) if process.offset else 0.0
+    likelihood = Likelihood(model, process.X, y - offset, process.trials)
+    objective = _with_prior(model, likelihood)
+    optimum = climb_from(model, objective, process.X, float(np.std(y - offset)), start)
     factor = _factor(model, optimum.theta, process.X, process.trials)
     return replace(
         process,
-        noise=model[1],
         theta=optimum.theta,
-        alpha=factor.solve(r),
+        alpha=factor.solve(y - offset),
         offset=offset,
         lml=optimum.lml,
-        starts=optimum.starts,
+        starts=(*process.starts, *optimum.starts),
         jitter=factor.jitter,
         at_bound=optimum.at_bound,
     )

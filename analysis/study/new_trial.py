@@ -25,6 +25,7 @@ from analysis.gp import (
     TrialRows,
     fit_gp,
     refit_gp,
+    without_idle_inputs,
 )
 from analysis.study.distribution import (
     FEWEST,
@@ -215,14 +216,16 @@ class NewTrialFit:
     def _fitted(
         self, kernel: Kernel, within: ConstantNoise | LogLinearNoise, c: float | None
     ) -> GaussianProcess:
-        return fit_gp(
+        outputs = self._outputs(self._chosen, c)
+        process = fit_gp(
             self._rows.inputs,
-            self._outputs(self._chosen, c),
+            outputs,
             kernel,
             self._noise(within),
             is_centred=self._curve is None,
             trials=self._trials,
         )
+        return without_idle_inputs(process, outputs)
 
     def _noise(self, within: ConstantNoise | LogLinearNoise) -> TrialNoise:
         load = self._rows.F_n
