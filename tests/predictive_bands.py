@@ -30,11 +30,11 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.search import climb_from, spread
 from analysis.study.crossval import FoldTask, choose_rows, plan_folds
-from analysis.study.distribution import warped
 from analysis.study.jobs import run_tasks
 from analysis.study.metrics import Score, score
 from analysis.study.models import GP_SE_NOISE, GP_SE_TRIAL, FitOptions, ModelFitter
 from analysis.study.new_trial import NORMAL, NewTrialFit, NewTrialModel
+from analysis.study.skew import warped
 from experiments.session import list_sessions
 
 BEFORE, EFFECT, NEW = "noise chosen", "trial effect alone", "new trial"

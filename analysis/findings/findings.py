@@ -7,6 +7,11 @@ from typing import Any
 import numpy as np
 
 from analysis.data import LEVELS
+from analysis.findings.new_trial_bands import (
+    HeldOutShares,
+    held_out_shares,
+    plain_shares,
+)
 from analysis.findings.paper_claims import PaperClaim, paper_claims
 from analysis.findings.paper_measures import gather_evidence
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
@@ -42,6 +47,7 @@ class StudyResults:
         study: the study.
         identification: how well the terrains can be told apart; None for one terrain.
         noise: constant against chosen noise, by terrain.
+        shares: where samples lie in what is predicted for a new trial, by terrain.
         trends: of the trial means, by terrain and measure.
         residuals: by terrain and model.
         axes: of the surfaces.
@@ -55,6 +61,7 @@ class StudyResults:
     study: Study
     identification: Identification | None
     noise: Sequence[NoiseSummary]
+    shares: Sequence[HeldOutShares]
     trends: Mapping[str, Mapping[str, Trend]]
     residuals: Mapping[str, Mapping[str, ResidualBand]]
     axes: SurfaceAxes
@@ -80,6 +87,7 @@ def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
         study=study,
         identification=identification,
         noise=noise,
+        shares=held_out_shares(study),
         trends={name: trends_of(result) for name, result in results.items()},
         residuals={
             name: {
@@ -106,6 +114,7 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
     return {
         "identification": _identification(results.identification),
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
+        "new_trial": {of.terrain: plain_shares(of) for of in results.shares},
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
             for name, trends in results.trends.items()

@@ -4,6 +4,7 @@ Equations 6 and 7 of the traction paper.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -76,6 +77,19 @@ class GaussianProcess:
             for i in range(0, Z.shape[0], _BLOCK)
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
+
+    def describe(self) -> dict[str, Any]:
+        """Return hyperparameters, likelihood, starts, jitter and standardisation."""
+        names = (*self.kernel.names, *self.noise.names)
+        return {
+            "theta": dict(zip(names, self.theta.tolist(), strict=True)),
+            "lml": self.lml,
+            "starts": [s._asdict() | {"theta": list(s.theta)} for s in self.starts],
+            "jitter": self.jitter,
+            "centre": self.centre.tolist(),
+            "scale": self.scale.tolist(),
+            "offset": self.offset,
+        }
 
     def given(
         self, inputs: Array, y: Array, trials: TrialRows | None = None

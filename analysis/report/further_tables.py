@@ -6,6 +6,7 @@ from statistics import median
 from analysis.data import LATEST_MS, LEVELS
 from analysis.figures import ReportSection
 from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
+from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
 from analysis.report.paper_tables import with_error
 from analysis.study import (
@@ -39,6 +40,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
         independent_samples(results),
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
+        *new_trial_tables(results),
         lag_table(study),
         *recognition_tables(results),
         trend_table(results),

@@ -31,9 +31,11 @@ from .models import (
 )
 from .new_trial import NewTrialModel, family_counts
 from .noise_selection import NAMES
+from .skew import ShapeMap
 from .store import ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
 from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
+from .trial_components import TOLD_APART, TrialComponents
 
 __all__ = [
     "FITTERS",
@@ -49,6 +51,7 @@ __all__ = [
     "NAMES",
     "SHARES",
     "TITLES",
+    "TOLD_APART",
     "TUSTIN",
     "CsvRow",
     "Distribution",
@@ -64,10 +67,12 @@ __all__ = [
     "PooledTustinFit",
     "Prediction",
     "ResultStore",
+    "ShapeMap",
     "Store",
     "Study",
     "StudyOptions",
     "TerrainResult",
+    "TrialComponents",
     "TustinModel",
     "Workers",
     "adjusted_by_holm",

@@ -9,19 +9,18 @@ A few trials say little about b: their number less one is k, and s stands for wh
 be (the posterior of a variance under Jeffreys' prior). The mixture is taken over 40
 equally probable values of s, so that its distribution function is a plain mean.
 
-A shape on top turns the normal score x of a measurement into another one,
-S(x) = sinh(delta asinh((x - xi) / eta) - epsilon), which is normal again where x is not
-(Jones and Pewsey 2009).
+A `ShapeMap` may be put on top of the normal scores.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from analysis.data import Array
+from analysis.study.skew import ShapeMap, log_warp_slope, unwarped, warped
 
 SHARES = (0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 FEWEST = 4  # degrees of freedom of a variance between trials, however few there are
@@ -30,8 +29,6 @@ _MIXED = 40  # values of the variance between trials
 _NODES = 64  # shares that moments and scores are integrated over
 _RATIOS = 129  # of variance between trials over all of it, for quantiles
 _EDGE = 1e-12  # a share nearer to 0 or 1 has no normal score worth the name
-_CLIPPED = 0.95  # c times this below zero, where the warp would lose its logarithm
-_STEEPEST = 50.0  # z / c beyond which an exponential is no force any more
 
 
 class Distribution(Protocol):
@@ -56,7 +53,7 @@ class Distribution(Protocol):
         """Return the probability of less than F_t [N], each (n,)."""
         ...
 
-    def quantiles(self, shares: Sequence[float]) -> Array:
+    def quantiles(self, shares: Sequence[float] | Array) -> Array:
         """Return the forces [N] that are not reached with these shares, (q, n)."""
         ...
 
@@ -67,67 +64,6 @@ class Distribution(Protocol):
     def ranked_probability(self, F_t: Array) -> Array:
         """Return the continuous ranked probability score of F_t [N], shape (n,)."""
         ...
-
-
-class ShapeMap(NamedTuple):
-    """S(x) = sinh(delta asinh((x - xi) / eta) - epsilon), increasing.
-
-    Attributes:
-        xi: shift of the normal score.
-        log_eta: logarithm of its scale.
-        epsilon: skew; above 0 the predicted distribution leans to large forces.
-        log_delta: logarithm of its tails: below 0 they are heavier than a normal's.
-    """
-
-    xi: float = 0.0
-    log_eta: float = 0.0
-    epsilon: float = 0.0
-    log_delta: float = 0.0
-
-    def score(self, x: Array) -> Array:
-        """Return S(x)."""
-        return np.sinh(self._inner(x))
-
-    def log_slope(self, x: Array) -> Array:
-        """Return log dS/dx."""
-        far = (x - self.xi) / np.exp(self.log_eta)
-        steep = np.log(np.cosh(self._inner(x))) - 0.5 * np.log1p(far**2)
-        return steep + self.log_delta - self.log_eta
-
-    def inverse(self, score: Array) -> Array:
-        """Return x of S(x) = score."""
-        bent = (np.arcsinh(score) + self.epsilon) / np.exp(self.log_delta)
-        return self.xi + np.exp(self.log_eta) * np.sinh(bent)
-
-    def log_gain(self, x: Array) -> Array:
-        """Return by how much the log density changes where the score was x."""
-        return 0.5 * (x**2 - self.score(x) ** 2) + self.log_slope(x)
-
-    def _inner(self, x: Array) -> Array:
-        far = (x - self.xi) / np.exp(self.log_eta)
-        return np.exp(self.log_delta) * np.arcsinh(far) - self.epsilon
-
-
-def warped(F_t: Array, c: float | None) -> Array:
-    """Return z = c log(y + c), the forces below -0.95 c put there; None: as they are.
-
-    Args:
-        F_t: forces y [N].
-        c: where the logarithm bends [N].
-    """
-    return F_t if c is None else c * np.log(np.maximum(F_t, -_CLIPPED * c) + c)
-
-
-def unwarped(z: Array, c: float | None) -> Array:
-    """Return y = exp(z / c) - c [N]."""
-    return z if c is None else np.exp(np.minimum(z / c, _STEEPEST)) - c
-
-
-def log_warp_slope(F_t: Array, c: float | None) -> Array:
-    """Return log dz/dy = log(c / (y + c)), 0 without a warp."""
-    if c is None:
-        return np.zeros(F_t.shape)
-    return np.log(c / (np.maximum(F_t, -_CLIPPED * c) + c))
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +111,7 @@ class NewTrialPrediction:
         x = self.normal_score(F_t)
         return ndtr(x if self.shape is None else self.shape.score(x))
 
-    def quantiles(self, shares: Sequence[float]) -> Array:
+    def quantiles(self, shares: Sequence[float] | Array) -> Array:
         """Return the forces [N] that are not reached with these shares, (q, n)."""
         from scipy.special import ndtr, ndtri
 

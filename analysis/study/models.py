@@ -37,6 +37,9 @@ GP_SE_TRIAL = "gp_se_trial"
 GP_NN_TRIAL = "gp_nn_trial"
 GP_SE_TUSTIN_TRIAL = "gp_se_tustin_trial"
 GP_NN_TUSTIN_TRIAL = "gp_nn_tustin_trial"
+NEW_TRIAL = frozenset(
+    {GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL, GP_NN_TUSTIN_TRIAL}
+)
 TITLES = {
     TUSTIN: "Tustin",
     GP_SE: "GP (SE)",
@@ -174,16 +177,7 @@ class GpModel:
 
     def describe(self) -> dict[str, Any]:
         """Return hyperparameters, likelihood, starts, jitter and standardisation."""
-        gp = self.process
-        names = (*gp.kernel.names, *gp.noise.names)
-        return {
-            "theta": dict(zip(names, gp.theta.tolist(), strict=True)),
-            "lml": gp.lml,
-            "starts": [s._asdict() | {"theta": list(s.theta)} for s in gp.starts],
-            "jitter": gp.jitter,
-            "centre": gp.centre.tolist(),
-            "scale": gp.scale.tolist(),
-            "offset": gp.offset,
+        return self.process.describe() | {
             "curve": None if self.curve is None else asdict(self.curve.parameters),
             "tails": None if self.tails is None else self.tails._asdict(),
             "noise": None if self.choice is None else self.choice._asdict(),

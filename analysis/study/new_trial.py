@@ -5,12 +5,12 @@ that changes with the inputs, and normal noise around a warped force z = c log(y
 The choice is made among the training trials only, by the log density (of y) of each of
 them left out in turn: the hyperparameters stay, its rows are taken out and the rest is
 factorised again. Another family than the normal one must be better by one standard
-error over the trials; so must a `ShapeMap` on top of the chosen one, of which every
-trial is scored by the shape of the others.
+error over the trials and by 0.05 log N. So must a `ShapeMap` on top of the chosen one
+be, by one standard error; every trial is scored by the shape of the others.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,10 +27,12 @@ from analysis.gp import (
     refit_gp,
     without_idle_inputs,
 )
-from analysis.study.distribution import (
-    FEWEST,
-    NewTrialPrediction,
+from analysis.study.distribution import FEWEST, NewTrialPrediction
+from analysis.study.noise_selection import clearly_best
+from analysis.study.skew import (
     ShapeMap,
+    choose_shape,
+    deepest,
     log_warp_slope,
     unwarped,
     warped,
@@ -42,9 +44,9 @@ FAMILIES = (NORMAL, LOGLINEAR, WARPED)
 LEVEL, RATIO, BOTH = "constant", "proportional", "both"
 EFFECTS = (LEVEL, RATIO, BOTH)
 
+LEAST_GAIN = 0.05  # log N; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
 _BENDS = (1.0, 3.0, 9.0)  # N, c of the warp
 _THIN = 5  # of the rows of a trial left out every fifth is scored
-_SHAPE_BOX = ((-1.0, 1.0), (-0.7, 0.7), (-1.0, 1.0), (-0.7, 0.7))
 
 
 class FamilyChoice(NamedTuple):
@@ -101,29 +103,14 @@ class NewTrialModel:
 
     def predict(self, F_n: Array, v_t: Array) -> NewTrialPrediction:
         """Return the distribution of measurements of a new trial."""
-        inputs = np.column_stack([F_n, v_t])
-        prediction = _predict(self.process, inputs, self.trials)
-        return NewTrialPrediction(
-            centre=prediction.centre + _curve(self.curve, inputs, self.c),
-            within=prediction.within,
-            between=prediction.between,
-            freedom=prediction.freedom,
-            c=self.c,
-            shape=self.shape,
-        )
+        inputs, around = np.column_stack([F_n, v_t]), (self.curve, self.c)
+        prediction = _predict(self.process, inputs, self.trials, around)
+        return replace(prediction, shape=self.shape)
 
     def describe(self) -> dict[str, Any]:
         """Return hyperparameters, likelihood, starts, family and standardisation."""
-        gp = self.process
-        names = (*gp.kernel.names, *gp.noise.names)
-        return {
-            "theta": dict(zip(names, gp.theta.tolist(), strict=True)),
-            "lml": gp.lml,
-            "starts": [s._asdict() | {"theta": list(s.theta)} for s in gp.starts],
-            "jitter": gp.jitter,
-            "centre": gp.centre.tolist(),
-            "scale": gp.scale.tolist(),
-            "offset": gp.offset,
+        return self.process.describe() | {
+            "curve": None if self.curve is None else asdict(self.curve.parameters),
             "trials": self.trials,
             "c": self.c,
             "shape": None if self.shape is None else self.shape._asdict(),
@@ -181,18 +168,17 @@ class NewTrialFit:
         """
         candidates = self._candidates(kernel)
         scores = [self._held_out(candidate) for candidate in candidates]
-        nlpd = np.array([[-part.mean() for part, _ in each] for each in scores])
-        best = _best(nlpd)
+        nlpd = np.array([[-part.mean() for part, _ in each] for each in scores]).T
+        best = clearly_best(nlpd, LEAST_GAIN)
         chosen = candidates[best]
         shape, gain = None, 0.0
         if len(candidates) > 1:
-            shape, gain = _choose_shape([x for _, x in scores[best]])
-        floor = -np.inf if chosen.c is None else -0.95 * chosen.c
+            shape, gain = choose_shape([x for _, x in scores[best]])
         choice = FamilyChoice(
             chosen.family,
-            {c.family: float(m) for c, m in zip(candidates, nlpd.mean(1), strict=True)},
+            {c.family: float(m) for c, m in zip(candidates, nlpd.mean(0), strict=True)},
             gain,
-            int(np.count_nonzero(self._rows.F_t < floor)),
+            int(np.count_nonzero(self._rows.F_t < deepest(chosen.c))),
         )
         count = len(self._left_out)
         return NewTrialModel(
@@ -265,15 +251,9 @@ class NewTrialFit:
             TrialRows(label, np.zeros(label.size)),
         )
         tested: SampleTable = self._training.rows.take(rows)
-        prediction = _predict(others, tested.inputs, len(self._left_out) - 1)
-        moved = NewTrialPrediction(
-            prediction.centre + _curve(self._curve, tested.inputs, c),
-            prediction.within,
-            prediction.between,
-            prediction.freedom,
-            c,
-        )
-        return moved.log_density(tested.F_t), moved.normal_score(tested.F_t)
+        count = len(self._left_out) - 1
+        prediction = _predict(others, tested.inputs, count, (self._curve, c))
+        return prediction.log_density(tested.F_t), prediction.normal_score(tested.F_t)
 
 
 def fit_new_trial(
@@ -290,17 +270,21 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
 
 
 def _predict(
-    process: GaussianProcess, inputs: Array, trials: int
+    process: GaussianProcess,
+    inputs: Array,
+    trials: int,
+    around: tuple[TustinFit | None, float | None],
 ) -> NewTrialPrediction:
+    """Return what a process of z predicts around a curve, warped with c."""
+    curve, c = around
     mean, variance = process.predict(inputs)
     between = np.zeros(mean.shape)
     if isinstance(process.noise, TrialNoise):
         theta = process.theta[len(process.kernel.names) :]
         Z = (inputs - process.centre) / process.scale
         between = process.noise.trial_variance(theta, Z)
-    return NewTrialPrediction(
-        mean, variance - between, between, max(trials - 1, FEWEST)
-    )
+    centre, freedom = mean + _curve(curve, inputs, c), max(trials - 1, FEWEST)
+    return NewTrialPrediction(centre, variance - between, between, freedom, c)
 
 
 def _curve(curve: TustinFit | None, inputs: Array, c: float | None) -> Array:
@@ -308,52 +292,3 @@ def _curve(curve: TustinFit | None, inputs: Array, c: float | None) -> Array:
     if curve is None:
         return np.zeros(inputs.shape[0])
     return warped(curve.mean(inputs[:, 0], inputs[:, 1]), c)
-
-
-def _best(nlpd: Array) -> int:
-    """Return the family of the smallest NLPD, (families, trials), or the first one.
-
-    Another than the first must be better by one standard error over the trials.
-    """
-    gain = nlpd[0] - nlpd
-    count = nlpd.shape[1]
-    error = gain.std(axis=1, ddof=1) / np.sqrt(count) if count > 1 else np.inf
-    mean = np.where(gain.mean(axis=1) > error, nlpd.mean(axis=1), np.inf)
-    mean[0] = nlpd[0].mean()
-    return int(np.argmin(mean))
-
-
-def _choose_shape(scores: Sequence[Array]) -> tuple[ShapeMap | None, float]:
-    """Return a shape if it raises the density of trials that it was not fitted to.
-
-    Args:
-        scores: normal scores of the rows of every trial left out.
-    """
-    count = len(scores)
-    if count < 3:
-        return None, 0.0
-    gains = np.array(
-        [
-            float(_fitted_shape([*scores[:k], *scores[k + 1 :]]).log_gain(x).mean())
-            for k, x in enumerate(scores)
-        ]
-    )
-    gain, error = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(count))
-    return (_fitted_shape(scores) if gain > error else None), gain
-
-
-def _fitted_shape(scores: Sequence[Array]) -> ShapeMap:
-    """Return the shape of largest likelihood, each trial with the same weight."""
-    from scipy.optimize import minimize
-
-    x = np.concatenate(scores)
-    weight = np.concatenate([np.full(part.size, 1.0 / part.size) for part in scores])
-    weight /= weight.sum()
-
-    def cost(theta: Array) -> float:
-        return -float(weight @ ShapeMap(*theta).log_gain(x)) + 0.005 * float(
-            theta @ theta
-        )
-
-    optimum = minimize(cost, np.zeros(4), method="L-BFGS-B", bounds=_SHAPE_BOX)
-    return ShapeMap(*(float(value) for value in optimum.x))

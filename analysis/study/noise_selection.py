@@ -94,12 +94,22 @@ def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
     nlpd = np.concatenate(
         [_left_out(training, group, points, seed) for group in range(groups)]
     )
+    averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
+    return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
+
+
+def clearly_best(nlpd: Array, least: float = 0.0) -> int:
+    """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
+
+    Another than the first must be better by one standard error over the trials, and by
+    `least` [log N].
+    """
     gain = nlpd[:, :1] - nlpd
     error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
-    mean = np.where(gain.mean(axis=0) > error, nlpd.mean(axis=0), np.inf)
+    is_clear = gain.mean(axis=0) > np.maximum(error, least)
+    mean = np.where(is_clear, nlpd.mean(axis=0), np.inf)
     mean[0] = nlpd[:, 0].mean()
-    averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
-    return NoiseChoice(NAMES[int(np.argmin(mean))], averages)
+    return int(np.argmin(mean))
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:

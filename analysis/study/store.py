@@ -29,22 +29,15 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import SampleTable
-from analysis.gp import (
-    Arcsine,
-    GaussianProcess,
-    Start,
-    TrialNoise,
-    TrialRows,
-    kernels,
-    noise,
-)
+from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise, trial_noise
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
-from analysis.study.distribution import ShapeMap
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.new_trial import FamilyChoice, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
+from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
+from analysis.study.trial_components import ComponentsTask, TimedRows, TrialComponents
 from analysis.tustin import Interval, Profiles
 from analysis.tustin import model as tustin
 
@@ -60,6 +53,7 @@ TYPES = {
     kind.__name__: kind
     for kind in (
         Arcsine,
+        ComponentsTask,
         FamilyChoice,
         FitOptions,
         FoldResult,
@@ -76,16 +70,18 @@ TYPES = {
         ShapeMap,
         Start,
         TailedNoise,
+        TimedRows,
+        TrialComponents,
         PooledTustinFit,
         TerrainTask,
-        TrialNoise,
-        TrialRows,
         TustinModel,
         kernels.Product,
         kernels.SquaredExponential,
         kernels.Sum,
         noise.ConstantNoise,
         noise.LogLinearNoise,
+        trial_noise.TrialNoise,
+        trial_noise.TrialRows,
         tustin.TustinBounds,
         tustin.TustinFit,
         tustin.TustinForm,

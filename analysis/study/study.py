@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 
@@ -23,8 +24,13 @@ from analysis.data import (
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.metrics import standard_error
-from analysis.study.models import FitOptions
+from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
+from analysis.study.trial_components import (
+    ComponentsTask,
+    TimedRows,
+    fit_components,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,9 +135,18 @@ def run_study(
         Workers(options.n_jobs, options.scheduler),
         _wholes(prepared, options),
     )
-    first, second = _in_turn(progress, len(tasks), len(whole_tasks))
+    component_tasks = _component_tasks(prepared, options.fit)
+    counts = len(tasks), len(whole_tasks), len(component_tasks)
+    first, second, third = _in_turn(progress, counts)
     folds = run_tasks(run_fold, tasks, workers, first, store)
     wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
+    components = dict(
+        zip(
+            (task.terrain for task in component_tasks),
+            run_tasks(fit_components, component_tasks, workers, third, store),
+            strict=True,
+        )
+    )
     notes += [note for fold in folds for note in fold.notes]
     results = {
         terrain: TerrainResult(
@@ -141,6 +156,7 @@ def run_study(
             slips=tuple(find_slips(trial.smooth) for trial in kept),
             folds=tuple(fold for fold in folds if fold.terrain == terrain),
             whole=whole,
+            components=components.get(terrain),
         )
         for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
     }
@@ -159,17 +175,28 @@ def _prepared(
     }
 
 
-def _in_turn(
-    progress: Progress | None, first: int, second: int
-) -> tuple[Progress | None, Progress | None]:
-    """Return one progress as that of two runs of tasks, one after the other."""
+def _in_turn(progress: Progress | None, counts: Sequence[int]) -> list[Progress | None]:
+    """Return one progress as that of several runs of tasks, one after the other."""
     if progress is None:
-        return None, None
-    total = first + second
-    return (
-        lambda done, _: progress(done, total),
-        lambda done, _: progress(first + done, total),
-    )
+        return [None] * len(counts)
+    total = sum(counts)
+    before = [0, *accumulate(counts)]
+    return [
+        lambda done, _, start=start: progress(start + done, total)
+        for start in before[:-1]
+    ]
+
+
+def _component_tasks(
+    prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
+) -> list[ComponentsTask]:
+    """Return a task per terrain, none where no model of a new trial is asked for."""
+    if not NEW_TRIAL & set(fit.models):
+        return []
+    return [
+        ComponentsTask(terrain, tuple(TimedRows.of(t) for t in trials if t.kept), fit)
+        for terrain, trials in prepared.items()
+    ]
 
 
 def _wholes(

@@ -3,15 +3,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from analysis.study.distribution import (
-    SHARES,
-    NewTrialPrediction,
-    ShapeMap,
-    log_warp_slope,
-    unwarped,
-    warped,
-)
+from analysis.study.distribution import SHARES, NewTrialPrediction
 from analysis.study.metrics import Prediction, score
+from analysis.study.skew import ShapeMap, log_warp_slope, unwarped, warped
 
 SHAPE = ShapeMap(0.2, 0.1, -0.4, -0.2)
 KINDS = {

@@ -6,7 +6,6 @@ import pytest
 from acquisition.errors import SettingsError
 from analysis.data.samples import SampleTable, TrainingSet
 from analysis.gp.kernels import SquaredExponential
-from analysis.study.distribution import unwarped, warped
 from analysis.study.metrics import coverage, log_density
 from analysis.study.models import (
     BEYOND,
@@ -19,6 +18,7 @@ from analysis.study.models import (
     ModelFitter,
 )
 from analysis.study.new_trial import NORMAL, NewTrialFit, family_counts
+from analysis.study.skew import unwarped, warped
 
 PER_TRIAL, CHOSEN = 120, 150
 SE = SquaredExponential()
