@@ -145,8 +145,7 @@ def paired_table(study: Study, key: str, unit: str) -> ReportTable:
         for n in names
         for m in others
     ]
-    cells = paired_cells(pairs)
-    width = len(others)
+    cells, width = paired_cells(pairs), len(others)
     rows = [[n, *cells[k * width : (k + 1) * width]] for k, n in enumerate(names)]
     return ReportTable(
         name=f"{key.upper()} against {TITLES[first]}, trial by trial",
@@ -289,7 +288,7 @@ def slope_cell(trend: Trend) -> str:
     return f"{trend.slope:+.3f} ± {trend.slope_error:.3f}"
 
 
-_MEASURES: Sequence[tuple[str, str]] = (("mae", "N"), ("nlpd", "log N"))
+_MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
 
 def _cells(result: TerrainResult, model: str) -> list[str]:

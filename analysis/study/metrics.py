@@ -186,6 +186,20 @@ def compare(
     return PairedComparison(mean, error, float(np.mean(is_as_large)), count)
 
 
+def clearly_best(nlpd: Array, least: float = 0.0) -> int:
+    """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
+
+    Another than the first must be better by one standard error over the trials, and by
+    `least` [log N].
+    """
+    gain = nlpd[:, :1] - nlpd
+    error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
+    is_clear = gain.mean(axis=0) > np.maximum(error, least)
+    mean = np.where(is_clear, nlpd.mean(axis=0), np.inf)
+    mean[0] = nlpd[:, 0].mean()
+    return int(np.argmin(mean))
+
+
 def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:
     """Return p values that hold for all comparisons together, in the order given.
 

@@ -28,7 +28,7 @@ from analysis.gp import (
     without_idle_inputs,
 )
 from analysis.study.distribution import FEWEST, NewTrialPrediction
-from analysis.study.noise_selection import clearly_best
+from analysis.study.metrics import clearly_best
 from analysis.study.skew import (
     ShapeMap,
     choose_shape,

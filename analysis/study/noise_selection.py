@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.data import Array, SampleTable, TrainingSet
 from analysis.gp import ConstantNoise, GaussianProcess, LogLinearNoise, fit_gp
-from analysis.study.metrics import Prediction, log_density
+from analysis.study.metrics import Prediction, clearly_best, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]
 
@@ -96,20 +96,6 @@ def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
     )
     averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
     return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
-
-
-def clearly_best(nlpd: Array, least: float = 0.0) -> int:
-    """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
-
-    Another than the first must be better by one standard error over the trials, and by
-    `least` [log N].
-    """
-    gain = nlpd[:, :1] - nlpd
-    error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
-    is_clear = gain.mean(axis=0) > np.maximum(error, least)
-    mean = np.where(is_clear, nlpd.mean(axis=0), np.inf)
-    mean[0] = nlpd[:, 0].mean()
-    return int(np.argmin(mean))
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:

@@ -131,22 +131,14 @@ def run_study(
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
-    workers, whole_tasks = (
-        Workers(options.n_jobs, options.scheduler),
-        _wholes(prepared, options),
-    )
-    component_tasks = _component_tasks(prepared, options.fit)
-    counts = len(tasks), len(whole_tasks), len(component_tasks)
+    workers = Workers(options.n_jobs, options.scheduler)
+    whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
+    counts = len(tasks), len(whole_tasks), len(apart)
     first, second, third = _in_turn(progress, counts)
     folds = run_tasks(run_fold, tasks, workers, first, store)
     wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
-    components = dict(
-        zip(
-            (task.terrain for task in component_tasks),
-            run_tasks(fit_components, component_tasks, workers, third, store),
-            strict=True,
-        )
-    )
+    fitted = run_tasks(fit_components, apart, workers, third, store)
+    components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
         terrain: TerrainResult(
@@ -187,7 +179,7 @@ def _in_turn(progress: Progress | None, counts: Sequence[int]) -> list[Progress 
     ]
 
 
-def _component_tasks(
+def _apart(
     prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
 ) -> list[ComponentsTask]:
     """Return a task per terrain, none where no model of a new trial is asked for."""
