@@ -43,7 +43,7 @@ class Prediction(NamedTuple):
         z = (F_t - self.mean) / self.scale
         return ndtr(z) if np.isinf(self.nu) else stdtr(self.nu, z)
 
-    def quantiles(self, shares: Sequence[float]) -> Array:
+    def quantiles(self, shares: Sequence[float] | Array) -> Array:
         """Return the forces [N] that are not reached with these shares, (q, n)."""
         from scipy.special import ndtri, stdtrit
 

@@ -167,16 +167,18 @@ def _prepared(
     }
 
 
-def _in_turn(progress: Progress | None, counts: Sequence[int]) -> list[Progress | None]:
+def _in_turn(
+    progress: Progress | None, counts: Sequence[int]
+) -> Sequence[Progress | None]:
     """Return one progress as that of several runs of tasks, one after the other."""
     if progress is None:
         return [None] * len(counts)
-    total = sum(counts)
-    before = [0, *accumulate(counts)]
-    return [
-        lambda done, _, start=start: progress(start + done, total)
-        for start in before[:-1]
-    ]
+    total, tell = sum(counts), progress
+
+    def from_(start: int) -> Progress:
+        return lambda done, _: tell(start + done, total)
+
+    return [from_(start) for start in [0, *accumulate(counts)][:-1]]
 
 
 def _apart(

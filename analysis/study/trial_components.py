@@ -234,8 +234,6 @@ def _resampled(per_trial: _PerTrial, theta: Array, rng: np.random.Generator) -> 
         ).x
 
     whole = likeliest(np.ones(count), theta)
-    drawn = [
-        likeliest(np.bincount(rng.integers(count, size=count), minlength=count), whole)
-        for _ in range(_DRAWS)
-    ]
+    weights = rng.multinomial(count, np.full(count, 1.0 / count), size=_DRAWS)
+    drawn = [likeliest(weight, whole) for weight in weights.astype(float)]
     return np.array([whole, *drawn])
