@@ -8,8 +8,8 @@
     folds = crossvalidate({"TF": kept})             # one whole trial left out at a time
 
 Forces are in N, velocities in m/s; v_t and F_t are positive in ordinary slip, F_n in
-compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean and standard
-deviation of a measurement. All functions are pure but for the loading ones.
+compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean, standard
+deviation and quantiles of a measurement. All functions are pure but those that load.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,6 +33,7 @@ from analysis.study import (
     GP_NN_TUSTIN,
     GP_SE,
     GP_SE_NOISE,
+    GP_SE_TRIAL,
     GP_SE_TUSTIN,
     TUSTIN,
     FitOptions,
@@ -51,6 +52,7 @@ __all__ = [
     "GP_NN_TUSTIN",
     "GP_SE",
     "GP_SE_NOISE",
+    "GP_SE_TRIAL",
     "GP_SE_TUSTIN",
     "TUSTIN",
     "FitOptions",
@@ -103,7 +105,8 @@ def fit_gp(
 
     Args:
         trials: prepared trials of one terrain.
-        model: "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin" or "gp_se_noise".
+        model: "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin", "gp_se_noise" or, for
+            bands that hold for a trial to come, "gp_se_trial" and the like.
         options: number and seed of the samples, and more.
 
     Raises:

@@ -192,7 +192,8 @@ def to_text(database: TerrainDatabase) -> str:
     """Return a database as the text of a file, in the current version.
 
     Raises:
-        SettingsError: it has no terrain, or terrains with different axes.
+        SettingsError: it has no terrain, terrains with different axes, or more than a
+            file may have.
     """
     known = list(database.terrains.values())
     grids = {(t.F_n, t.v_t, t.shares) for k in known for t in k.tables.values()}
@@ -214,7 +215,14 @@ def to_text(database: TerrainDatabase) -> str:
         "axes": {"F_n": list(F_n), "v_t": list(v_t)},
         "terrains": {terrain.name: _plain(terrain) for terrain in known},
     }
-    return json.dumps(content, default=str)
+    text = json.dumps(content, default=str)
+    if len(text.encode()) > _LARGEST:
+        raise SettingsError(
+            f"{len(known)} terrains make a file of {len(text) / 1e6:.1f} MB, larger "
+            f"than the {_LARGEST / 1e6:.0f} MB that are read.",
+            hint="Export fewer sessions at a time.",
+        )
+    return text
 
 
 def _plain(terrain: KnownTerrain) -> dict[str, Any]:

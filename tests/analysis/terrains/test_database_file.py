@@ -167,6 +167,12 @@ def load_other_grid():
     return KnownTerrain("TF", "flat", 1, 1, 0.0, {}, {"m": table}, {}, "m")
 
 
+def test_a_file_too_large_to_be_read_is_not_written():
+    remarks = {"remarks": "x" * 6_000_000}
+    with pytest.raises(SettingsError, match="6 MB"):
+        to_text(skewed(remarks))
+
+
 # --- the schema -----------------------------------------------------------------------
 
 CHECKED = {
