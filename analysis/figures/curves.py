@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.data import PrepareOptions, SampleTable
+from analysis.data import Array, PrepareOptions, SampleTable
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import Panel, force_range, panels, representatives
 from analysis.figures.spec import FigureSpec
@@ -190,7 +190,7 @@ def _draw_curves(ax: Axes, panel: Panel) -> None:
     for k, (name, colour, style) in enumerate(LOAD_LINES):
         label = f"{name} $F_n$"
         ax.plot(panel.v, panel.means[k], style, color=colour, lw=1.6, label=label)
-    _note_loads(ax, panel)
+    _note_loads(ax, panel.loads)
 
 
 def _draw_quantiles(ax: Axes, panel: Panel) -> None:
@@ -200,7 +200,7 @@ def _draw_quantiles(ax: Axes, panel: Panel) -> None:
         panel.v, low, high, color="#56B4E9", alpha=0.4, lw=0, label="5 to 95%"
     )
     ax.plot(panel.v, middle, color="#0072B2", lw=1.8, label="median")
-    _note_loads(ax, panel)
+    _note_loads(ax, panel.loads[1:2])
 
 
 def _draw_band(ax: Axes, panel: Panel) -> None:
@@ -219,7 +219,7 @@ def _draw_band(ax: Axes, panel: Panel) -> None:
         width = 1.8 if k == 1 else 1.0
         label = f"mean, {name} $F_n$"
         ax.plot(panel.v, panel.means[k], style, color=colour, lw=width, label=label)
-    _note_loads(ax, panel)
+    _note_loads(ax, panel.loads)
 
 
 def _draw_samples(ax: Axes, panel: Panel) -> None:
@@ -228,8 +228,8 @@ def _draw_samples(ax: Axes, panel: Panel) -> None:
     ax.plot(panel.data.v_t, panel.data.F_t, ".", label="samples", **style)
 
 
-def _note_loads(ax: Axes, panel: Panel) -> None:
-    loads = " / ".join(f"{load:.1f}" for load in panel.loads)
+def _note_loads(ax: Axes, drawn: Array) -> None:
+    loads = " / ".join(f"{load:.1f}" for load in drawn)
     ax.text(
         0.97,
         0.95,

@@ -15,6 +15,7 @@ from analysis.study import (
 )
 
 _ENOUGH = 10  # trials that the level is stated for
+_LEAST = 0.01  # of the residual within a trial: smaller noise is not told apart from 0
 
 
 def new_trial_tables(results: StudyResults) -> list[ReportTable]:
@@ -75,7 +76,7 @@ def worth_table(study: Study) -> ReportTable:
             _between(of),
             _with_interval(of, "within", "N"),
             _with_interval(of, "tau", "s"),
-            _with_interval(of, "measurement", "N"),
+            _measurement(of),
             f"{of.independent:.0f}",
             f"{of.level_sd(1):.2f}",
             f"{of.level_sd(_ENOUGH):.2f}",
@@ -134,6 +135,12 @@ def _between(of: TrialComponents) -> str:
     if not of.is_told_apart:
         return f"not told apart from 0 (gain {of.gain:.1f})"
     return f"{_with_interval(of, 'between', 'N')} (gain {of.gain:.1f})"
+
+
+def _measurement(of: TrialComponents) -> str:
+    if of.measurement < _LEAST * of.within:  # the search ends there
+        return "not told apart from 0"
+    return _with_interval(of, "measurement", "N")
 
 
 def _with_interval(of: TrialComponents, name: str, unit: str) -> str:
