@@ -1,7 +1,7 @@
-from .database import KnownTerrain, TerrainDatabase
-from .database_file import load, to_text
+from .database import load, to_text
 from .export import database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
+from .known import KnownTerrain, TerrainDatabase
 from .recognition import Recognition, recognise
 from .table import SlipRisk, TractionEstimate, TractionEstimates
 

@@ -21,9 +21,9 @@ from analysis.study import (
     Workers,
     run_tasks,
 )
-from analysis.terrains.database import KnownTerrain, TerrainDatabase
-from analysis.terrains.database_file import to_text
+from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.table import Table, rows_of
 
 POINTS = 32  # of each axis

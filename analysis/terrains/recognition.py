@@ -18,7 +18,7 @@ import numpy as np
 
 from analysis.data import Array, PreparedTrial
 from analysis.study import Distribution
-from analysis.terrains.database import KnownTerrain, TerrainDatabase
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
 
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N

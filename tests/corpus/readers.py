@@ -12,7 +12,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
-from analysis.terrains import database_file as terrain_db
+from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session

@@ -7,7 +7,7 @@ from importlib import resources
 
 import numpy as np
 
-from analysis.terrains.database_file import FORMAT, VERSION
+from analysis.terrains.database import FORMAT, VERSION
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
 from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit

@@ -20,7 +20,7 @@ from acquisition.trial_file.salvage import SoundRecords
 from analysis.data.columns import LONGEST_LINE
 from analysis.data.tables import LARGEST_FILE, MOST_TRIALS, load_tables
 from analysis.study.store import LARGEST, MOST_BYTES
-from analysis.terrains import database_file as database
+from analysis.terrains import database
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.data_files import parse_object
 from experiments.session.store import MOST_EVENTS, create_session

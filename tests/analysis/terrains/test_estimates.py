@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.terrains.database import KnownTerrain
+from analysis.terrains.known import KnownTerrain
 from analysis.terrains.table import Table
 
 ROWS = np.array([(1.0, 2.0), (3.0, 4.0)])

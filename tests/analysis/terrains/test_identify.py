@@ -14,7 +14,7 @@ from analysis.data.series import TractionSeries
 from analysis.study.metrics import Prediction
 from analysis.study.models import GP_SE, TUSTIN, FitOptions, ModelFitter
 from analysis.study.study import StudyOptions, run_study
-from analysis.terrains.database_file import load
+from analysis.terrains.database import load
 from analysis.terrains.export import TableTask, database_of, training_set
 from analysis.terrains.identify import Confusion, identify_study
 from analysis.terrains.recognition import (

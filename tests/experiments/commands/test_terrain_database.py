@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from analysis.terrains.database_file import load
+from analysis.terrains.database import load
 from tests.experiments.program import run_short, traction, write_config
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]

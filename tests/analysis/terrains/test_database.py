@@ -11,8 +11,8 @@ import pytest
 import analysis.terrains
 from acquisition.errors import SettingsError
 from analysis.study.distribution import SHARES
-from analysis.terrains.database import KnownTerrain, TerrainDatabase
-from analysis.terrains.database_file import load, to_text
+from analysis.terrains.database import load, to_text
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.table import Table, rows_of
 
 UTC = "2027-01-15T08:00:00Z"
