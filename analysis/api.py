@@ -10,10 +10,10 @@
     known = load_terrains("terrains.json")          # of traction export --terrain-db
 
 Forces are in N, velocities in m/s; v_t and F_t are positive in ordinary slip, F_n in
-compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean and standard
-deviation of a measurement. `rest.slip_risk(required, F_n)` and
+compression. A fitted model predicts with `model.predict(F_n, v_t)`: mean, standard
+deviation and quantiles of a measurement. `rest.slip_risk(required, F_n)` and
 `rest.available(F_n, risk)` answer for a push from rest, `risk_in_motion` of a terrain
-of `known` for a foot that slides. All functions are pure but for the loading ones.
+of `known` for a foot that slides. All functions are pure but those that load.
 """
 
 from collections.abc import Mapping, Sequence
@@ -46,6 +46,7 @@ from analysis.study import (
     GP_NN_TUSTIN,
     GP_SE,
     GP_SE_NOISE,
+    GP_SE_TRIAL,
     GP_SE_TUSTIN,
     TUSTIN,
     FitOptions,
@@ -65,6 +66,7 @@ __all__ = [
     "GP_NN_TUSTIN",
     "GP_SE",
     "GP_SE_NOISE",
+    "GP_SE_TRIAL",
     "GP_SE_TUSTIN",
     "TUSTIN",
     "AvailableForce",
@@ -125,7 +127,8 @@ def fit_gp(
 
     Args:
         trials: prepared trials of one terrain.
-        model: "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin" or "gp_se_noise".
+        model: "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin", "gp_se_noise" or, for
+            bands that hold for a trial to come, "gp_se_trial" and the like.
         options: number and seed of the samples, and more.
 
     Raises:

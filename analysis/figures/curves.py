@@ -7,14 +7,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from analysis.data import PrepareOptions, SampleTable
+from analysis.data import Array, PrepareOptions, SampleTable
 from analysis.figures.sections import ReportSection
-from analysis.figures.selection import (
-    Panel,
-    force_range,
-    panels,
-    representatives,
-)
+from analysis.figures.selection import Panel, force_range, panels, representatives
 from analysis.figures.spec import FigureSpec
 from analysis.figures.style import (
     FORCE_LABEL,
@@ -26,7 +21,7 @@ from analysis.figures.style import (
     plain,
 )
 from analysis.findings import StudyResults
-from analysis.study import GP_SE, TUSTIN, TerrainResult
+from analysis.study import GP_SE, GP_SE_TRIAL, TUSTIN, TerrainResult
 
 
 def draw_tustin_model(results: StudyResults) -> Figure | None:
@@ -140,6 +135,24 @@ def _bands_below_zero(chosen: Sequence[Panel]) -> str:
     )
 
 
+def draw_new_trial(results: StudyResults) -> Figure | None:
+    """Return the band that holds 90 % of a new trial, with the samples."""
+    return _draw_panels(panels(results.study, GP_SE_TRIAL), _draw_quantiles)
+
+
+def caption_new_trial(results: StudyResults) -> str:
+    """State how far the bands of a new trial reach from the median."""
+    reach = [
+        f"{low:.2f} N below and {high:.2f} N above on {panel.terrain}"
+        for panel in _one_per_kind(panels(results.study, GP_SE_TRIAL))
+        for low, high in [np.median(np.diff(panel.band, axis=0), axis=1)]
+    ]
+    return (
+        "First fold of each terrain: median and the band from 5 to 95% of a trial that "
+        f"nobody has recorded yet, at the median F_n. It reaches {'; '.join(reach)}."
+    )
+
+
 def _draw_panels(
     chosen: list[Panel], draw: Callable[[Axes, Panel], None]
 ) -> Figure | None:
@@ -177,22 +190,22 @@ def _draw_curves(ax: Axes, panel: Panel) -> None:
     for k, (name, colour, style) in enumerate(LOAD_LINES):
         label = f"{name} $F_n$"
         ax.plot(panel.v, panel.means[k], style, color=colour, lw=1.6, label=label)
-    _note_loads(ax, panel)
+    _note_loads(ax, panel.loads)
+
+
+def _draw_quantiles(ax: Axes, panel: Panel) -> None:
+    _draw_samples(ax, panel)
+    low, middle, high = panel.band
+    ax.fill_between(
+        panel.v, low, high, color="#56B4E9", alpha=0.4, lw=0, label="5 to 95%"
+    )
+    ax.plot(panel.v, middle, color="#0072B2", lw=1.8, label="median")
+    _note_loads(ax, panel.loads[1:2])
 
 
 def _draw_band(ax: Axes, panel: Panel) -> None:
+    _draw_samples(ax, panel)
     mean, sd = panel.means[1], panel.sds[1]
-    ax.axhline(0.0, color="black", lw=0.7, ls=":")
-    ax.plot(
-        panel.data.v_t,
-        panel.data.F_t,
-        ".",
-        ms=2.4,
-        color="#808080",
-        alpha=0.3,
-        mew=0,
-        label="samples",
-    )
     ax.fill_between(
         panel.v,
         mean - 2 * sd,
@@ -206,11 +219,17 @@ def _draw_band(ax: Axes, panel: Panel) -> None:
         width = 1.8 if k == 1 else 1.0
         label = f"mean, {name} $F_n$"
         ax.plot(panel.v, panel.means[k], style, color=colour, lw=width, label=label)
-    _note_loads(ax, panel)
+    _note_loads(ax, panel.loads)
 
 
-def _note_loads(ax: Axes, panel: Panel) -> None:
-    loads = " / ".join(f"{load:.1f}" for load in panel.loads)
+def _draw_samples(ax: Axes, panel: Panel) -> None:
+    ax.axhline(0.0, color="black", lw=0.7, ls=":")
+    style = {"ms": 2.4, "color": "#808080", "alpha": 0.3, "mew": 0}
+    ax.plot(panel.data.v_t, panel.data.F_t, ".", label="samples", **style)
+
+
+def _note_loads(ax: Axes, drawn: Array) -> None:
+    loads = " / ".join(f"{load:.1f}" for load in drawn)
     ax.text(
         0.97,
         0.95,
@@ -265,5 +284,13 @@ FIGURES = (
         draw_gp,
         caption_gp,
         ReportSection.PAPER,
+    ),
+    FigureSpec(
+        "new_trial",
+        "What a new trial may show",
+        "Samples of traction force over slip velocity with the median and the band "
+        "that holds 90 percent of a new trial, one panel per terrain.",
+        draw_new_trial,
+        caption_new_trial,
     ),
 )

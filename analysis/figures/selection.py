@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.data import Array, SampleTable, Slip, Smoothed
-from analysis.study import FittedModel, Study, TerrainResult
+from analysis.study import Distribution, FittedModel, Study, TerrainResult
 
 WINDOW = 3.5  # s shown of a trial
 LOADS = (0.1, 0.5, 0.9)  # quantiles of F_n at which curves are drawn
+BAND = (0.05, 0.5, 0.95)  # quantiles of F_t that make a band
 
 _MOST_POINTS = 1500  # drawn per panel
 _CURVE_POINTS = 120
@@ -55,6 +56,7 @@ class Panel:
         loads: low, median and high F_n [N] at which curves are drawn.
         means: predicted F_t [N], shape (3, m).
         sds: standard deviations [N], noise included, shape (3, m).
+        band: quantiles of F_t at the median load [N], 5, 50 and 95 %, shape (3, m).
     """
 
     title: str
@@ -66,6 +68,7 @@ class Panel:
     loads: Array
     means: Array
     sds: Array
+    band: Array
 
     def nearest_load(self) -> Array:
         """Return for every sample which of the three loads is nearest, shape (n,)."""
@@ -171,11 +174,11 @@ def _panel(result: TerrainResult, model: str) -> Panel:
         data=samples.take(np.arange(0, samples.count, step)),
         v=v,
         loads=loads,
-        means=np.array([mean for mean, _ in curves]),
-        sds=np.array([sd for _, sd in curves]),
+        means=np.array([curve.mean for curve in curves]),
+        sds=np.array([curve.sd for curve in curves]),
+        band=curves[1].quantiles(BAND),
     )
 
 
-def _curve(model: FittedModel, load: float, v: Array) -> tuple[Array, Array]:
-    prediction = model.predict(np.full(v.shape, load), v)
-    return prediction.mean, prediction.sd
+def _curve(model: FittedModel, load: float, v: Array) -> Distribution:
+    return model.predict(np.full(v.shape, load), v)

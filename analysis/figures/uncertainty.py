@@ -14,7 +14,7 @@ from analysis.figures.style import (
     panel_grid,
     plain,
 )
-from analysis.findings import RESIDUAL_MODELS, StudyResults
+from analysis.findings import BINS, RESIDUAL_MODELS, StudyResults
 from analysis.study import GP_SE, TITLES, TerrainResult, mean_of, standard_error
 
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
@@ -130,6 +130,42 @@ def caption_noise(results: StudyResults) -> str:
     )
 
 
+def draw_shares(results: StudyResults) -> Figure | None:
+    """Return where held-out samples lie in what is predicted for a new trial."""
+    if not results.shares:
+        return None
+    figure, axes = panel_grid(len(results.shares), 1.4)
+    edges = np.linspace(0.0, 1.0, BINS + 1)
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    for ax, shares in zip(axes, results.shares, strict=True):
+        ax.axhline(1.0, color="black", lw=1.0, ls=(0, (4, 2)))
+        ax.stairs(shares.density, edges, fill=True, color="#56B4E9", alpha=0.6)
+        ax.errorbar(
+            middles, shares.density, shares.error, fmt="none", color=_FIRST, lw=0.9
+        )
+        ax.set_ylim(0.0, 2.2)
+        ax.set_xlim(0.0, 1.0)
+        title = results.study.terrains[shares.terrain].title
+        ax.set_title(plain(title), loc="left")
+    figure.supxlabel("share of the predicted distribution below the sample", fontsize=8)
+    figure.supylabel("density of held-out samples", fontsize=8)
+    return figure
+
+
+def caption_shares(results: StudyResults) -> str:
+    """State how far the shares are from even, in standard errors."""
+    values = [
+        f"{of.terrain} {np.abs(of.density - 1.0).max():.2f}" for of in results.shares
+    ]
+    return (
+        "Probability integral transform: the share of the distribution predicted for a "
+        "new trial that lies below a sample of a trial left out, in ten bins; dashed: "
+        "even, as it is where the distribution is right. High ends: bands too narrow; "
+        "a slope: a bias. Mean over trials, whiskers: standard error over trials. "
+        f"Farthest from even: {'; '.join(values)}."
+    )
+
+
 def draw_residuals(results: StudyResults) -> Figure | None:
     """Return quantiles of measured minus predicted F_t over velocity."""
     shown = {name: bands for name, bands in results.residuals.items() if bands}
@@ -199,6 +235,14 @@ FIGURES = (
         "standard error, and the number of folds per choice.",
         draw_noise,
         caption_noise,
+    ),
+    FigureSpec(
+        "shares",
+        "Does the distribution of a new trial hold?",
+        "Histogram of the share of the predicted distribution below every held-out "
+        "sample with its standard error over trials, one panel per terrain.",
+        draw_shares,
+        caption_shares,
     ),
     FigureSpec(
         "residuals",

@@ -7,20 +7,24 @@ from .findings import (
     plain_findings,
 )
 from .force_uncertainty import ForceUncertainty, uncertainties_of, uncertainty_of
+from .new_trial_bands import BINS, ORACLE, HeldOutShares
 from .paper_claims import PaperClaim
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
 
 __all__ = [
+    "BINS",
     "MEAN_FORCE",
     "MEAN_LOAD",
+    "ORACLE",
     "PERIOD_EDGES",
     "RESIDUAL_MODELS",
     "RISKS",
     "SKEW_EDGES",
     "TRACTION_RATIO",
     "ForceUncertainty",
+    "HeldOutShares",
     "PaperClaim",
     "RigTrial",
     "StudyResults",

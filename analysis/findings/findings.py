@@ -12,6 +12,11 @@ from analysis.findings.break_away import (
     TerrainBreakAway,
     break_away_findings,
 )
+from analysis.findings.new_trial_bands import (
+    HeldOutShares,
+    held_out_shares,
+    plain_shares,
+)
 from analysis.findings.paper_claims import PaperClaim, paper_claims
 from analysis.findings.paper_measures import gather_evidence
 from analysis.findings.rig_health import HEALTH_UNITS, RigTrial
@@ -48,6 +53,7 @@ class StudyResults:
         identification: how well the terrains can be told apart; None for one terrain.
         break_away: what a terrain gives before it slips from rest, where it is known.
         noise: constant against chosen noise, by terrain.
+        shares: where samples lie in what is predicted for a new trial, by terrain.
         trends: of the trial means, by terrain and measure.
         residuals: by terrain and model.
         axes: of the surfaces.
@@ -62,6 +68,7 @@ class StudyResults:
     identification: Identification | None
     break_away: Mapping[str, TerrainBreakAway]
     noise: Sequence[NoiseSummary]
+    shares: Sequence[HeldOutShares]
     trends: Mapping[str, Mapping[str, Trend]]
     residuals: Mapping[str, Mapping[str, ResidualBand]]
     axes: SurfaceAxes
@@ -88,6 +95,7 @@ def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
         identification=identification,
         break_away=break_away_findings(study),
         noise=noise,
+        shares=held_out_shares(study),
         trends={name: trends_of(result) for name, result in results.items()},
         residuals={
             name: {
@@ -117,6 +125,7 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         else results.identification.numbers(),
         "break_away": {n: found.numbers() for n, found in results.break_away.items()},
         "noise": {summary.terrain: _noise(summary) for summary in results.noise},
+        "new_trial": {of.terrain: plain_shares(of) for of in results.shares},
         "trends": {
             name: {key: _trend(trend) for key, trend in trends.items()}
             for name, trends in results.trends.items()

@@ -6,7 +6,7 @@ as much again into fresh memory: so the memory is kept, and the inverse is put t
 from products of blocks, which run several times faster than LAPACK's own.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ from acquisition import SettingsError
 from analysis.data import Array
 from analysis.gp.kernels import Contraction, Kernel
 from analysis.gp.noise import Noise
+from analysis.gp.trial_noise import SharedAt, TrialRows, shared_over
 
 _JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that works
 _SMALL = 80  # rows of a triangle that LAPACK inverts as fast as products do
@@ -37,12 +38,18 @@ class Factor(NamedTuple):
         return _lapack("potrs")(self.L, r, lower=1)[0]
 
 
-def factorise(K: Array, S: Array, memory: Array | None = None) -> Factor:
+def factorise(
+    K: Array,
+    S: Array,
+    memory: Array | None = None,
+    blocks: Sequence[tuple[slice, Array]] = (),
+) -> Factor:
     """Return the Cholesky factor of K + diag(S), with jitter only if it needs some.
 
     Args:
         K: covariances, shape (n, n).
         S: what is added to the diagonal, shape (n,).
+        blocks: what is added on the diagonal's blocks, as (rows, covariances).
         memory: where the factor is put, shape (n, n) in Fortran's order; new by
             default.
 
@@ -55,6 +62,8 @@ def factorise(K: Array, S: Array, memory: Array | None = None) -> Factor:
         # the transpose of a symmetric matrix is itself, in the order LAPACK likes
         np.copyto(C, K.T)
         C.T.flat[:: S.size + 1] += S + jitter
+        for rows, block in blocks:
+            C[rows, rows] += block
         L, info = _lapack("potrf")(C, lower=1, clean=1, overwrite_a=1)
         if info == 0:
             return Factor(L, jitter)
@@ -73,6 +82,7 @@ class _Solved(NamedTuple):
         alpha: C^-1 r, shape (n,).
         contract: the kernel's contraction.
         contract_noise: the noise's, which is given the diagonal of the weight.
+        shared: covariances inside trials, and their contraction.
     """
 
     lml: float
@@ -80,6 +90,7 @@ class _Solved(NamedTuple):
     alpha: Array
     contract: Contraction
     contract_noise: Contraction
+    shared: SharedAt
 
 
 class Likelihood:
@@ -89,11 +100,19 @@ class Likelihood:
         model: kernel and noise; theta is the kernel's, then the noise's.
         X: inputs, shape (n, d).
         r: outputs with the mean function taken off, shape (n,).
+        trials: where the rows come from; None where they share nothing but the kernel.
     """
 
-    def __init__(self, model: tuple[Kernel, Noise], X: Array, r: Array) -> None:
+    def __init__(
+        self,
+        model: tuple[Kernel, Noise],
+        X: Array,
+        r: Array,
+        trials: TrialRows | None = None,
+    ) -> None:
         self._kernel, self._noise = model
         self._X, self._r = X, r
+        self._shared = shared_over(self._noise, X, trials)
         self._covariance = self._kernel.over(X, X)
         shape = (r.size, r.size)
         self._C, self._inverse = (np.zeros(shape, order="F") for _ in range(2))
@@ -111,9 +130,12 @@ class Likelihood:
         minus = self._minus_weight(at.L, at.alpha)
         on_diagonal = -np.diagonal(minus)
         minus.T.flat[:: at.alpha.size + 1] *= 0.5
+        slope_noise = at.contract_noise(on_diagonal)
+        if at.shared.blocks:
+            slope_noise -= at.shared.contract(minus)
         # K is symmetric: handing the transpose over keeps both in one order of memory
         slope = -at.contract(minus.T)
-        return at.lml, np.concatenate([slope, at.contract_noise(on_diagonal)])
+        return at.lml, np.concatenate([slope, slope_noise])
 
     def value(self, theta: Array) -> float:
         """Return the likelihood alone, for a third of the cost.
@@ -127,11 +149,12 @@ class Likelihood:
         theta_kernel, theta_noise = split(self._kernel, theta)
         K, contract = self._covariance(theta_kernel)
         S, contract_noise = self._noise.evaluate(theta_noise, self._X)
-        factor = factorise(K, S, self._C)
+        shared = self._shared(theta_noise)
+        factor = factorise(K, S, self._C, shared.blocks)
         alpha = factor.solve(self._r)
         lml = -0.5 * float(self._r @ alpha) - 0.5 * alpha.size * np.log(2.0 * np.pi)
         lml -= float(np.sum(np.log(np.diagonal(factor.L))))
-        return _Solved(lml, factor.L, alpha, contract, contract_noise)
+        return _Solved(lml, factor.L, alpha, contract, contract_noise, shared)
 
     def _minus_weight(self, L: Array, alpha: Array) -> Array:
         """Return the lower triangle of C^-1 - alpha alpha', zero above."""

@@ -4,6 +4,7 @@ Equations 6 and 7 of the traction paper.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -11,13 +12,24 @@ from scipy.linalg import solve_triangular
 from acquisition import SettingsError
 from analysis.data import Array
 from analysis.gp.kernels import Kernel, SquaredExponential
-from analysis.gp.likelihood import Likelihood, factorise, split
+from analysis.gp.likelihood import Factor, Likelihood, factorise, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import Optimum, Start, StartScores, maximise, spread
+from analysis.gp.search import (
+    Objective,
+    Optimum,
+    Start,
+    StartScores,
+    climb_from,
+    maximise,
+    spread,
+)
+from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
 
 _ROUGH = 150  # rows by which the first starts are chosen
+_SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
+_LONG = 1.0  # logarithm of a length from which on an input may be idle
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
@@ -38,6 +50,7 @@ class GaussianProcess:
         starts: where every start of the search ended.
         jitter: what the factorisation needed on the diagonal.
         at_bound: hyperparameters at the edge of the search.
+        trials: where the training rows come from, for noise that trials share.
     """
 
     kernel: Kernel
@@ -52,6 +65,7 @@ class GaussianProcess:
     starts: tuple[Start, ...]
     jitter: float
     at_bound: tuple[str, ...]
+    trials: TrialRows | None = None
 
     def mean(self, inputs: Array) -> Array:
         """Return the predictive mean at `inputs`, shape (m, d), in y's unit."""
@@ -64,7 +78,22 @@ class GaussianProcess:
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
 
-    def given(self, inputs: Array, y: Array) -> "GaussianProcess":
+    def describe(self) -> dict[str, Any]:
+        """Return hyperparameters, likelihood, starts, jitter and standardisation."""
+        names = (*self.kernel.names, *self.noise.names)
+        return {
+            "theta": dict(zip(names, self.theta.tolist(), strict=True)),
+            "lml": self.lml,
+            "starts": [s._asdict() | {"theta": list(s.theta)} for s in self.starts],
+            "jitter": self.jitter,
+            "centre": self.centre.tolist(),
+            "scale": self.scale.tolist(),
+            "offset": self.offset,
+        }
+
+    def given(
+        self, inputs: Array, y: Array, trials: TrialRows | None = None
+    ) -> "GaussianProcess":
         """Return the process with these hyperparameters, given other training rows.
 
         Standardisation and offset stay those of the rows it was fitted to.
@@ -72,16 +101,18 @@ class GaussianProcess:
         Args:
             inputs: training inputs in their units, shape (n, d).
             y: training outputs, shape (n,).
+            trials: where these rows come from.
         """
-        theta, theta_noise = split(self.kernel, self.theta)
+        _, theta_noise = split(self.kernel, self.theta)
         X, r = (inputs - self.centre) / self.scale, y - self.offset
-        S = self.noise.variance(theta_noise, X)
-        factor = factorise(self.kernel.matrix(theta, X, X), S)
+        factor = _factor((self.kernel, self.noise), self.theta, X, trials)
         alpha = factor.solve(r)
         spread = float(np.log(np.diagonal(factor.L)).sum())
         prior = self.noise.log_prior(theta_noise)[0]
         lml = prior - 0.5 * float(r @ alpha + r.size * np.log(2.0 * np.pi)) - spread
-        return replace(self, X=X, alpha=alpha, lml=lml, jitter=factor.jitter)
+        return replace(
+            self, X=X, alpha=alpha, lml=lml, jitter=factor.jitter, trials=trials
+        )
 
     def predict(
         self, inputs: Array, *, include_noise: bool = True
@@ -98,8 +129,7 @@ class GaussianProcess:
         """
         theta, theta_noise = split(self.kernel, self.theta)
         Z = (inputs - self.centre) / self.scale
-        S = self.noise.variance(theta_noise, self.X) + self.jitter
-        L = factorise(self.kernel.matrix(theta, self.X, self.X), S).L
+        L = _factor((self.kernel, self.noise), self.theta, self.X, self.trials).L
         mean, variance = np.empty(Z.shape[0]), self.kernel.diagonal(theta, Z)
         for i in range(0, Z.shape[0], _BLOCK):
             cross = self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
@@ -112,10 +142,23 @@ class GaussianProcess:
         return mean, variance
 
 
-def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum:
+def posterior_search(
+    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
+) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
+    likelihood = Likelihood(model, X, r, trials)
+    thin = slice(None, None, -(-r.size // _ROUGH))
+    rough = Likelihood(
+        model, X[thin], r[thin], None if trials is None else trials.take(thin)
+    )
+    scores = StartScores(rough.value, likelihood.value)
+    objective = _with_prior(model, likelihood)
+    return maximise(model, objective, X, float(np.std(r)), scores)
+
+
+def _with_prior(model: tuple[Kernel, Noise], likelihood: Likelihood) -> Objective:
+    """Return the likelihood with the noise's prior, and its slope."""
     kernel, noise = model
-    likelihood = Likelihood(model, X, r)
 
     def objective(theta: Array) -> tuple[float, Array]:
         lml, slope = likelihood(theta)
@@ -123,10 +166,18 @@ def posterior_search(model: tuple[Kernel, Noise], X: Array, r: Array) -> Optimum
         slope[-prior_slope.size :] += prior_slope
         return lml + prior, slope
 
-    every = -(-r.size // _ROUGH)
-    rough = Likelihood(model, X[::every], r[::every])
-    scores = StartScores(rough.value, likelihood.value)
-    return maximise(model, objective, X, float(np.std(r)), scores)
+    return objective
+
+
+def _factor(
+    model: tuple[Kernel, Noise], theta: Array, X: Array, trials: TrialRows | None
+) -> Factor:
+    """Return the factor of the covariance of training rows."""
+    kernel, noise = model
+    theta_kernel, theta_noise = split(kernel, theta)
+    S, _ = noise.evaluate(theta_noise, X)
+    blocks = shared_over(noise, X, trials)(theta_noise).blocks
+    return factorise(kernel.matrix(theta_kernel, X, X), S, blocks=blocks)
 
 
 def fit_gp(
@@ -136,6 +187,7 @@ def fit_gp(
     noise: Noise | None = None,
     *,
     is_centred: bool = True,
+    trials: TrialRows | None = None,
 ) -> GaussianProcess:
     """Return a Gaussian process fitted to `y`.
 
@@ -146,6 +198,7 @@ def fit_gp(
         noise: noise of the measurements, by default constant.
         is_centred: take the mean of `y` off first; False where another mean function
             already was.
+        trials: where the rows come from, for noise that trials share.
 
     Raises:
         SettingsError: fewer than 20 rows, or outputs that do not vary.
@@ -155,10 +208,8 @@ def fit_gp(
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
     X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
-    optimum = posterior_search((kernel, noise), X, y - offset)
-    theta_kernel, theta_noise = split(kernel, optimum.theta)
-    K = kernel.matrix(theta_kernel, X, X)
-    factor = factorise(K, noise.variance(theta_noise, X))
+    optimum = posterior_search((kernel, noise), X, y - offset, trials)
+    factor = _factor((kernel, noise), optimum.theta, X, trials)
     return GaussianProcess(
         kernel=kernel,
         noise=noise,
@@ -170,6 +221,61 @@ def fit_gp(
         scale=scale,
         lml=optimum.lml,
         starts=optimum.starts,
+        jitter=factor.jitter,
+        at_bound=optimum.at_bound,
+        trials=trials,
+    )
+
+
+def refit_gp(process: GaussianProcess, y: Array, ratio: float) -> GaussianProcess:
+    """Return a process of other outputs over the same rows, by a climb from this one.
+
+    For outputs so alike that the best top is nearly known.
+
+    Args:
+        process: what to begin with.
+        y: training outputs, shape (n,).
+        ratio: standard deviation of `y` over that of the outputs of `process`.
+    """
+    names = (*process.kernel.names, *process.noise.names)
+    is_size = [name.rpartition("_")[2] in _SIZES for name in names]
+    return _climbed(process, y, process.theta + np.log(ratio) * np.array(is_size))
+
+
+def without_idle_inputs(process: GaussianProcess, y: Array) -> GaussianProcess:
+    """Return the process, or a likelier one that makes no use of one of its inputs.
+
+    On a straight trend a long length and an endless one are two tops, and the search
+    offers the second only where the likelihood is flat between them.
+
+    Args:
+        process: what to begin with.
+        y: its training outputs, shape (n,).
+    """
+    best = process
+    for k, name in enumerate(process.kernel.names):
+        if name.rpartition("_")[2].startswith("l") and process.theta[k] > _LONG:
+            start = process.theta.copy()
+            start[k] = np.inf  # the climb begins at the bound
+            best = max(best, _climbed(process, y, start), key=lambda gp: gp.lml)
+    return best
+
+
+def _climbed(process: GaussianProcess, y: Array, start: Array) -> GaussianProcess:
+    """Return the process of outputs y that a climb from `start` leads to."""
+    model = (process.kernel, process.noise)
+    offset = float(y.mean()) if process.offset else 0.0
+    likelihood = Likelihood(model, process.X, y - offset, process.trials)
+    objective = _with_prior(model, likelihood)
+    optimum = climb_from(model, objective, process.X, float(np.std(y - offset)), start)
+    factor = _factor(model, optimum.theta, process.X, process.trials)
+    return replace(
+        process,
+        theta=optimum.theta,
+        alpha=factor.solve(y - offset),
+        offset=offset,
+        lml=optimum.lml,
+        starts=(*process.starts, *optimum.starts),
         jitter=factor.jitter,
         at_bound=optimum.at_bound,
     )

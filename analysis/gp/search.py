@@ -91,13 +91,11 @@ def maximise(
         scores: what starts are chosen by.
     """
     kernel, noise = model
-    sd_x = spread(X)
-    bounds = np.vstack([kernel.bounds(sd_y, sd_x), noise.bounds(sd_y)])
-    steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
+    bounds, steps = _box(model, X, sd_y)
     rough, exact = scores
     offered = [
         np.concatenate([point, noise.start(sd_y)])
-        for point in kernel.design(sd_y, sd_x)
+        for point in kernel.design(sd_y, spread(X))
     ]
     began = _first_starts(kernel, offered, rough)
     reached: list[Start] = []
@@ -105,9 +103,50 @@ def maximise(
         reached.append(climb(objective, start, (bounds, steps), reached))
     began.append(_last_start(kernel, offered, exact, (began, reached), bounds))
     reached.append(climb(objective, began[-1], (bounds, steps), reached))
-    best = _finish(objective, (bounds, steps), reached)
+    return _optimum(model, objective, (bounds, steps), (began, reached))
+
+
+def climb_from(
+    model: tuple[Kernel, Noise],
+    objective: Objective,
+    X: Array,
+    sd_y: float,
+    start: Array,
+) -> Optimum:
+    """Return the top that one start leads to: for where the best top is nearly known.
+
+    Args:
+        model: kernel and noise; theta is the kernel's, then the noise's.
+        objective: theta -> likelihood and its slope; may raise SettingsError.
+        X: inputs, shape (n, d).
+        sd_y: standard deviation of the outputs.
+        start: theta to begin with.
+    """
+    box = _box(model, X, sd_y)
+    reached = [climb(objective, start, box, [])]
+    return _optimum(model, objective, box, ([start], reached))
+
+
+def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> tuple[Array, Array]:
+    """Return the bounds of theta, shape (p, 2), and the size of its steps, (p,)."""
+    kernel, noise = model
+    bounds = np.vstack([kernel.bounds(sd_y, spread(X)), noise.bounds(sd_y)])
+    steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
+    return bounds, steps
+
+
+def _optimum(
+    model: tuple[Kernel, Noise],
+    objective: Objective,
+    box: tuple[Array, Array],
+    climbed: tuple[Sequence[Array], list[Start]],
+) -> Optimum:
+    """Return the best of what the starts reached, climbed on from."""
+    kernel, noise = model
+    began, reached = climbed
+    best = _finish(objective, box, reached)
     theta = np.array(best.theta)
-    is_edge = np.abs(bounds - theta[:, None]).min(axis=1) < _AT_BOUND
+    is_edge = np.abs(box[0] - theta[:, None]).min(axis=1) < _AT_BOUND
     edges = np.array([*kernel.names, *noise.names])[is_edge]
     return Optimum(
         theta, best.lml, tuple(reached), tuple(began), tuple(map(str, edges))

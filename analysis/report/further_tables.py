@@ -6,6 +6,7 @@ from statistics import median
 from analysis.data import LATEST_MS
 from analysis.figures import ReportSection
 from analysis.findings import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, StudyResults, Trend
+from analysis.report.new_trial_tables import new_trial_tables
 from analysis.report.page_model import ReportTable
 from analysis.report.paper_tables import with_error
 from analysis.report.terrain_tables import terrain_tables
@@ -39,6 +40,7 @@ def beyond_tables(results: StudyResults) -> list[ReportTable]:
         independent_samples(results),
         *(paired_table(study, key, unit) for key, unit in _MEASURES),
         noise_table(results),
+        *new_trial_tables(results),
         lag_table(study),
         *terrain_tables(results),
         trend_table(results),
@@ -143,8 +145,7 @@ def paired_table(study: Study, key: str, unit: str) -> ReportTable:
         for n in names
         for m in others
     ]
-    cells = paired_cells(pairs)
-    width = len(others)
+    cells, width = paired_cells(pairs), len(others)
     rows = [[n, *cells[k * width : (k + 1) * width]] for k, n in enumerate(names)]
     return ReportTable(
         name=f"{key.upper()} against {TITLES[first]}, trial by trial",
@@ -252,7 +253,7 @@ def slope_cell(trend: Trend) -> str:
     return f"{trend.slope:+.3f} ± {trend.slope_error:.3f}"
 
 
-_MEASURES: Sequence[tuple[str, str]] = (("mae", "N"), ("nlpd", "log N"))
+_MEASURES = (("mae", "N"), ("nlpd", "log N"))
 
 
 def _cells(result: TerrainResult, model: str) -> list[str]:

@@ -1,4 +1,5 @@
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
+from .distribution import SHARES, Distribution, NewTrialPrediction
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
 from .jobs import Store, Workers, available_cores, run_tasks
 from .metrics import (
@@ -12,10 +13,14 @@ from .metrics import (
 from .models import (
     FITTERS,
     GP_NN,
+    GP_NN_TRIAL,
     GP_NN_TUSTIN,
+    GP_NN_TUSTIN_TRIAL,
     GP_SE,
     GP_SE_NOISE,
+    GP_SE_TRIAL,
     GP_SE_TUSTIN,
+    GP_SE_TUSTIN_TRIAL,
     TITLES,
     TUSTIN,
     FitOptions,
@@ -24,41 +29,56 @@ from .models import (
     ModelFitter,
     TustinModel,
 )
+from .new_trial import NewTrialModel, family_counts
 from .noise_selection import NAMES
+from .skew import ShapeMap
 from .store import ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
 from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
+from .trial_components import TOLD_APART, TrialComponents
 
 __all__ = [
     "FITTERS",
     "GP_NN",
+    "GP_NN_TRIAL",
     "GP_NN_TUSTIN",
+    "GP_NN_TUSTIN_TRIAL",
     "GP_SE",
     "GP_SE_NOISE",
+    "GP_SE_TRIAL",
     "GP_SE_TUSTIN",
+    "GP_SE_TUSTIN_TRIAL",
     "NAMES",
+    "SHARES",
     "TITLES",
+    "TOLD_APART",
     "TUSTIN",
     "CsvRow",
+    "Distribution",
     "FitOptions",
     "FittedModel",
     "FoldResult",
     "GpModel",
     "ModelFitter",
     "ModelFold",
+    "NewTrialModel",
+    "NewTrialPrediction",
     "PairedComparison",
     "PooledTustinFit",
     "Prediction",
     "ResultStore",
+    "ShapeMap",
     "Store",
     "Study",
     "StudyOptions",
     "TerrainResult",
+    "TrialComponents",
     "TustinModel",
     "Workers",
     "adjusted_by_holm",
     "available_cores",
     "compare",
+    "family_counts",
     "flag_counts",
     "mean_of",
     "plan_folds",

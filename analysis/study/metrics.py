@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data import Array
+from analysis.study.distribution import Distribution
 
 _SMALLEST_SD = 1e-6  # N; a fit without any error is scored as if it had this one
 
@@ -29,6 +30,34 @@ class Prediction(NamedTuple):
         """Scale of Student's t with this standard deviation [N]; sd for a normal."""
         factor = 1.0 if np.isinf(self.nu) else np.sqrt((self.nu - 2.0) / self.nu)
         return factor * np.maximum(self.sd, _SMALLEST_SD)
+
+    @property
+    def point(self) -> Array:
+        """Median [N], which is the mean of a symmetric distribution, shape (n,)."""
+        return self.mean
+
+    def cdf(self, F_t: Array) -> Array:
+        """Return the probability of less than F_t [N], each (n,)."""
+        from scipy.special import ndtr, stdtr
+
+        z = (F_t - self.mean) / self.scale
+        return ndtr(z) if np.isinf(self.nu) else stdtr(self.nu, z)
+
+    def quantiles(self, shares: Sequence[float] | Array) -> Array:
+        """Return the forces [N] that are not reached with these shares, (q, n)."""
+        from scipy.special import ndtri, stdtrit
+
+        wanted = np.asarray(shares, dtype=float)
+        z = ndtri(wanted) if np.isinf(self.nu) else stdtrit(self.nu, wanted)
+        return self.mean + np.outer(z, self.scale)
+
+    def log_density(self, F_t: Array) -> Array:
+        """Return the log density of every measurement F_t [N], shape (n,)."""
+        return log_density(F_t, self)
+
+    def ranked_probability(self, F_t: Array) -> Array:
+        """Return the continuous ranked probability score [N] of F_t, shape (n,)."""
+        return ranked_probability(F_t, self)
 
 
 class Score(NamedTuple):
@@ -55,29 +84,26 @@ class Score(NamedTuple):
     coverage90: float
 
 
-def score(F_t: Array, prediction: Prediction) -> Score:
-    """Return the errors of a prediction of F_t [N], shape (n,) with n >= 1."""
-    error = np.abs(F_t - prediction.mean)
+def score(F_t: Array, prediction: Distribution) -> Score:
+    """Return the errors of a prediction of F_t [N], shape (n,) with n >= 1.
+
+    The absolute error is that of the median, the squared one that of the mean.
+    """
     return Score(
-        mae=float(error.mean()),
-        rmse=float(np.sqrt(np.mean(error**2))),
+        mae=float(np.abs(F_t - prediction.point).mean()),
+        rmse=float(np.sqrt(np.mean((F_t - prediction.mean) ** 2))),
         coverage95=coverage(F_t, prediction, 0.95),
         variance=float(np.mean(prediction.sd**2)),
-        nlpd=float(-np.mean(log_density(F_t, prediction))),
-        crps=float(np.mean(ranked_probability(F_t, prediction))),
+        nlpd=float(-np.mean(prediction.log_density(F_t))),
+        crps=float(np.mean(prediction.ranked_probability(F_t))),
         coverage50=coverage(F_t, prediction, 0.50),
         coverage90=coverage(F_t, prediction, 0.90),
     )
 
 
-def coverage(F_t: Array, prediction: Prediction, share: float) -> float:
+def coverage(F_t: Array, prediction: Distribution, share: float) -> float:
     """Return how many of F_t [N] lie in the central band that should hold `share`."""
-    from scipy.special import ndtri, stdtrit
-
-    upper = 0.5 * (1.0 + share)
-    is_normal = np.isinf(prediction.nu)
-    width = float(ndtri(upper) if is_normal else stdtrit(prediction.nu, upper))
-    return float(np.mean(np.abs(F_t - prediction.mean) <= width * prediction.scale))
+    return float(np.mean(np.abs(2.0 * prediction.cdf(F_t) - 1.0) <= share))
 
 
 def log_density(F_t: Array, prediction: Prediction) -> Array:
@@ -158,6 +184,20 @@ def compare(
     # rounding must not part a pattern from its mirror image
     is_as_large = np.abs(tossed) >= abs(mean) * (1.0 - 1e-12)
     return PairedComparison(mean, error, float(np.mean(is_as_large)), count)
+
+
+def clearly_best(nlpd: Array, least: float = 0.0) -> int:
+    """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
+
+    Another than the first must be better by one standard error over the trials, and by
+    `least` [log N].
+    """
+    gain = nlpd[:, :1] - nlpd
+    error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
+    is_clear = gain.mean(axis=0) > np.maximum(error, least)
+    mean = np.where(is_clear, nlpd.mean(axis=0), np.inf)
+    mean[0] = nlpd[:, 0].mean()
+    return int(np.argmin(mean))
 
 
 def adjusted_by_holm(p_values: Sequence[float]) -> list[float]:

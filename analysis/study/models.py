@@ -1,7 +1,7 @@
 """The models of a study by name, each fitted to the same rows.
 
-The five of Fig. 9 are the default; one more goes beyond the paper: the noise of a
-Gaussian process chosen per fold.
+The five of Fig. 9 are the default; others go beyond the paper: a Gaussian process whose
+noise is chosen per fold, and processes whose bands are those of a new trial.
 """
 
 from collections.abc import Callable, Mapping
@@ -21,7 +21,9 @@ from analysis.gp import (
     SquaredExponential,
     fit_gp,
 )
+from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
+from analysis.study.new_trial import EFFECTS, LEVEL, NewTrialModel, fit_new_trial
 from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
 from analysis.tustin import TustinBounds, TustinFit, TustinForm, fit_tustin
 
@@ -31,6 +33,13 @@ GP_NN = "gp_nn"
 GP_SE_TUSTIN = "gp_se_tustin"
 GP_NN_TUSTIN = "gp_nn_tustin"
 GP_SE_NOISE = "gp_se_noise"
+GP_SE_TRIAL = "gp_se_trial"
+GP_NN_TRIAL = "gp_nn_trial"
+GP_SE_TUSTIN_TRIAL = "gp_se_tustin_trial"
+GP_NN_TUSTIN_TRIAL = "gp_nn_tustin_trial"
+NEW_TRIAL = frozenset(
+    {GP_SE_TRIAL, GP_NN_TRIAL, GP_SE_TUSTIN_TRIAL, GP_NN_TUSTIN_TRIAL}
+)
 TITLES = {
     TUSTIN: "Tustin",
     GP_SE: "GP (SE)",
@@ -38,6 +47,10 @@ TITLES = {
     GP_SE_TUSTIN: "GP (SE, Tustin mean)",
     GP_NN_TUSTIN: "GP (NN, Tustin mean)",
     GP_SE_NOISE: "GP (SE, noise chosen)",
+    GP_SE_TRIAL: "GP (SE, new trial)",
+    GP_NN_TRIAL: "GP (NN, new trial)",
+    GP_SE_TUSTIN_TRIAL: "GP (SE, Tustin mean, new trial)",
+    GP_NN_TUSTIN_TRIAL: "GP (NN, Tustin mean, new trial)",
 }
 
 
@@ -53,9 +66,11 @@ class FitOptions:
         form: variant and loss of the Tustin fit.
         is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
         draws: mixtures of trials for the intervals of Tustin parameters; 0 for none.
+        effect: of a trial in the models of a new trial: "constant", "proportional" to
+            F_n, or "both".
 
     Raises:
-        SettingsError: an unknown model, or fewer than one point.
+        SettingsError: an unknown model or effect, or fewer than one point.
     """
 
     bounds: TustinBounds = field(default_factory=TustinBounds)
@@ -65,6 +80,7 @@ class FitOptions:
     form: TustinForm = field(default_factory=TustinForm)
     is_nn_as_printed: bool = False
     draws: int = 200
+    effect: str = LEVEL
 
     def __post_init__(self) -> None:
         unknown = [name for name in self.models if name not in TITLES]
@@ -73,6 +89,11 @@ class FitOptions:
                 f"No study of {', '.join(unknown) or 'the models'} with "
                 f"{self.gp_points} points.",
                 hint=f"The models are {', '.join(TITLES)}; give at least one point.",
+            )
+        if self.effect not in EFFECTS:
+            raise SettingsError(
+                f"There is no effect of a trial {self.effect!r}.",
+                hint=f"The effects are {', '.join(EFFECTS)}.",
             )
 
 
@@ -88,8 +109,8 @@ class FittedModel(Protocol):
         """Return the predicted F_t [N], shape (n,)."""
         ...
 
-    def predict(self, F_n: Array, v_t: Array) -> Prediction:
-        """Return the predicted F_t and its standard deviation [N], shape (n,)."""
+    def predict(self, F_n: Array, v_t: Array) -> Distribution:
+        """Return what is predicted of F_t [N] at n points."""
         ...
 
     def describe(self) -> dict[str, Any]:
@@ -156,16 +177,7 @@ class GpModel:
 
     def describe(self) -> dict[str, Any]:
         """Return hyperparameters, likelihood, starts, jitter and standardisation."""
-        gp = self.process
-        names = (*gp.kernel.names, *gp.noise.names)
-        return {
-            "theta": dict(zip(names, gp.theta.tolist(), strict=True)),
-            "lml": gp.lml,
-            "starts": [s._asdict() | {"theta": list(s.theta)} for s in gp.starts],
-            "jitter": gp.jitter,
-            "centre": gp.centre.tolist(),
-            "scale": gp.scale.tolist(),
-            "offset": gp.offset,
+        return self.process.describe() | {
             "curve": None if self.curve is None else asdict(self.curve.parameters),
             "tails": None if self.tails is None else self.tails._asdict(),
             "noise": None if self.choice is None else self.choice._asdict(),
@@ -241,6 +253,13 @@ class ModelFitter:
         )
         return GpModel(process, tails=tails, choice=choice)
 
+    def new_trial(
+        self, kernel: Kernel, *, is_around_tustin: bool = False
+    ) -> NewTrialModel:
+        """Return the model of a new trial, of the family that suits the trials."""
+        curve = self.curve() if is_around_tustin else None
+        return fit_new_trial(self.training, kernel, curve, self.options.effect)
+
     @property
     def nn_kernel(self) -> Arcsine:
         """The neural-network kernel of eq. (5), by the options as printed."""
@@ -258,4 +277,14 @@ FITTERS: Mapping[str, Fitter] = {
     GP_NN_TUSTIN: lambda fitter: fitter.gp_around_tustin(fitter.nn_kernel),
 }
 # beyond the paper, where FitOptions.models asks for them
-BEYOND: Mapping[str, Fitter] = {GP_SE_NOISE: ModelFitter.gp_with_chosen_noise}
+BEYOND: Mapping[str, Fitter] = {
+    GP_SE_NOISE: ModelFitter.gp_with_chosen_noise,
+    GP_SE_TRIAL: lambda fitter: fitter.new_trial(SquaredExponential()),
+    GP_NN_TRIAL: lambda fitter: fitter.new_trial(fitter.nn_kernel),
+    GP_SE_TUSTIN_TRIAL: lambda fitter: fitter.new_trial(
+        SquaredExponential(), is_around_tustin=True
+    ),
+    GP_NN_TUSTIN_TRIAL: lambda fitter: fitter.new_trial(
+        fitter.nn_kernel, is_around_tustin=True
+    ),
+}

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.data import Array, SampleTable, TrainingSet
 from analysis.gp import ConstantNoise, GaussianProcess, LogLinearNoise, fit_gp
-from analysis.study.metrics import Prediction, log_density
+from analysis.study.metrics import Prediction, clearly_best, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]
 
@@ -94,12 +94,8 @@ def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
     nlpd = np.concatenate(
         [_left_out(training, group, points, seed) for group in range(groups)]
     )
-    gain = nlpd[:, :1] - nlpd
-    error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0
-    mean = np.where(gain.mean(axis=0) > error, nlpd.mean(axis=0), np.inf)
-    mean[0] = nlpd[:, 0].mean()
     averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
-    return NoiseChoice(NAMES[int(np.argmin(mean))], averages)
+    return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:

@@ -29,12 +29,15 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import SampleTable
-from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise
+from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise, trial_noise
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
 from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
+from analysis.study.new_trial import FamilyChoice, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
+from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
+from analysis.study.trial_components import ComponentsTask, TimedRows, TrialComponents
 from analysis.tustin import Interval, Profiles
 from analysis.tustin import model as tustin
 
@@ -44,12 +47,14 @@ _DTYPES = {"float64": "<f8", "int64": "<i8", "bool": "|b1"}
 MOST_BYTES = 256 * 1024**2  # of all results; a fold of a study has about 60 kB
 LARGEST = 16 * 1024**2  # bytes of one result; a larger file is none
 _KEPT = 0.9  # share of the size that is left when results go
-VERSION = 3  # of the numbers: higher whenever the same task gives another result
+VERSION = 4  # of the numbers: higher whenever the same task gives another result
 
 TYPES = {
     kind.__name__: kind
     for kind in (
         Arcsine,
+        ComponentsTask,
+        FamilyChoice,
         FitOptions,
         FoldResult,
         FoldTask,
@@ -57,12 +62,16 @@ TYPES = {
         GpModel,
         Interval,
         ModelFold,
+        NewTrialModel,
         NoiseChoice,
         Profiles,
         SampleTable,
         Score,
+        ShapeMap,
         Start,
         TailedNoise,
+        TimedRows,
+        TrialComponents,
         PooledTustinFit,
         TerrainTask,
         TustinModel,
@@ -71,6 +80,8 @@ TYPES = {
         kernels.Sum,
         noise.ConstantNoise,
         noise.LogLinearNoise,
+        trial_noise.TrialNoise,
+        trial_noise.TrialRows,
         tustin.TustinBounds,
         tustin.TustinFit,
         tustin.TustinForm,

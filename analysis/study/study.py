@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 import numpy as np
 
@@ -23,8 +24,13 @@ from analysis.data import (
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.metrics import standard_error
-from analysis.study.models import FitOptions
+from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
+from analysis.study.trial_components import (
+    ComponentsTask,
+    TimedRows,
+    fit_components,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,13 +131,14 @@ def run_study(
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
-    workers, whole_tasks = (
-        Workers(options.n_jobs, options.scheduler),
-        _wholes(prepared, options),
-    )
-    first, second = _in_turn(progress, len(tasks), len(whole_tasks))
+    workers = Workers(options.n_jobs, options.scheduler)
+    whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
+    counts = len(tasks), len(whole_tasks), len(apart)
+    first, second, third = _in_turn(progress, counts)
     folds = run_tasks(run_fold, tasks, workers, first, store)
     wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
+    fitted = run_tasks(fit_components, apart, workers, third, store)
+    components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
         terrain: TerrainResult(
@@ -141,6 +148,7 @@ def run_study(
             slips=tuple(find_slips(trial.smooth) for trial in kept),
             folds=tuple(fold for fold in folds if fold.terrain == terrain),
             whole=whole,
+            components=components.get(terrain),
         )
         for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
     }
@@ -160,16 +168,29 @@ def _prepared(
 
 
 def _in_turn(
-    progress: Progress | None, first: int, second: int
-) -> tuple[Progress | None, Progress | None]:
-    """Return one progress as that of two runs of tasks, one after the other."""
+    progress: Progress | None, counts: Sequence[int]
+) -> Sequence[Progress | None]:
+    """Return one progress as that of several runs of tasks, one after the other."""
     if progress is None:
-        return None, None
-    total = first + second
-    return (
-        lambda done, _: progress(done, total),
-        lambda done, _: progress(first + done, total),
-    )
+        return [None] * len(counts)
+    total, tell = sum(counts), progress
+
+    def from_(start: int) -> Progress:
+        return lambda done, _: tell(start + done, total)
+
+    return [from_(start) for start in [0, *accumulate(counts)][:-1]]
+
+
+def _apart(
+    prepared: Mapping[str, Sequence[PreparedTrial]], fit: FitOptions
+) -> list[ComponentsTask]:
+    """Return a task per terrain, none where no model of a new trial is asked for."""
+    if not NEW_TRIAL & set(fit.models):
+        return []
+    return [
+        ComponentsTask(terrain, tuple(TimedRows.of(t) for t in trials if t.kept), fit)
+        for terrain, trials in prepared.items()
+    ]
 
 
 def _wholes(

@@ -17,6 +17,7 @@ from analysis.data import (
 )
 from analysis.study.crossval import FoldResult, ModelFold
 from analysis.study.models import FitOptions
+from analysis.study.trial_components import TrialComponents
 from analysis.tustin import Interval, TustinFit, bootstrap_tustin, fit_tustin
 
 _STREAM = 1_000_000  # apart from the folds, which have the same kind of seed
@@ -64,6 +65,8 @@ class TerrainResult:
         slips: the slips of every trial.
         folds: its folds; a trial without kept samples has none.
         whole: the Tustin fit of all its trials, with intervals.
+        components: how its trials differ; None where they were not asked for, or for
+            fewer than three of them.
     """
 
     terrain: str
@@ -72,6 +75,7 @@ class TerrainResult:
     slips: tuple[tuple[Slip, ...], ...]
     folds: tuple[FoldResult, ...]
     whole: PooledTustinFit
+    components: TrialComponents | None = None
 
     @property
     def title(self) -> str:

@@ -1,7 +1,8 @@
-from .database import TerrainDatabase, load
+from .database import load, to_text
 from .evidence import Exclusion
 from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
+from .known import KnownTerrain, TerrainDatabase
 from .table import SlipRisk, TractionEstimate, TractionEstimates
 from .verdict import Recognition, WindowEvidence, recognise
 
@@ -10,6 +11,7 @@ __all__ = [
     "Confusion",
     "Exclusion",
     "Identification",
+    "KnownTerrain",
     "Recognition",
     "SlipRisk",
     "TerrainDatabase",
@@ -21,4 +23,5 @@ __all__ = [
     "identify_study",
     "load",
     "recognise",
+    "to_text",
 ]

@@ -1,6 +1,5 @@
 """From trials to a terrain database: models of all trials, tabulated."""
 
-import json
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,8 @@ from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_break_away
 from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
 from analysis.study import (
     GP_SE,
+    GP_SE_TRIAL,
+    SHARES,
     TITLES,
     FitOptions,
     ModelFitter,
@@ -21,14 +22,15 @@ from analysis.study import (
     Workers,
     run_tasks,
 )
-from analysis.terrains.database import FORMAT, VERSION
+from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART
+from analysis.terrains.table import Table, rows_of
 
-POINTS = 48  # of each axis
+POINTS = 32  # of each axis
 _REACH = 99.8  # percentile of F_n up to which the tables reach, with a margin
 _MARGIN = 1.2
-_DIGITS = 6  # of a tabulated number
 _STREAM = 2_000_000  # apart from folds and terrain fits
 
 
@@ -49,25 +51,25 @@ class TableTask:
     options: FitOptions
 
 
-def tabulate(task: TableTask) -> dict[str, Any]:
+def tabulate(task: TableTask) -> dict[str, dict[str, Any]]:
     """Return models of all trials of a terrain as tables; a pure function of the task.
 
-    A model that cannot be fitted is left out.
+    Of each model its parameters and the quantiles of F_t [N], an array of shape
+    (q, n, m) over the axes. A model that cannot be fitted is left out.
     """
     F_n, v_t = (grid.ravel() for grid in np.meshgrid(*task.axes, indexing="ij"))
     fitter = ModelFitter(training_set(task), task.options)
-    models: dict[str, Any] = {}
+    shape = (len(SHARES), task.axes[0].size, task.axes[1].size)
+    models: dict[str, dict[str, Any]] = {}
     for name in task.options.models:
         try:
             model = fitter.fit(name)
         except TractionError:
             continue
-        prediction = model.predict(F_n, v_t)
+        forces = model.predict(F_n, v_t).quantiles(SHARES)
         models[name] = {
-            "title": TITLES[name],
             "parameters": model.describe(),
-            "mean": _rounded(prediction.mean, task.axes),
-            "sd": _rounded(prediction.sd, task.axes),
+            "quantiles": forces.reshape(shape),
         }
     return models
 
@@ -103,28 +105,33 @@ def database_of(
     axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
     models, from_rest = study.options.fit.models, break_away_of(study)
-    default = GP_SE if GP_SE in models else models[0]
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "made_utc": made_utc,
-        "simulated": study.simulated,
-        "default": default,
-        "units": {"F_n": "N", "v_t": "m/s", "mean": "N", "sd": "N"},
-        "axes": {"F_n": axes[0].tolist(), "v_t": axes[1].tolist()},
-        "terrains": {
-            task.terrain: {
-                "kind": study.kinds[task.terrain],
-                **_record(task, identification),
-                "parts": _parts(from_rest.get(task.terrain), identification, task),
-                "models": fitted,
-            }
-            for task, fitted in zip(tasks, tables, strict=True)
-            if default in fitted
-        },
-        "parts": _of_all(identification),
+    default = next((m for m in (GP_SE_TRIAL, GP_SE) if m in models), models[0])
+    recogniser = GP_SE if GP_SE in models else default
+    known = {
+        task.terrain: KnownTerrain(
+            name=task.terrain,
+            kind=study.kinds[task.terrain],
+            trials=len(task.trials),
+            samples=sum(rows.count for rows in task.trials),
+            rho=_rho(identification, task.terrain),
+            limits=_limits(identification, task.terrain),
+            tables={n: _table(one["quantiles"], axes) for n, one in fitted.items()},
+            parameters={n: one["parameters"] for n, one in fitted.items()},
+            default=default,
+            titles={name: TITLES[name] for name in fitted},
+            recogniser=recogniser,
+            parts=_parts(from_rest.get(task.terrain), identification, task),
+        )
+        for task, fitted in zip(tasks, tables, strict=True)
+        if default in fitted and recogniser in fitted
     }
-    return json.dumps(content, default=str)
+    of_all = _of_all(identification)
+    return to_text(TerrainDatabase(known, study.simulated, made_utc, of_all))
+
+
+def _table(forces: Array, axes: tuple[Array, Array]) -> Table:
+    F_n, v_t = (tuple(axis.tolist()) for axis in axes)
+    return Table(F_n, v_t, SHARES, tuple(map(rows_of, forces)))
 
 
 def break_away_of(study: Study) -> dict[str, BreakAwayModel]:
@@ -182,16 +189,9 @@ def _tasks(study: Study) -> tuple[tuple[Array, Array], list[TableTask]]:
     ]
 
 
-def _record(task: TableTask, identification: Identification | None) -> dict[str, Any]:
-    """Return what the database says of a terrain besides its models."""
-    return {
-        "trials": len(task.trials),
-        "samples": sum(rows.count for rows in task.trials),
-        "rho": 0.0
-        if identification is None
-        else round(identification.rho[task.terrain], 4),
-        "limits": _limits(identification, task.terrain),
-    }
+def _rho(identification: Identification | None, terrain: str) -> float:
+    """Return the correlation of neighbouring residuals; 0 where it is not known."""
+    return 0.0 if identification is None else round(identification.rho[terrain], 4)
 
 
 def _axes(
@@ -205,22 +205,15 @@ def _axes(
     return np.round(np.linspace(least, most, POINTS), 6), np.round(v_t, 8)
 
 
-def _limits(identification: Identification | None, terrain: str) -> Mapping[str, float]:
+def _limits(identification: Identification | None, terrain: str) -> Mapping[int, float]:
     if identification is None:
         return {}
-    return _finite(
-        {
-            size: limits[terrain].strain
-            for size, limits in identification.limits.items()
-            if terrain in limits
-        }
-    )
+    return {
+        size: round(limits[terrain].strain, 4)
+        for size, limits in identification.limits.items()
+        if terrain in limits and np.isfinite(limits[terrain].strain)
+    }
 
 
 def _finite(limits: Mapping[int, float]) -> dict[str, float]:
     return {str(k): round(v, 4) for k, v in limits.items() if np.isfinite(v)}
-
-
-def _rounded(values: Array, axes: tuple[Array, Array]) -> list[list[float]]:
-    table = values.reshape(axes[0].size, axes[1].size)
-    return [[float(f"{value:.{_DIGITS}g}") for value in row] for row in table.tolist()]

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.data import Array, PreparedTrial
-from analysis.study import Prediction
+from analysis.study import Distribution
 from analysis.terrains.windows import windows_of
 
 TAU = 10.0  # samples that count as one
 _SMALLEST_SD = 1e-6  # N
 _SPIKE = 10.0  # standard deviations beyond which a larger error adds nothing
-Predictor = Callable[[Array, Array], Prediction]
+Predictor = Callable[[Array, Array], Distribution]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Expert:
     rho: float
 
 
-def log_densities(trial: PreparedTrial, prediction: Prediction, rho: float) -> Array:
+def log_densities(trial: PreparedTrial, prediction: Distribution, rho: float) -> Array:
     """Return the log density of every kept sample given the one before, shape (n,)."""
     sd = np.maximum(prediction.sd, _SMALLEST_SD)
     z = (trial.F_t - prediction.mean) / sd
@@ -51,7 +51,7 @@ def log_densities(trial: PreparedTrial, prediction: Prediction, rho: float) -> A
     return -0.5 * (squares + np.log(2.0 * np.pi * spread)) - np.log(sd)
 
 
-def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Prediction]]) -> float:
+def neighbour_correlation(pairs: Sequence[tuple[PreparedTrial, Distribution]]) -> float:
     """Return rho of trials under their own terrain's models, 0 to 0.99."""
     products = squares = 0.0
     for trial, prediction in pairs:

@@ -1,36 +1,62 @@
-"""What a terrain database answers, and the table that it is read from."""
+"""What a terrain database answers, and the table that it is read from.
+
+A distribution of F_t is kept as quantiles. Between them forces are linear in the normal
+score of the share, and beyond the outer ones they go on with the same slope: a normal
+distribution comes back exactly.
+"""
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.data import Array
-from analysis.study import Prediction
+from analysis.study import SHARES
+
+Rows = tuple[tuple[float, ...], ...]
+
+_NODES = 64  # shares that moments are integrated over
 
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Mean and spread of F_t on a grid of F_n and v_t.
+    """Quantiles of F_t on a grid of F_n and v_t.
 
     Attributes:
         F_n: normal forces [N], shape (n,), increasing.
         v_t: velocities [m/s], shape (m,), increasing.
-        mean: F_t [N], n rows of m.
-        sd: its standard deviation [N], n rows of m.
+        shares: of the quantiles, increasing, shape (q,).
+        forces: F_t [N] that is not reached with each share, q times n rows of m.
     """
 
     F_n: tuple[float, ...]
     v_t: tuple[float, ...]
-    mean: tuple[tuple[float, ...], ...]
-    sd: tuple[tuple[float, ...], ...]
+    shares: tuple[float, ...]
+    forces: tuple[Rows, ...]
 
-    def at(self, F_n: float, v_t: float) -> tuple[float, float]:
-        """Return (mean, standard deviation) [N] at one point; a few microseconds."""
+    @classmethod
+    def normal(
+        cls, F_n: tuple[float, ...], v_t: tuple[float, ...], mean: Array, sd: Array
+    ) -> "Table":
+        """Return the quantiles of normal distributions.
+
+        Args:
+            F_n: normal forces [N], shape (n,).
+            v_t: velocities [m/s], shape (m,).
+            mean: F_t [N], shape (n, m).
+            sd: its standard deviation [N], shape (n, m).
+        """
+        forces = [mean + score * sd for score in normal_scores(SHARES)]
+        return cls(F_n, v_t, SHARES, tuple(rows_of(values) for values in forces))
+
+    def at(self, F_n: float, v_t: float) -> tuple[float, ...]:
+        """Return the quantiles [N] at one point, shape (q,); a few microseconds."""
         i, a = _place(self.F_n, F_n)
         j, b = _place(self.v_t, v_t)
-        return _blend(self.mean, i, a, j, b), _blend(self.sd, i, a, j, b)
+        return tuple(_blend(rows, i, a, j, b) for rows in self.forces)
 
     def covers(self, F_n: float, v_t: float) -> bool:
         """Return whether a point lies between the ends of both axes."""
@@ -42,17 +68,28 @@ class Table:
         is_load = (self.F_n[0] <= F_n) & (F_n <= self.F_n[-1])
         return is_load & (self.v_t[0] <= v_t) & (v_t <= self.v_t[-1])
 
-    def over(self, F_n: Array, v_t: Array) -> Prediction:
-        """Return mean and standard deviation [N] at many points, shape (n,)."""
+    def over(self, F_n: Array, v_t: Array) -> Array:
+        """Return the quantiles [N] at many points, shape (q, n)."""
         i, a = _places(self.F_n, F_n)
         j, b = _places(self.v_t, v_t)
-        values = []
-        for rows in (self.mean, self.sd):
-            table = np.array(rows)
-            low = table[i, j] + b * (table[i, j + 1] - table[i, j])
-            high = table[i + 1, j] + b * (table[i + 1, j + 1] - table[i + 1, j])
-            values.append(low + a * (high - low))
-        return Prediction(*values)
+        table = np.array(self.forces)
+        low = table[:, i, j] + b * (table[:, i, j + 1] - table[:, i, j])
+        far = table[:, i + 1, j]
+        high = far + b * (table[:, i + 1, j + 1] - far)
+        return low + a * (high - low)
+
+
+def rows_of(values: Array) -> Rows:
+    """Return an array of shape (n, m) as n rows of m numbers."""
+    return tuple(tuple(row) for row in values.tolist())
+
+
+@lru_cache
+def normal_scores(shares: tuple[float, ...]) -> Array:
+    """Return what a standard normal variable does not reach with these shares, (q,)."""
+    from scipy.special import ndtri
+
+    return ndtri(np.array(shares))
 
 
 def _place(axis: tuple[float, ...], value: float) -> tuple[int, float]:
@@ -72,9 +109,7 @@ def _places(axis: tuple[float, ...], values: Array) -> tuple[np.ndarray, Array]:
     return i, (inside - points[i]) / (points[i + 1] - points[i])
 
 
-def _blend(
-    rows: tuple[tuple[float, ...], ...], i: int, a: float, j: int, b: float
-) -> float:
+def _blend(rows: Rows, i: int, a: float, j: int, b: float) -> float:
     low, high = rows[i], rows[i + 1]
     left = low[j] + b * (low[j + 1] - low[j])
     right = high[j] + b * (high[j + 1] - high[j])
@@ -82,39 +117,103 @@ def _blend(
 
 
 @dataclass(frozen=True, slots=True)
+class TractionEstimates:
+    """What is to be expected of a terrain at many points.
+
+    Attributes:
+        shares: of the quantiles, shape (q,).
+        forces: traction [N] that is not reached with each share, shape (q, n).
+        is_extrapolated: which points lie outside the table, shape (n,).
+    """
+
+    shares: tuple[float, ...]
+    forces: Array
+    is_extrapolated: NDArray[np.bool_]
+
+    @property
+    def median(self) -> Array:
+        """Traction [N] that is reached every second time, shape (n,)."""
+        return self.quantile(0.5)
+
+    @property
+    def mean(self) -> Array:
+        """Expected traction [N], shape (n,)."""
+        weights, values = self._integrated()
+        return weights @ values
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation of a measurement [N], shape (n,)."""
+        weights, values = self._integrated()
+        return np.sqrt(weights @ (values - weights @ values) ** 2)
+
+    def quantile(self, share: float) -> Array:
+        """Return the traction [N] not reached with probability `share`, shape (n,)."""
+        return self._forces_at(normal_scores((share,)))[0]
+
+    def _integrated(self) -> tuple[Array, Array]:
+        """Return weights, shape (64,), and forces [N], shape (64, n), of moments."""
+        nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+        shares = tuple((0.5 * (nodes + 1.0)).tolist())
+        return 0.5 * weights, self._forces_at(normal_scores(shares))
+
+    def _forces_at(self, wanted: Array) -> Array:
+        """Return the forces [N] at these normal scores, shape (k, n)."""
+        known = normal_scores(self.shares)
+        i = np.clip(np.searchsorted(known, wanted, "right") - 1, 0, known.size - 2)
+        way = (wanted - known[i]) / (known[i + 1] - known[i])
+        return self.forces[i] + way[:, None] * (self.forces[i + 1] - self.forces[i])
+
+
+@dataclass(frozen=True, slots=True)
 class TractionEstimate:
     """What is to be expected of a terrain at one point.
 
     Attributes:
-        mean: traction [N].
-        sd: its standard deviation [N], noise included.
+        shares: of the quantiles, shape (q,).
+        forces: traction [N] that is not reached with each share, shape (q,).
         is_extrapolated: the point lies outside the table: the values are of its edge.
     """
 
-    mean: float
-    sd: float
+    shares: tuple[float, ...]
+    forces: tuple[float, ...]
     is_extrapolated: bool = False
+
+    @property
+    def median(self) -> float:
+        """Traction [N] that is reached every second time."""
+        return self.quantile(0.5)
+
+    @property
+    def mean(self) -> float:
+        """Expected traction [N]."""
+        return float(self._many().mean[0])
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation of a measurement [N]."""
+        return float(self._many().sd[0])
 
     def quantile(self, share: float) -> float:
         """Return the traction [N] that is not reached with probability `share`."""
-        from scipy.special import ndtri
+        return float(self._many().quantile(share)[0])
 
-        return self.mean + self.sd * float(ndtri(share))
+    def probability_below(self, force: float) -> float:
+        """Return the probability of less traction than `force` [N]."""
+        from scipy.special import ndtr
+
+        return float(ndtr(_score_of(force, self.forces, normal_scores(self.shares))))
+
+    def _many(self) -> TractionEstimates:
+        forces = np.array(self.forces)[:, None]
+        return TractionEstimates(self.shares, forces, np.array([self.is_extrapolated]))
 
 
-@dataclass(frozen=True, slots=True)
-class TractionEstimates:
-    """What is to be expected of a terrain at many points, arrays of shape (n,).
-
-    Attributes:
-        mean: traction [N].
-        sd: its standard deviation [N], noise included.
-        is_extrapolated: which points lie outside the table.
-    """
-
-    mean: Array
-    sd: Array
-    is_extrapolated: NDArray[np.bool_]
+def _score_of(force: float, forces: Sequence[float], scores: Array) -> float:
+    """Return the normal score of a force [N] among quantiles, which do not decrease."""
+    i = min(max(bisect_right(forces, force) - 1, 0), len(forces) - 2)
+    step = max(forces[i + 1] - forces[i], 1e-9)
+    return float(scores[i] + (force - forces[i]) / step * (scores[i + 1] - scores[i]))
 
 
 class SlipRisk(float):

@@ -14,7 +14,7 @@ import numpy as np
 
 from analysis.data import Array, PreparedTrial, groups_of
 from analysis.terrains.classifier import FLAT_GROUND, ROCKY_GROUND, LogisticModel
-from analysis.terrains.database import KnownTerrain, TerrainDatabase
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import roughness_in, surfaces_in
 from analysis.terrains.recognition import Expert, TerrainScores, score_trial
 from analysis.terrains.windows import RESID, window_features

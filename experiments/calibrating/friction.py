@@ -33,7 +33,7 @@ _SIGMAS = 1.96
 
 
 @dataclass(frozen=True, slots=True)
-class _Recorded:
+class _RecordedWay:
     """What was recorded on the way, by its use."""
 
     fitted: list[RecordedLeg]
@@ -82,8 +82,8 @@ class FrictionGuide:
             is_simulated=rig.is_simulated,
         )
 
-    def _record(self, legs: Sequence[FrictionLeg]) -> _Recorded:
-        recorded = _Recorded([], [])
+    def _record(self, legs: Sequence[FrictionLeg]) -> _RecordedWay:
+        recorded = _RecordedWay([], [])
         clock, loop_client = self._rig.clock, self._rig.backend.loop_client
         pose: int | None = None
         for leg in legs:
@@ -101,7 +101,7 @@ class FrictionGuide:
             pose = leg.halt.pose
         return recorded
 
-    def _fit(self, recorded: _Recorded) -> FrictionFit:
+    def _fit(self, recorded: _RecordedWay) -> FrictionFit:
         rig = self._rig
         models = rig.model, rig.law_model
         is_known = rig.settings.rig.gravity.model == "calibrated"

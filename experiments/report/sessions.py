@@ -22,6 +22,7 @@ from analysis.study import (
     FITTERS,
     GP_SE,
     GP_SE_NOISE,
+    GP_SE_TRIAL,
     FitOptions,
     ResultStore,
     Study,
@@ -46,7 +47,8 @@ from experiments.session import (
 )
 
 FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
-REPORTED = (*FITTERS, GP_SE_NOISE)  # the models of a report: Fig. 9, and chosen noise
+REPORTED = (*FITTERS, GP_SE_NOISE, GP_SE_TRIAL)  # Fig. 9, and those beyond the paper
+EXPORTED = (*FITTERS, GP_SE_TRIAL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,7 +234,9 @@ def export_terrains(
     judged = FitOptions(seed=order.seed, models=(GP_SE,), draws=0)
     analysed = study_sessions(sessions, data, order, console, judged)
     study = analysed.study
-    options = replace(study.options, fit=FitOptions(seed=order.seed, draws=0))
+    options = replace(
+        study.options, fit=FitOptions(seed=order.seed, models=EXPORTED, draws=0)
+    )
     text = database_of(
         replace(study, options=options),
         identify_study(study),

@@ -94,7 +94,7 @@ def _sensor_calibration() -> str:
 
 def _database() -> dict[str, object]:
     table = [[1.0, 2.0], [2.0, 3.0]]
-    model = {"mean": table, "sd": table, "parameters": {"mu": 0.6}}
+    model = {"title": "GP", "quantiles": [table, table], "parameters": {"mu": 0.6}}
     terrain = {"kind": "stones", "trials": 3, "samples": 90, "rho": 0.5}
     law = PushLaw(2.2, 0.5, 0.3, 0.1)
     rest = BreakAwayModel(
@@ -116,6 +116,8 @@ def _database() -> dict[str, object]:
         "simulated": True,
         "made_utc": _UTC,
         "default": "gp",
+        "recogniser": "gp",
+        "shares": [0.1, 0.9],
         "axes": {"F_n": [1.0, 5.0], "v_t": [0.0, 0.1]},
         "terrains": {"S0": {**terrain, "limits": {"2": 0.1}, "models": {"gp": model}}},
     }

@@ -241,7 +241,7 @@ def stored(path, *, terrains=1, points=2):
     content["axes"]["v_t"] = [0.1 * k for k in range(points)]
     terrain = content["terrains"].pop("S0")
     table = [[1.0] * points] * 2
-    terrain["models"]["gp"] |= {"mean": table, "sd": table}
+    terrain["models"]["gp"]["quantiles"] = [table, table]
     content["terrains"] = {f"S{number}": terrain for number in range(terrains)}
     path.write_text(json.dumps(content))
     return path

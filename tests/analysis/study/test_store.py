@@ -33,7 +33,9 @@ def task(slice_trials):
         name: [prepare_trial(series, PrepareOptions()) for series in slice_trials[name]]
         for name in ("S0", "TF")
     }
-    options = FitOptions(gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_noise"))
+    options = FitOptions(
+        gp_points=40, models=("tustin", "gp_nn_tustin", "gp_se_noise", "gp_se_trial")
+    )
     return plan_folds(trials, options)[0][0]
 
 

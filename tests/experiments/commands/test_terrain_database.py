@@ -23,12 +23,14 @@ def exported(tmp_path_factory):
     return folder / "data", path
 
 
-def test_every_terrain_has_all_five_models(exported):
+def test_every_terrain_has_the_five_models_and_that_of_a_new_trial(exported):
     database = load(exported[1])
     assert set(database.terrains) == {"S0", "Tf"}
     assert database.is_simulated
     models = database.terrain("Tf").tables
-    assert set(models) == {"tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin"}
+    five = {"tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin"}
+    assert set(models) == five | {"gp_se_trial"}
+    assert database.terrain("Tf").default == "gp_se_trial"
     assert 0.1 < database.terrain("Tf").predict(3.0, 0.05).mean < 2.0
 
 

@@ -1,0 +1,133 @@
+"""Whether the bands of a model hold on trials it has not seen, and how surely.
+
+Two looks at the trials of a terrain, each left out in turn. The first is the share of
+the predicted distribution below every measurement: such shares are even where the
+distribution is right. The second is an oracle that believes no distribution: a band
+around the median, as wide as the other trials left out need it (conformal prediction
+over groups; Lee, Barber and Willett 2023). Rows of one trial repeat each other, so a
+trial counts as one in both, and an error is that over trials.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from analysis.data import Array
+from analysis.study import GP_SE_TRIAL, Study, TerrainResult
+
+BINS = 10  # of the shares
+ORACLE = (0.5, 0.8)  # bands that ten trials can show; 95 % would need nineteen
+
+_EDGE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class OracleBand:
+    """A band of the model beside one that assumes no distribution.
+
+    Attributes:
+        nominal: share that both should hold.
+        coverage: share of left-out samples in the oracle's band, mean of trials.
+        coverage_error: its standard error over trials.
+        width: width of the oracle's band over that of the model's, mean of trials.
+    """
+
+    nominal: float
+    coverage: float
+    coverage_error: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutShares:
+    """Where samples of left-out trials lie in what was predicted for them.
+
+    Attributes:
+        terrain: its terrain.
+        density: share of the samples in each of ten even bins times ten, mean of
+            trials; 1 everywhere where the prediction is right. Shape (10,).
+        error: its standard error over trials, shape (10,).
+        trials: number of trials.
+        oracle: bands beside those of the oracle.
+    """
+
+    terrain: str
+    density: Array
+    error: Array
+    trials: int
+    oracle: tuple[OracleBand, ...]
+
+
+def held_out_shares(study: Study, model: str = GP_SE_TRIAL) -> list[HeldOutShares]:
+    """Return the shares of every terrain with at least three folds of the model."""
+    found = (_of_terrain(result, model) for result in study.terrains.values())
+    return [shares for shares in found if shares is not None]
+
+
+def plain_shares(shares: HeldOutShares) -> dict[str, Any]:
+    """Return the shares of a terrain as plain values for fits.json."""
+    return asdict(shares) | {
+        "density": shares.density.tolist(),
+        "error": shares.error.tolist(),
+    }
+
+
+def _of_terrain(result: TerrainResult, model: str) -> HeldOutShares | None:
+    shares = [
+        fold.models[model].model.predict(trial.F_n, trial.v_t).cdf(trial.F_t)
+        for fold in result.folds
+        if model in fold.models
+        for trial in [result.trials[fold.fold]]
+    ]
+    if len(shares) < 3:
+        return None
+    edges = np.linspace(0.0, 1.0, BINS + 1)
+    counts = np.array([np.histogram(u, edges)[0] / u.size * BINS for u in shares])
+    return HeldOutShares(
+        terrain=result.terrain,
+        density=counts.mean(axis=0),
+        error=counts.std(axis=0, ddof=1) / np.sqrt(len(shares)),
+        trials=len(shares),
+        oracle=tuple(oracle_band(shares, nominal) for nominal in ORACLE),
+    )
+
+
+def oracle_band(shares: Sequence[Array], nominal: float) -> OracleBand:
+    """Return how the conformal band over trials does on each trial in turn.
+
+    Args:
+        shares: share of the prediction below every sample, trial by trial.
+        nominal: share that the band should hold.
+    """
+    from scipy.special import ndtri
+
+    scores = [np.abs(ndtri(np.clip(u, _EDGE, 1.0 - _EDGE))) for u in shares]
+    reach = [
+        conformal_reach([*scores[:k], *scores[k + 1 :]], nominal)
+        for k in range(len(scores))
+    ]
+    held = np.array([np.mean(s <= r) for s, r in zip(scores, reach, strict=True)])
+    usual = float(ndtri(0.5 + 0.5 * nominal))
+    error = held.std(ddof=1) / np.sqrt(held.size)
+    width = float(np.mean(reach)) / usual
+    return OracleBand(nominal, float(held.mean()), float(error), width)
+
+
+def conformal_reach(scores: Sequence[Array], nominal: float) -> float:
+    """Return the score that a new trial's samples stay below with a share `nominal`.
+
+    The trials known share all weight but one part, which stands for the new trial and
+    lies at infinity: the reach is infinite for a share that so few trials cannot show.
+
+    Args:
+        scores: of the samples of every known trial, larger where they fit less.
+        nominal: share of the new trial's samples.
+    """
+    values = np.concatenate(scores)
+    weight = np.concatenate([np.full(s.size, 1.0 / s.size) for s in scores])
+    order = np.argsort(values)
+    reached = np.cumsum(weight[order]) / (len(scores) + 1)
+    place = int(np.searchsorted(reached, nominal - 1e-12))
+    return float(values[order][place]) if place < values.size else float("inf")

@@ -1,0 +1,149 @@
+"""Tables of the report about a trial that nobody has recorded yet."""
+
+from analysis.figures import ReportSection
+from analysis.findings import StudyResults
+from analysis.report.page_model import ReportTable
+from analysis.study import (
+    GP_SE_NOISE,
+    GP_SE_TRIAL,
+    NewTrialModel,
+    Study,
+    TrialComponents,
+    compare,
+    family_counts,
+    mean_of,
+)
+
+_ENOUGH = 10  # trials that the level is stated for
+_LEAST = 0.01  # of the residual within a trial: smaller noise is not told apart from 0
+
+
+def new_trial_tables(results: StudyResults) -> list[ReportTable]:
+    """Return the tables on predictions of a new trial; one without rows is left out."""
+    tables = [
+        family_table(results.study),
+        worth_table(results.study),
+        oracle_table(results),
+    ]
+    return [table for table in tables if table.rows]
+
+
+def family_table(study: Study) -> ReportTable:
+    """Return which family of distributions the trials chose, and what it gains."""
+    rows: list[list[str]] = []
+    for name, result in study.terrains.items():
+        fitted = [fold.model for fold in result.models(GP_SE_TRIAL)]
+        models = [model for model in fitted if isinstance(model, NewTrialModel)]
+        if not models:
+            continue
+        counts = family_counts(models)
+        before, after = (result.scores(m, "nlpd") for m in (GP_SE_NOISE, GP_SE_TRIAL))
+        paired, mean = compare(before, after), mean_of(after)
+        rows.append(
+            [
+                name,
+                ", ".join(f"{family} {n}" for family, n in counts.items() if n),
+                str(sum(model.shape is not None for model in models)),
+                str(sum(model.choice.clipped for model in models)),
+                "–" if mean is None else f"{mean:.3f}",
+                "–" if paired is None else f"{-paired.difference:+.3f}",
+            ]
+        )
+    return ReportTable(
+        name="Distribution of a new trial",
+        header=(
+            "terrain",
+            "family by folds",
+            "with a shape on top",
+            "rows clipped",
+            "NLPD [log N]",
+            "gain over chosen noise [log N]",
+        ),
+        rows=rows,
+        note="A Gaussian process with an effect of the trial. Normal noise, noise that "
+        "changes with load and velocity, or normal noise of the warped force "
+        "c log(F_t + c): chosen in every fold among its training trials, each left "
+        "out in turn. Scores are of trials left out of the fold.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def worth_table(study: Study) -> ReportTable:
+    """Return how trials differ, and how well so many show a terrain's level."""
+    rows = [
+        [
+            name,
+            _between(of),
+            _with_interval(of, "within", "N"),
+            _with_interval(of, "tau", "s"),
+            _measurement(of),
+            f"{of.independent:.0f}",
+            f"{of.level_sd(1):.2f}",
+            f"{of.level_sd(_ENOUGH):.2f}",
+        ]
+        for name, result in study.terrains.items()
+        if (of := result.components) is not None
+    ]
+    return ReportTable(
+        name="What another trial is worth",
+        header=(
+            "terrain",
+            "between trials",
+            "within a trial",
+            "its time",
+            "measurement",
+            "independent values a trial",
+            "level after one trial [N]",
+            f"after {_ENOUGH} [N]",
+        ),
+        rows=rows,
+        note="Standard deviations with 95% intervals from trials drawn again. Between: "
+        "a level of its own in every trial. Within: a residual that lasts for its "
+        "time and averages out along a trial. Measurement: what the next row does not "
+        "share. The last columns are how well the terrain's level is known. A spread "
+        "between trials that gains less than 1.4 in log likelihood is not told apart "
+        "from 0.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def oracle_table(results: StudyResults) -> ReportTable:
+    """Return bands of a new trial beside those that assume no distribution."""
+    rows = [
+        [
+            of.terrain,
+            f"{band.nominal:.0%}",
+            f"{band.coverage:.1%} ± {band.coverage_error:.1%}",
+            f"{band.width:.2f}",
+        ]
+        for of in results.shares
+        for band in of.oracle
+    ]
+    return ReportTable(
+        name="Bands that assume no distribution",
+        header=("terrain", "band", "holds", "width over the model's"),
+        rows=rows,
+        note="A band around the median as wide as the other trials left out need it, "
+        "each trial counting as one (conformal over trials). It has to hold its share "
+        "at least; a width near 1 says that the model's own band is honest. Ten trials "
+        "cannot show a band of 95%: that needs nineteen.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def _between(of: TrialComponents) -> str:
+    if not of.is_told_apart:
+        return f"not told apart from 0 (gain {of.gain:.1f})"
+    return f"{_with_interval(of, 'between', 'N')} (gain {of.gain:.1f})"
+
+
+def _measurement(of: TrialComponents) -> str:
+    if of.measurement < _LEAST * of.within:  # the search ends there
+        return "not told apart from 0"
+    return _with_interval(of, "measurement", "N")
+
+
+def _with_interval(of: TrialComponents, name: str, unit: str) -> str:
+    interval = of.intervals[name]
+    value = getattr(of, name)
+    return f"{value:.2f} ({interval.lower:.2f} to {interval.upper:.2f}) {unit}"

@@ -1,0 +1,294 @@
+"""Models whose bands hold for a new trial: with an effect of the trial, and skew.
+
+Three families compete, each with a level of its own in every trial: normal noise, noise
+that changes with the inputs, and normal noise around a warped force z = c log(y + c).
+The choice is made among the training trials only, by the log density (of y) of each of
+them left out in turn: the hyperparameters stay, its rows are taken out and the rest is
+factorised again. Another family than the normal one must be better by one standard
+error over the trials and by 0.05 log N. So must a `ShapeMap` on top of the chosen one
+be, by one standard error; every trial is scored by the shape of the others.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from analysis.data import Array, Indices, SampleTable, TrainingSet
+from analysis.gp import (
+    ConstantNoise,
+    GaussianProcess,
+    Kernel,
+    LogLinearNoise,
+    TrialNoise,
+    TrialRows,
+    fit_gp,
+    refit_gp,
+    without_idle_inputs,
+)
+from analysis.study.distribution import FEWEST, NewTrialPrediction
+from analysis.study.metrics import clearly_best
+from analysis.study.skew import (
+    ShapeMap,
+    choose_shape,
+    deepest,
+    log_warp_slope,
+    unwarped,
+    warped,
+)
+from analysis.tustin import TustinFit
+
+NORMAL, LOGLINEAR, WARPED = "normal", "loglinear", "log warp"
+FAMILIES = (NORMAL, LOGLINEAR, WARPED)
+LEVEL, RATIO, BOTH = "constant", "proportional", "both"
+EFFECTS = (LEVEL, RATIO, BOTH)
+
+LEAST_GAIN = 0.05  # log N; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
+_BENDS = (1.0, 3.0, 9.0)  # N, c of the warp
+_THIN = 5  # of the rows of a trial left out every fifth is scored
+
+
+class FamilyChoice(NamedTuple):
+    """The family chosen for a training set, and why.
+
+    Attributes:
+        chosen: its name.
+        nlpd: mean negative log density of training trials left out, by family.
+        shape_gain: by how much a shape on top raised it [log N].
+        clipped: chosen rows below -0.95 c, where the warp has an end.
+    """
+
+    chosen: str
+    nlpd: dict[str, float]
+    shape_gain: float
+    clipped: int
+
+
+@dataclass(frozen=True, slots=True)
+class NewTrialModel:
+    """A model of F_t over (F_n, v_t) that predicts a trial it has not seen.
+
+    Attributes:
+        process: the process of z with the trial's effect in its noise.
+        curve: Tustin fit that is its mean function.
+        trials: number of trials it was fitted to.
+        c: of the warp z = c log(y + c) [N]; None for z = y.
+        shape: of the distribution, where it was worth one.
+        choice: how the family was chosen.
+    """
+
+    process: GaussianProcess
+    curve: TustinFit | None
+    trials: int
+    c: float | None
+    shape: ShapeMap | None
+    choice: FamilyChoice
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """Hyperparameters at the edge of the search, and what was clipped."""
+        jitter = ("jitter added",) if self.process.jitter else ()
+        clipped = ("forces clipped by the warp",) if self.choice.clipped else ()
+        at_bound = (f"{name} at bound" for name in self.process.at_bound)
+        return (*at_bound, *jitter, *clipped)
+
+    def mean(self, F_n: Array, v_t: Array) -> Array:
+        """Return the median [N], the forecast of the smallest absolute error."""
+        if self.shape is not None:
+            return self.predict(F_n, v_t).point
+        inputs = np.column_stack([F_n, v_t])
+        z = self.process.mean(inputs) + _curve(self.curve, inputs, self.c)
+        return unwarped(z, self.c)
+
+    def predict(self, F_n: Array, v_t: Array) -> NewTrialPrediction:
+        """Return the distribution of measurements of a new trial."""
+        inputs, around = np.column_stack([F_n, v_t]), (self.curve, self.c)
+        prediction = _predict(self.process, inputs, self.trials, around)
+        return replace(prediction, shape=self.shape)
+
+    def describe(self) -> dict[str, Any]:
+        """Return hyperparameters, likelihood, starts, family and standardisation."""
+        return self.process.describe() | {
+            "curve": None if self.curve is None else asdict(self.curve.parameters),
+            "trials": self.trials,
+            "c": self.c,
+            "shape": None if self.shape is None else self.shape._asdict(),
+            "family": self.choice._asdict(),
+        }
+
+
+class _Candidate(NamedTuple):
+    """One family, fitted.
+
+    Attributes:
+        family: its name.
+        process: of z.
+        c: of its warp [N], None without.
+    """
+
+    family: str
+    process: GaussianProcess
+    c: float | None
+
+
+class NewTrialFit:
+    """Fits the families to one training set.
+
+    Args:
+        training: rows of the training trials.
+        curve: Tustin fit that is the mean function; None for a constant.
+        effect: what a trial adds: "constant", "proportional" to F_n, or "both".
+        families: that compete, the normal one among them; it alone gets no shape.
+    """
+
+    def __init__(
+        self,
+        training: TrainingSet,
+        curve: TustinFit | None,
+        effect: str = LEVEL,
+        families: Sequence[str] = FAMILIES,
+    ) -> None:
+        self._training, self._curve, self._effect = training, curve, effect
+        self._families = families
+        self._chosen = np.sort(training.chosen)  # rows of a trial stand together
+        self._rows = training.rows.take(self._chosen)
+        self._trial = training.trial_of()
+        label = self._trial[self._chosen]
+        self._trials = TrialRows(label, np.zeros(label.size))
+        self._left_out = [
+            np.flatnonzero(self._trial == k)[::_THIN] for k in np.unique(label)
+        ]
+
+    def fit(self, kernel: Kernel) -> NewTrialModel:
+        """Return the family that predicts training trials best when left out.
+
+        Raises:
+            SettingsError: fewer than 20 rows, or outputs that do not vary.
+        """
+        candidates = self._candidates(kernel)
+        scores = [self._held_out(candidate) for candidate in candidates]
+        nlpd = np.array([[-part.mean() for part, _ in each] for each in scores]).T
+        best = clearly_best(nlpd, LEAST_GAIN)
+        chosen = candidates[best]
+        shape, gain = None, 0.0
+        if len(candidates) > 1:
+            shape, gain = choose_shape([x for _, x in scores[best]])
+        choice = FamilyChoice(
+            chosen.family,
+            {c.family: float(m) for c, m in zip(candidates, nlpd.mean(0), strict=True)},
+            gain,
+            int(np.count_nonzero(self._rows.F_t < deepest(chosen.c))),
+        )
+        count = len(self._left_out)
+        return NewTrialModel(
+            chosen.process, self._curve, count, chosen.c, shape, choice
+        )
+
+    def _candidates(self, kernel: Kernel) -> list[_Candidate]:
+        normal = self._fitted(kernel, ConstantNoise(), None)
+        fitted = [_Candidate(NORMAL, normal, None)]
+        if len(self._left_out) < 2:
+            return fitted
+        if LOGLINEAR in self._families:
+            changing = self._fitted(kernel, LogLinearNoise(), None)
+            fitted.append(_Candidate(LOGLINEAR, changing, None))
+        if WARPED in self._families:
+            c = max(_BENDS, key=lambda c: self._warped_likelihood(normal, c))
+            bent = self._fitted(kernel, ConstantNoise(), c)
+            fitted.append(_Candidate(WARPED, bent, c))
+        return fitted
+
+    def _fitted(
+        self, kernel: Kernel, within: ConstantNoise | LogLinearNoise, c: float | None
+    ) -> GaussianProcess:
+        outputs = self._outputs(self._chosen, c)
+        process = fit_gp(
+            self._rows.inputs,
+            outputs,
+            kernel,
+            self._noise(within),
+            is_centred=self._curve is None,
+            trials=self._trials,
+        )
+        return without_idle_inputs(process, outputs)
+
+    def _noise(self, within: ConstantNoise | LogLinearNoise) -> TrialNoise:
+        load = self._rows.F_n
+        usual = max(float(np.abs(load).mean()), 1e-9)
+        return TrialNoise(
+            within,
+            has_level=self._effect != RATIO and len(self._left_out) > 1,
+            has_ratio=self._effect != LEVEL and len(self._left_out) > 1,
+            load=(float(load.mean()) / usual, float(load.std()) / usual),
+        )
+
+    def _warped_likelihood(self, normal: GaussianProcess, c: float) -> float:
+        """Return the likelihood of y under a warp: that of z and its Jacobian."""
+        before = self._outputs(self._chosen, None)
+        z = self._outputs(self._chosen, c)
+        lml = refit_gp(normal, z, float(z.std() / before.std())).lml
+        return lml + float(log_warp_slope(self._rows.F_t, c).sum())
+
+    def _outputs(self, rows: Indices, c: float | None) -> Array:
+        taken = self._training.rows.take(rows)
+        return warped(taken.F_t, c) - _curve(self._curve, taken.inputs, c)
+
+    def _held_out(self, candidate: _Candidate) -> list[tuple[Array, Array]]:
+        """Return log density and normal score of rows of every trial left out."""
+        if len(self._left_out) < 2:
+            return [(np.zeros(1), np.zeros(1))]
+        return [self._without(candidate, rows) for rows in self._left_out]
+
+    def _without(self, candidate: _Candidate, rows: Indices) -> tuple[Array, Array]:
+        """Return what the process says of one trial when given only the others."""
+        process, c = candidate.process, candidate.c
+        is_other = self._trials.trial != self._trial[rows[0]]
+        label = self._trials.trial[is_other]
+        others = process.given(
+            self._rows.take(np.flatnonzero(is_other)).inputs,
+            self._outputs(self._chosen[is_other], c),
+            TrialRows(label, np.zeros(label.size)),
+        )
+        tested: SampleTable = self._training.rows.take(rows)
+        count = len(self._left_out) - 1
+        prediction = _predict(others, tested.inputs, count, (self._curve, c))
+        return prediction.log_density(tested.F_t), prediction.normal_score(tested.F_t)
+
+
+def fit_new_trial(
+    training: TrainingSet, kernel: Kernel, curve: TustinFit | None, effect: str
+) -> NewTrialModel:
+    """Return the model of a new trial; see `NewTrialFit`."""
+    return NewTrialFit(training, curve, effect).fit(kernel)
+
+
+def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
+    """Return how many models chose each family."""
+    chosen = [model.choice.chosen for model in models]
+    return {family: chosen.count(family) for family in FAMILIES}
+
+
+def _predict(
+    process: GaussianProcess,
+    inputs: Array,
+    trials: int,
+    around: tuple[TustinFit | None, float | None],
+) -> NewTrialPrediction:
+    """Return what a process of z predicts around a curve, warped with c."""
+    curve, c = around
+    mean, variance = process.predict(inputs)
+    between = np.zeros(mean.shape)
+    if isinstance(process.noise, TrialNoise):
+        theta = process.theta[len(process.kernel.names) :]
+        Z = (inputs - process.centre) / process.scale
+        between = process.noise.trial_variance(theta, Z)
+    centre, freedom = mean + _curve(curve, inputs, c), max(trials - 1, FEWEST)
+    return NewTrialPrediction(centre, variance - between, between, freedom, c)
+
+
+def _curve(curve: TustinFit | None, inputs: Array, c: float | None) -> Array:
+    """Return the mean function of z at (F_n, v_t), shape (n,)."""
+    if curve is None:
+        return np.zeros(inputs.shape[0])
+    return warped(curve.mean(inputs[:, 0], inputs[:, 1]), c)

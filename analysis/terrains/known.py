@@ -1,0 +1,170 @@
+"""Terrains that are known by their models: what another program asks.
+
+`load` of `database` reads them from a file, and checks everything before it
+believes it.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from acquisition import SettingsError
+from analysis.breakaway import BreakAwayModel, BreakAwayRisk
+from analysis.data import Array
+from analysis.study import Prediction
+from analysis.terrains.parts import Parts, break_away_in
+from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
+
+
+@dataclass(frozen=True, slots=True)
+class KnownTerrain:
+    """One terrain of a database.
+
+    Attributes:
+        name: of the terrain.
+        kind: "small", "big", "flat" or a word of its own.
+        trials: it was fitted to so many trials,
+        samples: with so many samples.
+        rho: correlation of its residuals from one kept sample to the next.
+        limits: mean strain by window size that its own windows stay below.
+        tables: by name of the model.
+        parameters: of every model, as fitted.
+        default: name of the model that answers.
+        titles: of every model, for people.
+        recogniser: name of the model that `rho` and `limits` belong to, which says how
+            well a trial fits the terrain; "" = the default.
+        parts: what else is known of it, by name; see `analysis.terrains.parts`.
+    """
+
+    name: str
+    kind: str
+    trials: int
+    samples: int
+    rho: float
+    limits: Mapping[int, float]
+    tables: Mapping[str, Table]
+    parameters: Mapping[str, Any]
+    default: str
+    titles: Mapping[str, str] = field(default_factory=dict)
+    recogniser: str = ""
+    parts: Parts = field(default_factory=dict[str, Any])
+
+    def predict(self, F_n: float, v_t: float, model: str = "") -> TractionEstimate:
+        """Return the traction to expect of a new trial.
+
+        Args:
+            F_n: normal force [N].
+            v_t: slip velocity [m/s].
+            model: name of a model; "" = the default.
+
+        Raises:
+            SettingsError: there is no such model, or a value is no finite number.
+        """
+        _check_finite(F_n=F_n, v_t=v_t)
+        table = self._table(model)
+        forces = table.at(F_n, v_t)
+        return TractionEstimate(table.shares, forces, not table.covers(F_n, v_t))
+
+    def predict_many(
+        self, F_n: Array, v_t: Array, model: str = ""
+    ) -> TractionEstimates:
+        """Return the same for many points, shape (n,).
+
+        Raises:
+            SettingsError: there is no such model, or a value is no finite number.
+        """
+        if not (np.isfinite(F_n).all() and np.isfinite(v_t).all()):
+            raise SettingsError("F_n and v_t have to be finite numbers.")
+        table, loads, speeds = self._table(model), np.asarray(F_n), np.asarray(v_t)
+        is_outside = ~table.covers_many(loads, speeds)
+        return TractionEstimates(table.shares, table.over(loads, speeds), is_outside)
+
+    def prediction(self, F_n: Array, v_t: Array) -> Prediction:
+        """Return the recogniser's answer as a model of the study gives it."""
+        many = self.predict_many(F_n, v_t, self.recogniser)
+        return Prediction(many.mean, many.sd)
+
+    def slip_risk(self, required: float, F_n: float) -> BreakAwayRisk:
+        """Return `BreakAwayModel.slip_risk`: of a push from rest at a load F_n [N].
+
+        Raises:
+            SettingsError: a value is negative or no finite number, or it is not known.
+        """
+        return self.from_rest.slip_risk(required, F_n)
+
+    @property
+    def from_rest(self) -> BreakAwayModel:
+        """What it gives before it slips; read anew every time.
+
+        Raises:
+            SettingsError: it is not known.
+        """
+        return break_away_in(self.parts, self.name)
+
+    def risk_in_motion(self, required: float, F_n: float, v_t: float = 0.0) -> SlipRisk:
+        """Return the probability that a sliding foot meets less than `required` [N].
+
+        Velocities below the slowest one that was measured count as that. A load or
+        velocity outside the table is marked by `is_extrapolated` of the answer.
+
+        Raises:
+            SettingsError: a value is no finite number.
+        """
+        _check_finite(required=required, F_n=F_n, v_t=v_t)
+        table = self._table("")
+        risk = self.predict(F_n, v_t).probability_below(required)
+        is_covered = table.covers(F_n, max(v_t, table.v_t[0]))
+        return SlipRisk(risk, is_extrapolated=not is_covered)
+
+    def _table(self, model: str) -> Table:
+        table = self.tables.get(model or self.default)
+        if table is None:
+            raise SettingsError(
+                f"{self.name}: there is no model {model!r}.",
+                hint=f"Models: {', '.join(self.tables)}.",
+            )
+        return table
+
+
+def _check_finite(**values: float) -> None:
+    """Refuse a value that no table can be asked for.
+
+    Raises:
+        SettingsError: one is no finite number.
+    """
+    for name, value in values.items():
+        if not math.isfinite(value):
+            raise SettingsError(f"{name} = {value} is no finite number.")
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainDatabase:
+    """Terrains by name.
+
+    Attributes:
+        terrains: every terrain.
+        is_simulated: the trials were simulated.
+        made_utc: when.
+        parts: what else is known of all of them, by name.
+    """
+
+    terrains: Mapping[str, KnownTerrain]
+    is_simulated: bool
+    made_utc: str
+    parts: Parts = field(default_factory=dict[str, Any])
+
+    def terrain(self, name: str) -> KnownTerrain:
+        """Return a terrain.
+
+        Raises:
+            SettingsError: there is none of that name.
+        """
+        if name not in self.terrains:
+            raise SettingsError(
+                f"There is no terrain {name!r} in the database.",
+                hint=f"Terrains: {', '.join(self.terrains)}.",
+            )
+        return self.terrains[name]

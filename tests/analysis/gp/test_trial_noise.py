@@ -1,0 +1,150 @@
+"""What rows of one trial share: against differences, closed form, scikit-learn."""
+
+import numpy as np
+import pytest
+
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import GaussianProcess, fit_gp, refit_gp
+from analysis.gp.trial_noise import TrialNoise, TrialRows
+
+SE = SquaredExponential(2)
+LEVEL = TrialNoise()
+EVERYTHING = TrialNoise(LogLinearNoise(2), True, True, True, (1.0, 0.4))
+
+
+def drawn(trials, rows, seed=0):
+    """Return inputs, outputs and places of so many rows of each of the trials."""
+    rng = np.random.default_rng(seed)
+    X, y = rng.normal(size=(trials * rows, 2)), rng.normal(size=trials * rows)
+    t = np.tile(np.cumsum(rng.uniform(0.1, 0.5, rows)), trials)
+    return X, y, TrialRows(np.repeat(np.arange(trials), rows), t)
+
+
+@pytest.mark.parametrize("kernel", [SE, Arcsine(2), Arcsine(2, as_printed=True)])
+@pytest.mark.parametrize("rows", [6, 38])  # the larger is inverted block by block
+def test_gradient_agrees_with_differences(kernel, rows):
+    X, y, places = drawn(5, rows)
+    likelihood = Likelihood((kernel, EVERYTHING), X, y, places)
+    shape = np.linspace(0.3, -0.2, len(kernel.names))
+    theta = np.concatenate([shape, [-0.5, 0.2, -0.1, -0.3, -0.6, -0.2, 0.1]])
+    slope = likelihood(theta)[1]
+    h = 1e-5  # the error of a central difference is of order h^2
+    for k, step in enumerate(h * np.eye(theta.size)):
+        change = likelihood.value(theta + step) - likelihood.value(theta - step)
+        assert slope[k] == pytest.approx(change / (2 * h), rel=1e-6, abs=1e-6)
+
+
+def test_likelihood_has_the_closed_form_of_a_mixed_model():
+    from scipy.stats import multivariate_normal
+
+    X, y, places = drawn(4, 5)
+    sc, sp, so, tau = 0.7, 0.4, 0.5, 0.8
+    theta = np.concatenate([[0.1, 0.2, -0.3], np.log([0.6, sc, sp, so, tau])])
+    noise = TrialNoise(ConstantNoise(), True, True, True, (1.0, 0.4))
+    same = (places.trial[:, None] == places.trial).astype(float)
+    f = 1.0 + 0.4 * X[:, 0]
+    gap = np.abs(places.t[:, None] - places.t)
+    C = SE.matrix(theta[:3], X, X) + 0.6**2 * np.eye(y.size)
+    C += same * (sc**2 + sp**2 * np.outer(f, f) + so**2 * np.exp(-gap / tau))
+    expected = multivariate_normal(np.zeros(y.size), C).logpdf(y)
+    found = Likelihood((SE, noise), X, y, places).value(theta)
+    assert found == pytest.approx(expected, rel=1e-10)
+
+
+def test_likelihood_gradient_and_prediction_agree_with_scikit_learn():
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, Matern
+    from sklearn.gaussian_process.kernels import WhiteKernel as White
+
+    X, y, places = drawn(6, 8, seed=3)
+    any_, same = 1e9, 1e-3  # lengths: a column that does not count; one that must agree
+    known = np.column_stack([X, places.trial, places.t])
+    smooth = ConstantKernel(1.3**2) * RBF([0.9, 1.7, any_, any_])
+    level = ConstantKernel(0.6**2) * RBF([any_, any_, same, any_])
+    drift = ConstantKernel(0.5**2) * RBF([any_, any_, same, any_])
+    drift *= Matern([any_, any_, any_, 0.8], nu=0.5)
+    theirs = GaussianProcessRegressor(
+        smooth + level + drift + White(0.4**2), alpha=1e-300, optimizer=None
+    ).fit(known, y)
+    value, gradient = theirs.log_marginal_likelihood(
+        theirs.kernel_.theta, eval_gradient=True
+    )
+    noise = TrialNoise(ConstantNoise(), has_drift=True)
+    theta = np.log([1.3, 0.9, 1.7, 0.4, 0.6, 0.5, 0.8])
+    lml, slope = Likelihood((SE, noise), X, y, places)(theta)
+    assert lml == pytest.approx(value, rel=1e-10)
+    # theirs: sf^2, l1, l2, -, -, sc^2, 4 of E, so^2, 4 of E, -, -, -, tau, sn^2
+    places_of_ours = [0, 1, 2, 19, 5, 10, 18]
+    factors = [2.0, 1.0, 1.0, 2.0, 2.0, 2.0, 1.0]  # ours is by sf, theirs by sf^2
+    np.testing.assert_allclose(slope, gradient[places_of_ours] * factors, rtol=1e-6)
+
+    at = np.random.default_rng(1).normal(size=(5, 2))
+    new = np.column_stack([at, np.full(5, 99.0), np.zeros(5)])  # a trial of its own
+    mean, sd = theirs.predict(new, return_std=True)
+    C = np.linalg.inv(theirs.kernel_(known))
+    ours, variance = GaussianProcess(
+        kernel=SE, noise=noise, theta=theta, X=X, alpha=C @ y, offset=0.0,
+        centre=np.zeros(2), scale=np.ones(2), lml=0.0, starts=(), jitter=0.0,
+        at_bound=(), trials=places,
+    ).predict(at)  # fmt: skip
+    np.testing.assert_allclose(ours, mean, rtol=1e-8)
+    np.testing.assert_allclose(np.sqrt(variance), sd, rtol=1e-8)
+
+
+def test_the_search_recovers_the_spread_between_trials():
+    X, _, places = drawn(40, 8, seed=1)
+    rng = np.random.default_rng(2)
+    y = np.sin(X[:, 0]) + rng.normal(0, 0.7, 40)[places.trial]
+    y += rng.normal(0, 0.3, y.size)
+    model = fit_gp(X, y, SE, LEVEL, trials=places)
+    theta = dict(zip(("log_sn", "log_sc"), model.theta[3:], strict=True))
+    # 40 trials show a spread to 1/sqrt(80) = 11 %, 320 rows the noise to 4 %
+    assert np.exp(theta["log_sc"]) == pytest.approx(0.7, rel=0.35)
+    assert np.exp(theta["log_sn"]) == pytest.approx(0.3, rel=0.15)
+
+
+def test_a_new_trial_is_as_uncertain_as_trials_differ():
+    X, _, places = drawn(10, 20, seed=4)
+    rng = np.random.default_rng(5)
+    y = rng.normal(0, 2.0, 10)[places.trial] + rng.normal(0, 0.1, 200)
+    with_level = fit_gp(X, y, SE, LEVEL, trials=places).predict(X[:5])[1]
+    pooled = fit_gp(X, y).predict(X[:5])[1]
+    level = y.reshape(10, 20).mean(axis=1).std()
+    assert np.sqrt(with_level) == pytest.approx(np.full(5, level), rel=0.35)
+    assert with_level.min() > pooled.mean() * 0.8
+
+
+def test_trials_that_are_not_named_share_nothing():
+    X, y, _ = drawn(5, 8)
+    theta = np.array([0.1, 0.2, 0.3, -0.4])
+    alone = Likelihood((SE, ConstantNoise()), X, y).value(theta)
+    named = np.append(theta, 0.5)
+    assert Likelihood((SE, LEVEL), X, y).value(named) == pytest.approx(alone)
+
+
+def test_other_outputs_are_fitted_from_where_the_first_ended():
+    X, _, places = drawn(8, 20, seed=6)
+    rng = np.random.default_rng(7)
+    y = 5.0 + np.sin(X[:, 0]) + rng.normal(0, 0.4, 160)
+    first = fit_gp(X, y, SE, LEVEL, trials=places)
+    z = 3.0 * np.log(y + 3.0)
+    near = refit_gp(first, z, float(z.std() / y.std()))
+    anew = fit_gp(X, z, SE, LEVEL, trials=places)
+    assert near.lml == pytest.approx(anew.lml, abs=1e-2)
+
+
+def test_rows_left_out_are_predicted_by_the_others():
+    X, _, places = drawn(6, 12, seed=8)
+    y = np.random.default_rng(9).normal(0, 1.0, 6)[places.trial] + X[:, 0]
+    model = fit_gp(X, y, SE, LEVEL, trials=places)
+    keep = places.trial != 2
+    others = TrialRows(places.trial[keep], places.t[keep])
+    without = model.given(X[keep], y[keep], others)
+    # nothing of the trial left out is in it: its own rows change nothing
+    changed = np.where(keep, y, 99.0)
+    again = model.given(X[keep], changed[keep], others)
+    np.testing.assert_array_equal(without.predict(X)[0], again.predict(X)[0])
+    assert without.X.shape == (60, 2)

@@ -1,0 +1,252 @@
+"""The file of a terrain database: its versions, its schema, and what it keeps."""
+
+import json
+from math import inf, nan
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+import analysis.terrains
+from acquisition.errors import SettingsError
+from analysis.study.distribution import SHARES
+from analysis.terrains.database import load, to_text
+from analysis.terrains.known import KnownTerrain, TerrainDatabase
+from analysis.terrains.table import Table, rows_of
+
+UTC = "2027-01-15T08:00:00Z"
+MEAN, SD = [[1.0, 2.0], [3.0, 5.0]], [[0.5, 0.5], [1.0, 2.0]]
+AXES = {"F_n": [1.0, 5.0], "v_t": [0.01, 0.2]}
+OLD = {
+    "format": "traction-terrain-db", "version": 1, "made_utc": UTC, "simulated": True,
+    "default": "gp_se", "axes": AXES,
+    "terrains": {"S0": {
+        "kind": "small", "trials": 10, "samples": 9000, "rho": 0.9,
+        "limits": {"100": 3.0}, "models": {"gp_se": {
+            "title": "GP (SE)", "parameters": {"lml": -5.0}, "mean": MEAN, "sd": SD}},
+    }},
+}  # fmt: skip
+SCHEMA = Path(analysis.terrains.__file__).parent / "terrain_db.schema.json"
+
+
+def saved(tmp_path, content):
+    path = tmp_path / "terrains.json"
+    path.write_text(content if isinstance(content, str) else json.dumps(content))
+    return path
+
+
+def skewed(parts=None):
+    """Return a database of one terrain with a lognormal force."""
+    scores = [NormalDist().inv_cdf(share) for share in SHARES]
+    middle = np.array(MEAN)
+    forces = [np.exp(0.4 * score) * middle for score in scores]
+    table = Table((1.0, 5.0), (0.01, 0.2), SHARES, tuple(map(rows_of, forces)))
+    terrain = KnownTerrain(
+        "S0", "small", 10, 9000, 0.9, {100: 3.0}, {"gp_se_trial": table},
+        {"gp_se_trial": {"c": 3.0}}, "gp_se_trial", {"gp_se_trial": "new trial"},
+        "gp_se_trial", parts or {},
+    )  # fmt: skip
+    return TerrainDatabase({"S0": terrain}, True, UTC)
+
+
+# --- version 1 ------------------------------------------------------------------------
+
+
+def test_a_file_of_version_1_is_read_as_normal_distributions(tmp_path):
+    answer = load(saved(tmp_path, OLD)).terrain("S0").predict(1.0, 0.01)
+    normal = NormalDist(1.0, 0.5)
+    assert answer.mean == pytest.approx(1.0, abs=1e-9)
+    assert answer.sd == pytest.approx(0.5, rel=5e-3)
+    for share in (0.001, 0.05, 0.3, 0.5, 0.97, 0.9999):
+        assert answer.quantile(share) == pytest.approx(normal.inv_cdf(share), abs=1e-9)
+
+
+@pytest.mark.parametrize("required", [0.2, 1.0, 1.3, 2.5])
+def test_the_slip_risk_of_version_1_is_that_of_a_normal(tmp_path, required):
+    terrain = load(saved(tmp_path, OLD)).terrain("S0")
+    expected = NormalDist(1.0, 0.5).cdf(required)
+    assert terrain.slip_risk(required, 1.0, 0.01) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_file_of_version_1_is_written_back_as_version_2(tmp_path):
+    text = to_text(load(saved(tmp_path, OLD)))
+    content = json.loads(text)
+    assert content["version"] == 2
+    assert content["terrains"]["S0"]["models"]["gp_se"]["title"] == "GP (SE)"
+    again = load(saved(tmp_path, text)).terrain("S0")
+    assert again.recogniser == "gp_se"
+    assert again.predict(5.0, 0.2).median == pytest.approx(5.0)
+
+
+# --- version 2 ------------------------------------------------------------------------
+
+
+def test_what_is_written_is_read_again(tmp_path):
+    database = skewed()
+    again = load(saved(tmp_path, to_text(database)))
+    assert again.made_utc == UTC
+    assert again.is_simulated
+    first, second = (d.terrain("S0").predict(3.0, 0.1) for d in (database, again))
+    assert second.forces == pytest.approx(first.forces, rel=1e-4)
+    assert again.terrain("S0").parameters == {"gp_se_trial": {"c": 3.0}}
+
+
+def test_further_parts_of_a_terrain_are_kept_and_written_back(tmp_path):
+    parts = {"push": {"v_slip": 0.06, "b": [2.3, 0.4]}, "remarks": "wet"}
+    text = to_text(load(saved(tmp_path, to_text(skewed(parts)))))
+    assert json.loads(text)["terrains"]["S0"]["parts"] == parts
+    assert load(saved(tmp_path, text)).terrain("S0").parts == parts
+
+
+def test_a_skewed_force_keeps_its_skew():
+    answer = skewed().terrain("S0").predict(1.0, 0.01)
+    low, high = (answer.quantile(share) for share in (0.05, 0.95))
+    assert high - answer.median > 1.5 * (answer.median - low)
+    assert answer.mean > answer.median
+    # linear between nine shares: within a few percent of the lognormal's moments
+    assert answer.mean == pytest.approx(np.exp(0.08), rel=0.03)
+
+
+def test_risk_and_quantile_are_each_others_inverse():
+    terrain = skewed().terrain("S0")
+    answer = terrain.predict(3.0, 0.1)
+    for share in (0.005, 0.02, 0.3, 0.8, 0.995):
+        force = answer.quantile(share)
+        assert terrain.slip_risk(force, 3.0, 0.1) == pytest.approx(share, rel=1e-6)
+
+
+def test_the_file_is_read_without_this_project(tmp_path):
+    """Only json and arithmetic: the force at a point of the table, not reached 5 %."""
+    content = json.loads(to_text(skewed()))
+    model = content["terrains"]["S0"]["models"][content["default"]]
+    table = model["quantiles"][content["shares"].index(0.05)]
+    row, column = content["axes"]["F_n"].index(5.0), content["axes"]["v_t"].index(0.2)
+    expected = 5.0 * np.exp(0.4 * NormalDist().inv_cdf(0.05))
+    assert table[row][column] == pytest.approx(expected, rel=1e-4)
+    assert content["units"]["quantiles"] == "N"
+
+
+def changed(**changes):
+    return json.loads(to_text(skewed())) | changes
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"shares": [0.5, 0.1] + [0.9] * 7}, "shares"),
+        ({"shares": [0.0, *SHARES[1:]]}, "shares"),
+        ({"shares": [0.1, 0.9]}, "finite numbers"),
+        ({"shares": [nan] * 9}, "shares"),
+        ({"recogniser": "oracle"}, "lacks the model"),
+        ({"version": 3}, "version"),
+    ],
+)
+def test_a_damaged_file_is_refused(tmp_path, changes, word):
+    with pytest.raises(SettingsError, match=word):
+        load(saved(tmp_path, changed(**changes)))
+
+
+@pytest.mark.parametrize("value", [inf, -99.0])
+def test_quantiles_that_do_not_increase_are_refused(tmp_path, value):
+    content = changed()
+    model = content["terrains"]["S0"]["models"]["gp_se_trial"]
+    model["quantiles"][-1][0][0] = value
+    with pytest.raises(SettingsError, match="no terrain database"):
+        load(saved(tmp_path, content))
+
+
+def test_terrains_of_different_grids_make_no_file():
+    one, other = skewed().terrain("S0"), load_other_grid()
+    with pytest.raises(SettingsError, match="2 different grids"):
+        to_text(TerrainDatabase({"S0": one, "TF": other}, True, UTC))
+
+
+def load_other_grid():
+    table = Table.normal((0.0, 1.0), (0.1, 0.2), np.array(MEAN), np.array(SD))
+    return KnownTerrain("TF", "flat", 1, 1, 0.0, {}, {"m": table}, {}, "m")
+
+
+def test_a_file_too_large_to_be_read_is_not_written():
+    remarks = {"remarks": "x" * 6_000_000}
+    with pytest.raises(SettingsError, match="6 MB"):
+        to_text(skewed(remarks))
+
+
+# --- the schema -----------------------------------------------------------------------
+
+CHECKED = {
+    "$schema", "title", "description", "type", "required", "properties", "const",
+    "additionalProperties", "items", "minItems", "maxItems", "minimum", "maxProperties",
+    "exclusiveMinimum", "exclusiveMaximum", "minProperties", "$ref", "$defs",
+}  # fmt: skip
+KINDS = {
+    "object": dict, "array": list, "string": str, "boolean": bool, "integer": int,
+    "number": (int, float),
+}  # fmt: skip
+
+
+def problems(value, schema, root, place="$"):
+    """Yield where a value breaks a schema of the keywords above."""
+    unknown = set(schema) - CHECKED
+    assert not unknown, f"keywords that this check does not know: {unknown}"
+    if "$ref" in schema:
+        name = schema["$ref"].removeprefix("#/$defs/")
+        yield from problems(value, root["$defs"][name], root, place)
+    if "const" in schema and value != schema["const"]:
+        yield f"{place} is not {schema['const']}"
+    if "type" in schema and not isinstance(value, KINDS[schema["type"]]):
+        yield f"{place} is no {schema['type']}"
+        return
+    if isinstance(value, dict):
+        yield from (
+            f"{place}.{n} is missing"
+            for n in schema.get("required", ())
+            if n not in value
+        )
+        others = schema.get("additionalProperties", {})
+        for name, item in value.items():
+            inner = schema.get("properties", {}).get(name, others)
+            yield from problems(item, inner, root, f"{place}.{name}")
+    sizes = (("minItems", "maxItems"), ("minProperties", "maxProperties"))
+    if isinstance(value, list | dict):
+        least, most = sizes[isinstance(value, dict)]
+        if not schema.get(least, 0) <= len(value) <= schema.get(most, inf):
+            yield f"{place} has {len(value)} entries"
+    if isinstance(value, list) and "items" in schema:
+        for k, item in enumerate(value):
+            yield from problems(item, schema["items"], root, f"{place}[{k}]")
+    if isinstance(value, int | float) and (
+        value < schema.get("minimum", -inf)
+        or value <= schema.get("exclusiveMinimum", -inf)
+        or value >= schema.get("exclusiveMaximum", inf)
+    ):
+        yield f"{place} = {value} is out of range"
+
+
+def broken(content):
+    schema = json.loads(SCHEMA.read_text())
+    return list(problems(content, schema, schema))
+
+
+def test_what_is_written_follows_the_schema_that_is_shipped():
+    assert broken(json.loads(to_text(skewed({"push": {"v_slip": 0.06}})))) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "place"),
+    [
+        ({"version": 1}, "$.version"),
+        ({"shares": [0.1, 1.0]}, "$.shares[1]"),
+        ({"axes": {"F_n": [1.0, 2.0]}}, "$.axes.v_t"),
+        ({"terrains": {}}, "$.terrains"),
+        ({"terrains": {"S0": {}}}, "$.terrains.S0.kind"),
+        ({"simulated": "yes"}, "$.simulated"),
+    ],
+)
+def test_the_schema_refuses_what_the_reader_refuses(tmp_path, changes, place):
+    content = changed(**changes)
+    assert any(problem.startswith(place) for problem in broken(content))
+    if "simulated" not in changes:  # the reader takes any truth value
+        with pytest.raises(SettingsError):
+            load(saved(tmp_path, content))
