@@ -27,6 +27,7 @@ INTERVAL = (0.05, 0.95)  # of the trial bootstraps: 90 %
 _HALVINGS = 60  # of an interval of forces
 _WIDE = 40.0  # spreads that it begins with
 _LARGEST_LOG = 50.0  # exp of it is far beyond any force
+_LARGEST_PARAMETER, _LEAST_SPREAD = 1e4, 1e-6
 _DIGITS = 6  # of a stored number
 _MOST_DRAWS = 2000
 _MOST = 10_000_000  # slips, held pushes or trials
@@ -158,17 +159,15 @@ class BreakAwayModel:
     def _laws(self, count: int) -> Array:
         return np.tile(np.array(self.law.values), (count, 1))
 
-    @property
-    def _is_sliding(self) -> bool:
-        return self.kind == SLIDING
-
     def _centre(self, laws: Array, F_n: Array | float) -> Array:
         load = np.asarray(F_n, dtype=np.float64)
-        return laws[:, 0] + laws[:, 1] * (load if self._is_sliding else log_load(load))
+        return laws[:, 0] + laws[:, 1] * (
+            load if self.kind == SLIDING else log_load(load)
+        )
 
     def _shares(self, laws: Array, required: Array, F_n: Array | float) -> Array:
         """Return P(F < required) under every law, trial effect integrated out."""
-        if self._is_sliding:
+        if self.kind == SLIDING:
             return _mixed(self.family, laws, required - self._centre(laws, F_n))
         with np.errstate(divide="ignore"):
             logs = np.log(required)
@@ -186,7 +185,7 @@ class BreakAwayModel:
                 np.where(is_under, high, middle),
             )
         found = self._centre(laws, F_n) + 0.5 * (low + high)
-        if self._is_sliding:
+        if self.kind == SLIDING:
             return np.maximum(found, 0.0)
         return np.exp(np.minimum(found, _LARGEST_LOG))
 
@@ -227,10 +226,11 @@ class BreakAwayModel:
         if len(draws) > _MOST_DRAWS:
             raise ValueError(f"more than {_MOST_DRAWS} draws")
         distance = content["distance"]
+        (law,) = _laws([content["law"]]).tolist()
         return cls(
             kind=kind,
             family=Family(content["family"]),
-            law=PushLaw(*_laws([content["law"]])[0].tolist()),
+            law=PushLaw(*law),
             draws=_laws(draws),
             v_slip=_positive(content["v_slip"]),
             slips=_count(content["slips"]),
@@ -272,9 +272,9 @@ def _rounded(values: Sequence[float]) -> list[float]:
 
 def _laws(rows: Any) -> Array:  # noqa: ANN401
     laws = np.array(rows, dtype=np.float64).reshape(-1, 4)
-    if not bool(np.isfinite(laws).all()):
-        raise ValueError("a parameter is no finite number")
-    if bool((laws[:, 2] <= 0.0).any() or (laws[:, 3] < 0.0).any()):
+    if not bool((np.abs(laws) <= _LARGEST_PARAMETER).all()):  # nor is NaN
+        raise ValueError("a parameter is no number that a force can have")
+    if bool((laws[:, 2] < _LEAST_SPREAD).any() or (laws[:, 3] < 0.0).any()):
         raise ValueError("a spread is not positive")
     return laws
 

@@ -20,6 +20,7 @@ FLAT_GROUND, ROCKY_GROUND = "flat", "rocky"
 _RIDGE = 1.0
 _STEPS = 25
 _HALVINGS = 20
+_LARGEST_NUMBER = 1e9  # of a stored weight, mean or scale
 _SMALL = 1e-8
 _LARGEST = 5.0  # standard deviations beyond which a feature says no more
 _LARGEST_LOGIT = 30.0
@@ -104,9 +105,10 @@ class LogisticModel:
         sizes = {"mean": count, "scale": count, "weights": 2 * count + 1}
         parts = {name: np.array(content[name], dtype=np.float64) for name in sizes}
         for name, size in sizes.items():
-            if parts[name].shape != (size,) or not np.isfinite(parts[name]).all():
+            is_usual = bool((np.abs(parts[name]) <= _LARGEST_NUMBER).all())
+            if parts[name].shape != (size,) or not is_usual:
                 raise ValueError(f"{name} of a classifier is not {size} numbers")
-        if bool((parts["scale"] <= 0.0).any()):
+        if bool((parts["scale"] < 1.0 / _LARGEST_NUMBER).any()):
             raise ValueError("a scale of a classifier is not positive")
         return cls(**parts)
 

@@ -192,6 +192,7 @@ def test_a_stored_classifier_answers_alike(classifier):
         lambda c: c["models"]["50"].update(weights=[1.0]),
         lambda c: c["models"]["50"].update(mean=[math.nan] * len(FEATURES)),
         lambda c: c["models"]["50"].update(scale=[0.0] * len(FEATURES)),
+        lambda c: c["models"]["50"].update(mean=[1e308] * len(FEATURES)),
         lambda c: c["models"].update({"51": c["models"]["50"]}),
         lambda c: c.update(models=[1]),
     ],
