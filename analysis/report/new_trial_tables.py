@@ -144,6 +144,7 @@ def _measurement(of: TrialComponents) -> str:
 
 
 def _with_interval(of: TrialComponents, name: str, unit: str) -> str:
-    interval = of.intervals[name]
-    value = getattr(of, name)
+    value, interval = getattr(of, name), of.intervals.get(name)
+    if interval is None:
+        return f"{value:.2f} {unit}"
     return f"{value:.2f} ({interval.lower:.2f} to {interval.upper:.2f}) {unit}"

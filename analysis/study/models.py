@@ -65,7 +65,8 @@ class FitOptions:
         models: names of the models, by default the five of Fig. 9.
         form: variant and loss of the Tustin fit.
         is_nn_as_printed: eq. (5) as printed, c = 0, for the NN kernel.
-        draws: mixtures of trials for the intervals of Tustin parameters; 0 for none.
+        draws: mixtures of trials for the intervals of Tustin parameters, and of the
+            components of a trial (100 at most); 0 for none.
         effect: of a trial in the models of a new trial: "constant", "proportional" to
             F_n, or "both".
 

@@ -27,7 +27,7 @@ APART = 4  # kept samples from one to the next: nearer ones share the moving ave
 TOLD_APART = 1.4  # log likelihood that a level must gain: 5 % on the edge of its range
 
 _STREAM = 3_000_000  # apart from folds, terrain fits and tables
-_DRAWS = 100  # of trials with replacement
+_DRAWS = 100  # of trials with replacement, at most
 _ENDS = (2.5, 97.5)  # % of the draws
 _FEWEST = 3  # trials that a spread between them can be seen in
 
@@ -80,7 +80,8 @@ class TrialComponents:
         within: that of the residual along a trial, so [N].
         tau: its correlation time [s].
         measurement: standard deviation of single rows, sn [N].
-        intervals: 95 % intervals of "between", "within", "tau" and "measurement".
+        intervals: 95 % intervals of "between", "within", "tau" and "measurement";
+            none where no draws were asked for.
         gain: log likelihood that the level of a trial gains.
     """
 
@@ -141,15 +142,15 @@ def fit_components(task: ComponentsTask) -> TrialComponents | None:
         return None
     theta = whole.theta[len(whole.kernel.names) :]
     residual = F_t - whole.mean(inputs)
-    draws = _resampled(_PerTrial(residual, places), theta, rng)
-    ends = np.exp(theta + np.percentile(draws - draws[0], _ENDS, axis=0))
     names = ("measurement", "between", "within", "tau")
+    per_trial, draws = _PerTrial(residual, places), min(task.options.draws, _DRAWS)
+    intervals = _intervals(per_trial, theta, draws, rng) if draws else []
     point = dict(zip(names, np.exp(theta).tolist(), strict=True))
     return TrialComponents(
         trials=len(rows),
         seconds=float(np.mean([_motion(trial.t) for trial in task.trials])),
         **point,
-        intervals={n: Interval(*ends[:, k].tolist()) for k, n in enumerate(names)},
+        intervals=dict(zip(names, intervals, strict=bool(intervals))),
         gain=max(0.0, whole.lml - without.lml),
     )
 
@@ -216,8 +217,17 @@ class _PerTrial:
         return -0.5 * ((self._r * a).sum(axis=1) + size), np.stack(slopes, axis=1)
 
 
-def _resampled(per_trial: _PerTrial, theta: Array, rng: np.random.Generator) -> Array:
-    """Return the likeliest theta of all trials, then of drawn ones, (1 + draws, 4)."""
+def _intervals(
+    per_trial: _PerTrial, theta: Array, draws: int, rng: np.random.Generator
+) -> list[Interval]:
+    """Return 95 % intervals of sn, sc, so and tau from trials drawn again.
+
+    Args:
+        per_trial: likelihood of every trial's residuals.
+        theta: logarithms of the components of all trials.
+        draws: of the trials with replacement.
+        rng: draws them.
+    """
     from scipy.optimize import minimize
 
     count = per_trial.trials
@@ -234,6 +244,7 @@ def _resampled(per_trial: _PerTrial, theta: Array, rng: np.random.Generator) -> 
         ).x
 
     whole = likeliest(np.ones(count), theta)
-    weights = rng.multinomial(count, np.full(count, 1.0 / count), size=_DRAWS)
-    drawn = [likeliest(weight, whole) for weight in weights.astype(float)]
-    return np.array([whole, *drawn])
+    weights = rng.multinomial(count, np.full(count, 1.0 / count), size=draws)
+    drawn = np.array([likeliest(weight, whole) for weight in weights.astype(float)])
+    ends = np.exp(theta + np.percentile(drawn - whole, _ENDS, axis=0))
+    return [Interval(*pair) for pair in ends.T.tolist()]
