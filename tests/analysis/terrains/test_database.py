@@ -66,7 +66,7 @@ def test_a_file_of_version_1_is_read_as_normal_distributions(tmp_path):
 def test_the_slip_risk_of_version_1_is_that_of_a_normal(tmp_path, required):
     terrain = load(saved(tmp_path, OLD)).terrain("S0")
     expected = NormalDist(1.0, 0.5).cdf(required)
-    assert terrain.slip_risk(required, 1.0, 0.01) == pytest.approx(expected, rel=1e-9)
+    assert terrain.risk_in_motion(required, 1.0, 0.01) == pytest.approx(expected, rel=1e-9)
 
 
 def test_a_file_of_version_1_is_written_back_as_version_2(tmp_path):
@@ -113,7 +113,7 @@ def test_risk_and_quantile_are_each_others_inverse():
     answer = terrain.predict(3.0, 0.1)
     for share in (0.005, 0.02, 0.3, 0.8, 0.995):
         force = answer.quantile(share)
-        assert terrain.slip_risk(force, 3.0, 0.1) == pytest.approx(share, rel=1e-6)
+        assert terrain.risk_in_motion(force, 3.0, 0.1) == pytest.approx(share, rel=1e-6)
 
 
 def test_the_file_is_read_without_this_project(tmp_path):
