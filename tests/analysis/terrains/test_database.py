@@ -66,7 +66,9 @@ def test_a_file_of_version_1_is_read_as_normal_distributions(tmp_path):
 def test_the_slip_risk_of_version_1_is_that_of_a_normal(tmp_path, required):
     terrain = load(saved(tmp_path, OLD)).terrain("S0")
     expected = NormalDist(1.0, 0.5).cdf(required)
-    assert terrain.risk_in_motion(required, 1.0, 0.01) == pytest.approx(expected, rel=1e-9)
+    assert terrain.risk_in_motion(required, 1.0, 0.01) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 def test_a_file_of_version_1_is_written_back_as_version_2(tmp_path):
