@@ -20,6 +20,8 @@ from analysis.study.models import GP_SE, FitOptions
 from analysis.study.store import write_atomic
 from analysis.study.study import StudyOptions, run_study
 
+pytestmark = pytest.mark.slow  # a whole study and its page
+
 OPTIONS = StudyOptions(fit=FitOptions(gp_points=80), n_jobs=1)
 HOSTILE = "<script>$x_1</b>&"
 
