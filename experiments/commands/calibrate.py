@@ -197,7 +197,7 @@ def _without_old(
 ) -> tuple[Settings, TerrainRow]:
     """Return settings and row without the calibration that is made anew."""
     if what == "gravity":
-        return settings.by_cad(), row
+        return settings.by_cad().without_friction(), row
     if what == "friction":
         return settings.without_friction(), row
     if what == "terrain":

@@ -19,7 +19,14 @@ from wam.calibration import (
     gravity_from_toml,
 )
 from wam.control import FrictionCompensation, known_friction
-from wam.model import ArmModel, Array, gravity_model, joint_coulomb, load_constants
+from wam.model import (
+    ArmConstants,
+    ArmModel,
+    MotorFriction,
+    gravity_model,
+    joint_coulomb,
+    load_constants,
+)
 
 _INSTEAD = 'set [gravity] model = "cad" in rig.toml'
 _WITHOUT = 'set [friction] model = "none" in rig.toml'
@@ -140,14 +147,15 @@ def build_compensation(
             hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
         )
     constants, fit = load_constants(), stored.fit
-    _check_size(section.file, joint_coulomb(constants, fit.friction.coulomb))
+    _check_size(section.file, constants, fit.friction)
     known = known_friction(fit.friction, fit.deviation, fit.asymmetry_deviation)
     return FrictionCompensation(constants, known, section.compensation)
 
 
-def _check_size(name: str, coulomb: Array) -> None:
+def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> None:
     """Refuse friction that no arm of this kind has: it would drive the arm."""
-    most = _LARGEST * load_constants().coulomb
+    coulomb = joint_coulomb(constants, friction.coulomb)
+    most = _LARGEST * constants.coulomb
     for joint, (torque, limit) in enumerate(zip(coulomb, most, strict=True), 1):
         if torque > limit:
             raise SettingsError(

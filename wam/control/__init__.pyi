@@ -1,6 +1,5 @@
 from .controller import FootController
 from .friction_compensation import (
-    LARGEST_SHARE,
     SWUNG_MOTOR,
     FrictionCompensation,
     KnownFriction,
@@ -11,7 +10,6 @@ from .position_control import TOP_SPEED, JointMove, move_reference
 from .soft_walls import SoftWalls, Walls
 
 __all__ = [
-    "LARGEST_SHARE",
     "SWUNG_MOTOR",
     "TOP_SPEED",
     "FootController",

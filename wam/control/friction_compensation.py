@@ -21,7 +21,6 @@ from wam.model import ArmConstants, Array, MotorFriction, motor_turns, plastic_s
 
 LARGEST_SHARE = 0.8
 SWUNG_MOTOR = "friction:swung_motor"  # in the recording
-SHARE = 0.7
 _MARGIN = 0.9  # of what surely rubs: share (1 + error) never exceeds it
 _SIGMAS = 1.96
 # Four times what is assumed of real bristles: a stiffer one would hunt.

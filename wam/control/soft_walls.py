@@ -42,7 +42,7 @@ class SoftWalls:
         self._walls = walls
         pairs = zip(walls.lower, walls.upper, strict=True)
         self._free = [(lower + DEPTH, upper - DEPTH) for lower, upper in pairs]
-        self._bounds = np.array(walls.lower) + DEPTH, np.array(walls.upper) - DEPTH
+        self._bounds = np.array(self._free).T
         self._armed = 0
 
     @property

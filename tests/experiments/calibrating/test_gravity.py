@@ -205,6 +205,17 @@ def test_a_calibration_can_be_made_though_rig_toml_wants_one_already(tmp_path):
     assert done.code == 130
 
 
+def test_gravity_can_be_weighed_though_rig_toml_compensates_friction(tmp_path):
+    use = ('[friction]\nmodel = "none"', '[friction]\nmodel = "calibrated"')
+    config = write_config(tmp_path, rig=use)
+
+    def press(asked, rig):
+        signal.raise_signal(signal.SIGINT)
+
+    done, _ = calibrate(tmp_path / "g.toml", "--config", config, press=press)
+    assert done.code == 130
+
+
 def test_a_simulated_calibration_is_marked_and_lies_beside_rig_toml(tmp_path):
     config = write_config(tmp_path)
     (tmp_path / "gravity.fake.toml").write_text("mine")

@@ -18,6 +18,7 @@ from fakes.plant.friction import draw_friction
 from tests.experiments.program import only_session, run_short, write_config
 from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
 from wam.calibration.friction_fit import FrictionFit
+from wam.control.friction_compensation import SWUNG_MOTOR, FrictionCompensation
 from wam.model.constants import load_constants
 from wam.model.friction import MotorFriction
 
@@ -127,6 +128,19 @@ def test_the_trial_carries_calibration_and_share(folder):
     cycles = trial.cycles().data
     excess = cycles["torque_command"] - cycles["torque_gravity"]
     assert np.abs(excess[:, 1]).max() > 0.2  # N m, at joint 2
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("motor", [0, 3])
+def test_the_review_names_a_motor_that_ended_the_compensation(
+    folder, monkeypatch, motor
+):
+    ended = {SWUNG_MOTOR: str(motor)}
+    monkeypatch.setattr(FrictionCompensation, "metadata", lambda self: ended)
+    done = run_short(folder / "rig.toml", folder, "TF", 1, "--friction", "0.4")
+    assert done.code == 0, done.err
+    assert ("motor 3 swung" in done.out) == (motor == 3)
 
 
 def test_every_parameter_of_the_motors_is_in_the_file():
