@@ -14,7 +14,6 @@ from acquisition import SettingsError
 from analysis.data import Array, TrainingSet
 from analysis.gp import (
     Arcsine,
-    ConstantNoise,
     GaussianProcess,
     Kernel,
     LogLinearNoise,
@@ -24,7 +23,12 @@ from analysis.gp import (
 from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
 from analysis.study.new_trial import EFFECTS, LEVEL, NewTrialModel, fit_new_trial
-from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
+from analysis.study.noise_selection import (
+    NoiseChoice,
+    NoiseFits,
+    TailedNoise,
+    choose_noise,
+)
 from analysis.tustin import TustinBounds, TustinFit, TustinForm, fit_tustin
 
 TUSTIN = "tustin"
@@ -189,7 +193,7 @@ class GpModel:
 
 
 class ModelFitter:
-    """Fits models by name to one training set; they share one Tustin fit.
+    """Fits models by name to one training set; they share what they have in common.
 
     Args:
         training: rows that the models are fitted to.
@@ -199,6 +203,7 @@ class ModelFitter:
     def __init__(self, training: TrainingSet, options: FitOptions) -> None:
         self.training, self.options = training, options
         self._curve: TustinFit | None = None
+        self._processes: dict[Kernel, GpModel] = {}
 
     def curve(self) -> TustinFit:
         """Return the Tustin fit of all training rows; the first call makes it.
@@ -229,8 +234,10 @@ class ModelFitter:
 
     def gp(self, kernel: Kernel) -> GpModel:
         """Return a Gaussian process with constant noise on the chosen rows."""
-        subset = self.training.subset
-        return GpModel(fit_gp(subset.inputs, subset.F_t, kernel))
+        if kernel not in self._processes:
+            subset = self.training.subset
+            self._processes[kernel] = GpModel(fit_gp(subset.inputs, subset.F_t, kernel))
+        return self._processes[kernel]
 
     def gp_around_tustin(self, kernel: Kernel) -> GpModel:
         """Return the Tustin curve with a zero-mean process on its residuals.
@@ -244,11 +251,13 @@ class ModelFitter:
 
     def gp_with_chosen_noise(self) -> GpModel:
         """Return a Gaussian process whose noise is chosen among the training trials."""
-        training, options = self.training, self.options
-        choice = choose_noise(training, options.gp_points, options.seed)
-        noise = ConstantNoise() if choice.chosen == "constant" else LogLinearNoise()
-        subset = training.subset
-        process = fit_gp(subset.inputs, subset.F_t, None, noise)
+        training, options, subset = self.training, self.options, self.training.subset
+        fits = NoiseFits(
+            self.gp(SquaredExponential()).process,
+            fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise()),
+        )
+        choice = choose_noise(training, fits, options.gp_points, options.seed)
+        process = fits.constant if choice.chosen == "constant" else fits.changing
         tails = (
             TailedNoise.of(process, training) if choice.chosen == "student" else None
         )

@@ -46,6 +46,12 @@ def run_short(config, data, terrain="TF", trials=1, *more) -> Done:
     return traction("run", terrain, *options, "--config", config, "--data", data, *more)
 
 
+def changed(text: str, old: str, new: str) -> str:
+    """Return `text` with its first `old` replaced, which must be there."""
+    assert old in text
+    return text.replace(old, new, 1)
+
+
 def write_config(folder: Path, *, rig=None, matrix=None, travel=TRAVEL) -> Path:
     """Write rig.toml and matrix.toml, changed by (old, new), and return the first."""
     shipped = resources.files("experiments.data")
@@ -53,8 +59,7 @@ def write_config(folder: Path, *, rig=None, matrix=None, travel=TRAVEL) -> Path:
         text = (shipped / name).read_text()
         text = text.replace("travel = 0.45", f"travel = {travel}")
         if change is not None:
-            assert change[0] in text
-            text = text.replace(*change, 1)
+            text = changed(text, *change)
         (folder / name).write_text(text)
     return folder / "rig.toml"
 
