@@ -67,6 +67,7 @@ def test_other_global_options_stay_as_they_stood_before_the_command():
     assert (args.data, args.verbose, args.no_color) == (Path("demo"), True, True)
 
 
+@pytest.mark.slow
 def test_the_board_of_a_folder_named_before_the_command_is_shown(recorded):
     before = traction("--data", recorded.data, "status")
     assert before == traction("status", "--data", recorded.data)

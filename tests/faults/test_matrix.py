@@ -34,21 +34,30 @@ WHOLE = {End.COMPLETE, End.TOLD, End.REDONE, End.UNBRACKETED}
 DAILY = {
     ("puck-silent", "idle"),
     ("safety-torque", "tare"),
-    ("stall-150-ms", "recording"),
     ("estop", "end"),
     ("overspeed", "review"),
     ("ft-garbled", "preflight"),
-    ("bus-shared", "recording"),
-    ("creep-of-motor-2", "recording"),
     ("can-silence", MOVING),
     ("overspeed", MOVING),
     ("safety-silent", MOVING),
+}
+WHOLE_TRIALS = {
+    ("stall-150-ms", "recording"),
+    ("bus-shared", "recording"),
+    ("creep-of-motor-2", "recording"),
 }
 
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory):
     return write_config(tmp_path_factory.mktemp("config"))
+
+
+def marks_of(cell):
+    """Return when a cell is run: by default, with whole sessions, or by hand."""
+    if cell in WHOLE_TRIALS:
+        return [pytest.mark.slow]
+    return [] if cell in DAILY else [pytest.mark.long]
 
 
 def marked():
@@ -59,7 +68,7 @@ def marked():
             phase,
             cell,
             id=f"{fault}-{phase}",
-            marks=[] if (fault, phase) in DAILY else [pytest.mark.long],
+            marks=marks_of((fault, phase)),
         )
         for fault, phase, cell in cells_of_all()
     ]

@@ -13,6 +13,8 @@ from analysis.study.models import GP_SE, GP_SE_TRIAL, FitOptions
 from analysis.study.study import StudyOptions, run_study
 from analysis.study.trial_components import TOLD_APART
 
+pytestmark = pytest.mark.slow  # a whole study
+
 
 def test_a_reach_is_the_quantile_with_one_part_at_infinity():
     scores = [np.array([float(k)]) for k in range(1, 10)]  # nine trials

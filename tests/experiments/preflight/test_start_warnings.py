@@ -8,6 +8,8 @@ from acquisition.trial_file.reader import TrialReader
 from tests.experiments.other_arms import deaf_to, firmware, serve
 from tests.experiments.program import only_session, run_short, traction, write_config
 
+pytestmark = pytest.mark.slow  # whole sessions
+
 SET_VL2, GET_PEN = (0x00A, 0xAE), (0x00A, 0x2B)
 
 

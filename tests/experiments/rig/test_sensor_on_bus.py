@@ -17,6 +17,8 @@ from tests.experiments.program import (
     write_config,
 )
 
+pytestmark = pytest.mark.slow  # whole sessions
+
 MS = 1_000_000
 LINE = ("port", "baudrate", "sinc")
 

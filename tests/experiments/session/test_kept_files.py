@@ -7,6 +7,8 @@ from experiments.session.kept_files import compare_kept
 from experiments.session.store import find_session
 from tests.experiments.program import digest, journal, only_session, sidecar, traction
 
+pytestmark = pytest.mark.slow  # whole sessions
+
 
 @pytest.fixture
 def data(recorded, tmp_path):
@@ -122,7 +124,6 @@ def test_what_is_left_is_exported_if_that_is_allowed(data, config):
     assert [path.name for path in to.glob("*/T0?.csv")] == ["T02.csv"]
 
 
-@pytest.mark.slow
 def test_a_report_without_a_kept_trial_says_so_at_its_top(data, config):
     (only_session(data) / "trials" / "T01.json").unlink()
     arguments = ("report", "S001", "--allow-missing")

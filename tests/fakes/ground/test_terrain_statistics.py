@@ -98,6 +98,7 @@ def few():
     return {name: push_across(name, 1, range(1, 4)) for name in ("S0", "B15", "TF")}
 
 
+@pytest.mark.slow
 def test_a_foot_slips_on_stones_and_lets_nearly_all_force_go(few):
     for name in ("S0", "B15"):
         slips = few[name].all_slips
@@ -108,18 +109,21 @@ def test_a_foot_slips_on_stones_and_lets_nearly_all_force_go(few):
         assert 7.0 < np.median([slip.peak for slip in slips]) < 15.0
 
 
+@pytest.mark.slow
 def test_a_foot_on_a_plate_neither_slips_nor_bounces(few):
     plate = few["TF"]
     assert plate.slips_per_trial() <= 0.4
     assert all(trial.shares.backward < 0.005 for trial in plate.trials)
 
 
+@pytest.mark.slow
 def test_most_of_a_trial_is_kept(few):
     for run in few.values():
         assert all(420 <= trial.kept <= 2000 for trial in run.trials)
         assert all(trial.shares.window_of_moving > 0.8 for trial in run.trials)
 
 
+@pytest.mark.slow
 def test_forces_are_those_of_a_light_foot(few):
     for name, friction in (("S0", 1.6), ("B15", 1.15), ("TF", 0.84)):
         F_n, F_t = column(few[name], "F_n"), column(few[name], "F_t")

@@ -1,6 +1,7 @@
 """Friction that is compensated never makes a floating arm move by itself."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -41,16 +42,28 @@ def whole(seed=None, presliding=1.0):
     return replace(friction, presliding=presliding * friction.presliding)
 
 
-@pytest.mark.parametrize("joint", range(6))
-@pytest.mark.parametrize("late", [0, 2])
+def every(cases, *daily):
+    """Return `cases` as parameters; all but `daily` are marked long."""
+    return [
+        pytest.param(*case, marks=[] if case in daily else pytest.mark.long)
+        for case in cases
+    ]
+
+
+@pytest.mark.parametrize(
+    ("joint", "late"),
+    every(product(range(6), (0, 2)), *product((0, 1, 3, 5), (2,)), (1, 0)),
+)
 def test_an_overestimate_of_a_fifth_leaves_no_swing(joint, late):
     rubbing = whole()
     q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=late)
     assert np.ptp(q, axis=0)[:6].max() < STILL
 
 
-@pytest.mark.parametrize("presliding", [0.25, 0.5, 2.0, 4.0])
-@pytest.mark.parametrize("joint", [1, 3, 5])
+@pytest.mark.parametrize(
+    ("joint", "presliding"),
+    every(product((1, 3, 5), (0.25, 0.5, 2.0, 4.0)), (1, 0.25), (3, 4.0), (5, 0.25)),
+)
 def test_bristles_that_are_softer_or_stiffer_leave_no_swing(joint, presliding):
     rubbing = whole(presliding=presliding)
     q = settled(rubbing, over(rubbing, 1.2), joint=joint, late=2)
