@@ -62,7 +62,9 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=_Formatter,
     )
     add_global_options(parser)
-    parser.add_argument("--version", action="version", version=f"traction {_version()}")
+    parser.add_argument(
+        "--version", action=_Version, nargs=0, help="version and commit"
+    )
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for name, help_text in COMMANDS.items():
         module = importlib.import_module(f"experiments.commands.{name}")
@@ -140,13 +142,17 @@ def _tell(name: str, details: Mapping[str, object]) -> int:
     return CATALOGUE[name].exit_code
 
 
-def _version() -> str:
-    from importlib import metadata
+class _Version(argparse.Action):
+    """Prints version and commit; git is asked only here."""
 
-    try:
-        return metadata.version("traction")
-    except metadata.PackageNotFoundError:
-        return "unknown"
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from experiments import provenance
+
+        code = provenance.collect()
+        changed = ", changed" if code["dirty"] == "true" else ""
+        text = f"{code['software']} (commit {code['commit']}{changed})"
+        print(text)  # noqa: T201
+        parser.exit()
 
 
 if __name__ == "__main__":

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction check --bus 10                   who says what on the bus; nothing is sent
-  traction check --fake                     the page with simulated devices"""
+  traction check --fake --json > page.json  the page with simulated devices, as JSON"""
+
+_JSON_SCHEMA = 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,6 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="more about a message; all of them; the tables of all states",
     )
     parser.add_argument(
+        "--json", action="store_true", help="the page as JSON, refusals too"
+    )
+    parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
 
@@ -54,8 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
     from experiments.operator import GOOD, Console
-    from experiments.preflight import connect_rig, run_preflight
-    from experiments.rig import FakeOptions, logging_bus, read_law_calibrations
+    from experiments.rig import read_law_calibrations
     from experiments.settings import load_settings, origin_lines
 
     console = Console(color=not args.no_color)
@@ -70,6 +74,21 @@ def run(args: argparse.Namespace) -> int:
         return 0
     if args.bus is not None:
         return _listen(settings, args.bus, console, is_fake=args.fake)
+    if args.json:
+        return _as_json(args, settings)
+    _check(args, settings, console)
+    return 0
+
+
+def _check(args: argparse.Namespace, settings: Settings, console: Console) -> None:
+    """Run the preflight and print its page.
+
+    Raises:
+        PreflightError: a check failed.
+    """
+    from experiments.preflight import connect_rig, run_preflight
+    from experiments.rig import FakeOptions, logging_bus
+
     first = settings.matrix.terrains[0].name
     row = settings.row(args.terrain or first)
     fake = FakeOptions(args.fast, seed=1) if args.fake else None
@@ -78,6 +97,37 @@ def run(args: argparse.Namespace) -> int:
     with logging_bus(rig, args.can_log, console):
         run_preflight(rig, Path(args.data), console, args.loop_test)
     console.say("Fit to run. No torque was sent.")
+
+
+def _as_json(args: argparse.Namespace, settings: Settings) -> int:
+    """Print the page as JSON, with the refusal where there is one, which is raised.
+
+    Raises:
+        PreflightError: a check failed.
+    """
+    import json
+
+    from acquisition import TractionError
+    from experiments import provenance
+    from experiments.operator import Console, PageRecorder
+
+    page = PageRecorder()
+    refusal: TractionError | None = None
+    try:
+        _check(args, settings, page)
+    except TractionError as error:
+        refusal = error
+    report = {
+        "schema": _JSON_SCHEMA,
+        "is_fit": refusal is None,
+        "is_simulated": bool(args.fake),
+        "checks": page.checks,
+        "problem": None if refusal is None else str(refusal),
+        "software": provenance.collect(),
+    }
+    Console(color=False).say(json.dumps(report, indent=1, ensure_ascii=False))
+    if refusal is not None:
+        raise refusal
     return 0
 
 

@@ -1,4 +1,4 @@
-from .console import BAD, GOOD, WARNING, Console
+from .console import BAD, GOOD, WARNING, Console, PageRecorder
 from .feedback import FeedbackSignal, OperatorFeedback, build_feedback
 from .keys import (
     NOTE_KEYS,
@@ -34,6 +34,7 @@ __all__ = [
     "KeyAction",
     "OperatorFeedback",
     "OperatorInput",
+    "PageRecorder",
     "Prompt",
     "PromptState",
     "ReadyView",

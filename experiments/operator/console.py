@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from rich.live import Live
 
 GOOD, WARNING, BAD = "✔", "▲", "✘"
+_GRADES = {GOOD: "good", WARNING: "warning", BAD: "bad"}
 _BELOW_TEXT = " " * 18  # where the text of a graded line begins
 
 
@@ -128,6 +129,25 @@ class Console:
         RichConsole(no_color=not self._color, highlight=False, markup=False).print(
             table
         )
+
+
+class PageRecorder(Console):
+    """Keeps the graded lines of a page and prints nothing.
+
+    Attributes:
+        checks: grade ("good", "warning", "bad"), name and text of every line.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(color=False)
+        self.checks: list[dict[str, str]] = []
+
+    def check(self, mark: str, name: str, text: str) -> None:
+        """Keep one line of a graded page."""
+        self.checks.append({"grade": _GRADES[mark], "name": name, "text": text})
+
+    def say(self, text: str = "") -> None:
+        """Print nothing: the page is for a program."""
 
 
 def wrapped(text: str, width: int, indent: str = "") -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments import provenance
 from experiments.__main__ import COMMANDS, EXIT_CODES, build_parser
 from experiments.messages import CATALOGUE
 from tests.experiments.program import traction
@@ -74,10 +75,11 @@ def test_the_board_of_a_folder_named_before_the_command_is_shown(recorded):
     assert before.code == 0
 
 
-def test_version_is_told():
+def test_version_is_told_with_the_commit():
     done = traction("--version")
-    assert done.code == 0
+    assert (done.code, done.err) == (0, "")
     assert done.out.startswith("traction ")
+    assert f"(commit {provenance.collect()['commit']}" in done.out
 
 
 def test_the_parser_is_built_without_a_slow_library():

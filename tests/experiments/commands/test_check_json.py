@@ -1,0 +1,31 @@
+"""The page of `traction check` for a program."""
+
+import json
+
+from tests.experiments.program import traction, write_config
+
+FAKE = ("check", "--fake", "--fast", "--loop-test", "0.3", "--json")
+
+
+def test_the_page_of_a_fit_rig_is_json_and_nothing_else(tmp_path):
+    done = traction(*FAKE, "--data", tmp_path)
+    page = json.loads(done.out)
+    assert (done.code, done.err) == (0, "")
+    assert (page["schema"], page["is_fit"], page["is_simulated"]) == (1, True, True)
+    assert page["problem"] is None
+    names = [check["name"] for check in page["checks"]]
+    assert {"pucks 1-7", "safety", "F/T sensor"} <= set(names)
+    assert {check["grade"] for check in page["checks"]} <= {"good", "warning"}
+    assert page["software"]["commit"]
+
+
+def test_a_refused_rig_is_json_too_and_every_check_that_failed_is_in_it(tmp_path):
+    change = ('"socketcan"', '"no-such-adapter"')
+    config = write_config(tmp_path, rig=change)
+    done = traction("check", "--json", "--config", config, "--data", tmp_path)
+    page = json.loads(done.out)
+    assert done.code == 3
+    assert page["problem"] in done.err
+    assert (page["is_fit"], page["is_simulated"]) == (False, False)
+    bad = {check["name"] for check in page["checks"] if check["grade"] == "bad"}
+    assert bad >= {"F/T sensor"}
