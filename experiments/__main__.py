@@ -4,12 +4,14 @@
 import argparse
 import errno
 import importlib
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from acquisition import TractionError
-from experiments.arguments import add_global_options
+from experiments.arguments import add_global_options, did_you_mean
 
 COMMANDS = {
     "check": "is the rig fit to run? one graded page",
@@ -48,13 +50,27 @@ exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
 130 interrupted outside a session"""
 
 
+_INVALID = re.compile(r"invalid choice: '(?P<got>[^']*)' \(choose from (?P<known>.*)\)")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Names the nearest command or choice to one that there is not."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the message with what was probably meant, and end with 2."""
+        if invalid := _INVALID.search(message):
+            known = re.findall(r"[\w-]+", invalid["known"])
+            message = f"{message} {did_you_mean(invalid['got'], known)}".rstrip()
+        super().error(message)
+
+
 class _Formatter(argparse.RawDescriptionHelpFormatter):
     """Keeps the examples as they are written."""
 
 
 def build_parser() -> argparse.ArgumentParser:
     """Return the parser of all commands; imports no slow library."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="traction",
         description="Measures how a robotic foot grips loose stones.",
         epilog="rehearse without hardware: traction run S0 --fake --fast\n\n"

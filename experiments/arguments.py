@@ -3,7 +3,7 @@
 import math
 import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 FRICTION = 0.02  # of the simulated joints, as a share of another arm's
@@ -173,3 +173,12 @@ def add_author(parser: ArgumentParser) -> None:
 def data_option(data: Path) -> str:
     """Return the option that names `data` in a command to be typed, "" if none."""
     return "" if str(data) == "data" else f" --data {shlex.quote(str(data))}"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return "Did you mean NAME?" for the known name that is nearest, or nothing."""
+    from difflib import get_close_matches
+
+    names = {each.lower(): each for each in known}
+    near = get_close_matches(name.lower(), names, n=1, cutoff=0.6)
+    return f"Did you mean {names[near[0]]}?" if near else ""

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import number_within
+from experiments.arguments import did_you_mean, number_within
 
 if TYPE_CHECKING:
     from experiments.operator import Console
@@ -213,8 +213,9 @@ def _explain(name: str, console: Console) -> int:
         "all": catalogue_table,
     }
     if name not in pages and name not in CATALOGUE:
+        asked = did_you_mean(name, [*pages, *CATALOGUE])
         raise SettingsError(
-            f"There is no message called {name!r}.",
+            f"There is no message called {name!r}. {asked}".rstrip(),
             hint=f"Known: states, all, {', '.join(sorted(CATALOGUE))}.",
         )
     for line in pages[name]() if name in pages else explanation(name):

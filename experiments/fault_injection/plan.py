@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from acquisition import SettingsError, SimulationControl
+from experiments.arguments import did_you_mean
 from experiments.fault_injection.host_faults import COMPUTER_FAULTS, HostFaults
 
 _PATTERN = re.compile(
@@ -95,8 +96,9 @@ def parse_fault(text: str, known: Sequence[str]) -> FaultPlan:
     """
     match = _PATTERN.match(text)
     if match is None or match["name"] not in known:
+        asked = did_you_mean(text.partition("@")[0], known)
         raise SettingsError(
-            f"--fault {text!r} is not a fault that can be raised.",
+            f"--fault {text!r} is not a fault that can be raised. {asked}".rstrip(),
             hint="Use NAME or NAME@T2+3.5s with NAME one of: "
             f"{', '.join(sorted(known))}. Nothing was started.",
         )

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic.fields import FieldInfo
 
 from acquisition import SettingsError, parse_toml, read_text
+from experiments.arguments import did_you_mean
+from experiments.settings.explaining import explain
 from experiments.settings.matrix import MatrixSettings, TerrainRow
 from experiments.settings.rig import FootSection, RigSettings
 from experiments.settings.sensor import build_device
@@ -81,10 +82,11 @@ class Settings:
         for row in self.matrix.terrains:
             if row.name == terrain:
                 return row
-        known = " ".join(row.name for row in self.matrix.terrains)
+        known = [row.name for row in self.matrix.terrains]
+        asked = did_you_mean(terrain, known)
         raise SettingsError(
             f"There is no terrain {terrain!r} in matrix.toml.",
-            hint=f"Terrains: {known}. Nothing was started.",
+            hint=f"{asked} Terrains: {' '.join(known)}. Nothing was started.".strip(),
         )
 
 
@@ -149,116 +151,5 @@ def _parse(model: type[_M], text: str, name: str) -> _M:
         return model.model_validate(data)
     except ValidationError as error:
         raise SettingsError(
-            explain(model, name, error), hint="Nothing was started."
+            explain(model, name, text, error), hint="Nothing was started."
         ) from error
-
-
-_NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
-_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
-
-
-def explain(model: type[BaseModel], name: str, error: ValidationError) -> str:
-    """Return what is wrong with file `name`, which should have been a `model`.
-
-    Of several errors the first is explained.
-    """
-    first = error.errors()[0]
-    location = _locate(model, first["loc"])
-    place = f"{name}: {location.place}"
-    if first["type"] == "missing":
-        return f"{place} is missing{location.example}."
-    if first["type"] == "extra_forbidden":
-        return f"{place} {_refusal(location, str(first['loc'][-1]))}."
-    if first["type"] == "union_tag_not_found":
-        return f"{place}.kind is missing, e.g. {_kinds(location.kinds)}."
-    if first["type"] == "union_tag_invalid":
-        got = first.get("ctx", {}).get("tag")
-        return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}.'
-    got = first["input"]
-    shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
-    expected = _expected(location.field, first["msg"])
-    return f"{place} = {shown} - expected {expected}{location.example}."
-
-
-@dataclass(frozen=True, slots=True)
-class _Location:
-    """A place in a settings file.
-
-    Attributes:
-        place: its dotted name as a person writes it.
-        field: what should stand there; None where nothing is known.
-        kinds: the sections that a `kind` chooses between, on the way to it; or none.
-        kind: the chosen one.
-    """
-
-    place: str
-    field: FieldInfo | None
-    kinds: Mapping[str, type[BaseModel]]
-    kind: str
-
-    @property
-    def example(self) -> str:
-        """An example of the field for the end of a sentence; or nothing."""
-        examples = self.field.examples if self.field else None
-        return f", e.g. {examples[0]}" if examples else ""
-
-
-def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Location:
-    """Follow the `location` of an error; a kind stands in it like a table."""
-    current: type[BaseModel] | None = model
-    field: FieldInfo | None = None
-    kinds: Mapping[str, type[BaseModel]] = {}
-    place = kind = ""
-    for part in location:
-        if isinstance(part, int):
-            place += f"[{part}]"
-        elif current is None and part in kinds and not kind:
-            kind, current = part, kinds[part]
-        else:
-            place += f".{part}"
-            field = current.model_fields.get(part) if current else None
-            sections = _sections_of(field.annotation) if field else []
-            current = sections[0] if len(sections) == 1 else None
-            if len(sections) > 1:
-                kinds = {_kind_of(section): section for section in sections}
-    return _Location(place.lstrip("."), field, kinds, kind)
-
-
-def _sections_of(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [
-        section for inner in get_args(annotation) for section in _sections_of(inner)
-    ]
-
-
-def _kind_of(section: type[BaseModel]) -> str:
-    return str(get_args(section.model_fields["kind"].annotation)[0])
-
-
-def _kinds(kinds: Mapping[str, type[BaseModel]]) -> str:
-    *others, last = (f"'{kind}'" for kind in kinds)
-    return f"{', '.join(others)} or {last}"
-
-
-def _refusal(location: _Location, option: str) -> str:
-    """Return why there is no such `option`; that of another kind has a name."""
-    others = [kind for kind, s in location.kinds.items() if option in s.model_fields]
-    if not others:
-        return "is no setting Traction knows"
-    names = " and ".join(f'"{kind}"' for kind in others)
-    return f'belongs to kind {names}, this is a "{location.kind}"'
-
-
-def _expected(field: FieldInfo | None, otherwise: str) -> str:
-    """Return what a number should be, with its bounds; else what pydantic says."""
-    kind = _NUMBERS.get(field.annotation) if field else None
-    if field is None or kind is None:
-        return otherwise.removeprefix("Input should be ")
-    bounds = [
-        f"{sign} {getattr(constraint, name)}"
-        for constraint in field.metadata
-        for name, sign in _BOUNDS
-        if hasattr(constraint, name)
-    ]
-    return f"{kind} {' and '.join(bounds)}".rstrip()

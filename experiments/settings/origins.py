@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 from acquisition import parse_toml
+from experiments.settings.explaining import line_of
 from experiments.settings.load import Settings
 
 _SHIPPED = "shipped default"
@@ -31,7 +32,7 @@ def flatten(value: object, place: str = "") -> dict[str, object]:
 
 
 def origin_lines(settings: Settings) -> list[str]:
-    """Return one line per setting: file, name, value, where it comes from."""
+    """Return one line per setting: name, value, file and line it comes from."""
     lines: list[str] = []
     files: tuple[tuple[str, Any, str], ...] = (
         ("rig.toml", settings.rig, settings.rig_text),
@@ -41,7 +42,9 @@ def origin_lines(settings: Settings) -> list[str]:
         given = flatten(parse_toml(text))
         origin = _origin(settings, file)
         for name, value in flatten(model.model_dump()).items():
-            source = origin if name in given else f"default, not in {file}"
+            line = line_of(text, name) if name in given else None
+            place = f"{origin}, line {line}" if line else origin
+            source = place if name in given else f"default, not in {file}"
             lines.append(f"{name} = {_shown(value)}   ({source})")
     return lines
 

@@ -117,7 +117,7 @@ SETTINGS = [
         "matrix",
         ("trials = 10", 'trials = "ten"'),
         'matrix.toml: terrains[0].trials = "ten" - expected a whole number >= 1 and '
-        "<= 99, e.g. 10. Nothing was started.",
+        "<= 99, e.g. 10 (line ",
     ),
     (
         "matrix",
@@ -132,7 +132,7 @@ SETTINGS = [
     (
         "matrix",
         ("trials = 10\n", ""),
-        "matrix.toml: terrains[0].trials is missing, e.g. 10. Nothing was started.",
+        "matrix.toml: terrains[0].trials is missing, e.g. 10 (line ",
     ),
     (
         "matrix",
@@ -158,12 +158,13 @@ SETTINGS = [
     (
         "rig",
         ("foot_speed", "foot_sped"),
-        "rig.toml: limits.foot_speed is missing, e.g. 0.8.",
+        "rig.toml: limits.foot_sped is no setting Traction knows - did you mean "
+        "foot_speed? (line ",
     ),
     (
         "rig",
         ("[limits]", "[limits]\nhaste = 1"),
-        "rig.toml: limits.haste is no setting Traction knows.",
+        "rig.toml: limits.haste is no setting Traction knows (line ",
     ),
     (
         "rig",
@@ -189,6 +190,43 @@ def test_a_wrong_setting_is_named_with_what_to_write(tmp_path, name, change, tex
     config = write_config(tmp_path, **{name: change})
     done = traction("status", "--config", config, "--data", tmp_path)
     assert refusal(done).startswith(text)
+
+
+def test_every_wrong_setting_is_named_with_its_line(tmp_path):
+    config = write_config(tmp_path, rig=("bitrate", "bitrtae"))
+    text = config.read_text().replace("foot_speed = 0.8", 'foot_speed = "fast"')
+    text = text.replace("[operator]", "[operater]")
+    config.write_text(text)
+    done = traction("check", "--config-only", "--config", config)
+    lines = text.splitlines()
+    assert done.code == 2
+    for key, meant in (("bitrtae", "bitrate"), ("[operater]", "operator")):
+        number = next(n for n, line in enumerate(lines, 1) if line.startswith(key))
+        assert f"did you mean {meant}? (line {number})" in done.err
+    assert 'limits.foot_speed = "fast" - expected a number' in done.err
+    assert "missing" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (("rnu", "S0"), "run"),
+        (("run", "s10", "--fake"), "S10"),
+        (("run", "S0", *FAKE, "--fault", "puck-silnt@T1+1"), "puck-silent"),
+        (("run", "S0", "--fake", "--pace", "slowly"), "slow"),
+        (("check", "--explain", "pucks-silent"), "puck-silent"),
+    ],
+)
+def test_what_was_probably_meant_is_asked(tmp_path, arguments, meant):
+    done = traction(*arguments, "--data", tmp_path)
+    assert done.code == 2
+    assert f"Did you mean {meant}?" in done.err
+
+
+def test_nothing_is_asked_where_no_name_is_near(tmp_path):
+    done = traction("run", "meadow", "--fake", "--data", tmp_path)
+    assert done.code == 2
+    assert "Did you mean" not in done.err
 
 
 def test_settings_that_are_no_text_are_refused(tmp_path):

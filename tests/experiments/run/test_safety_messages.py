@@ -141,7 +141,7 @@ def test_a_torque_warning_left_out_is_nine_tenths_of_its_fault(tmp_path):
         (
             "speed_warning = 0.5",
             "speed_warning = -1",
-            "rig.toml: safety.speed_warning = -1 - expected greater than 0, e.g. 0.5.",
+            "rig.toml: safety.speed_warning = -1 - expected greater than 0, e.g. 0.5",
         ),
     ],
 )

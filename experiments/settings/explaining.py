@@ -1,0 +1,195 @@
+"""What is wrong in a settings file, line by line, and what was probably meant."""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from experiments.arguments import did_you_mean
+
+_MOST = 8  # errors in one message
+_HEADER = re.compile(r"^\s*(\[\[|\[)\s*([\w.\" -]+?)\s*\]")
+_KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*[=.]""")
+
+_NUMBERS: dict[object, str] = {int: "a whole number", float: "a number"}
+_BOUNDS = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
+
+
+def line_of(text: str, place: str) -> int | None:
+    """Return the number of the line of a TOML text where a setting stands.
+
+    That is the line of its key, or of the table that should have it; None where neither
+    stands at the beginning of a line.
+
+    Args:
+        text: the TOML.
+        place: dotted name, e.g. "terrains[3].trials".
+    """
+    lines: dict[str, int] = {}
+    counts: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), 1):
+        if header := _HEADER.match(line):
+            table = header[2].replace('"', "").replace(" ", "")
+            if header[1] == "[[":
+                counts[table] = counts.get(table, -1) + 1
+                table = f"{table}[{counts[table]}]"
+            lines.setdefault(table, number)
+        elif key := _KEY.match(line):
+            lines.setdefault(f"{table}.{key[1]}".lstrip("."), number)
+    while place and place not in lines:
+        place = place[: max(place.rfind("."), place.rfind("["), 0)]
+    return lines.get(place)
+
+
+def explain(
+    model: type[BaseModel], name: str, text: str, error: ValidationError
+) -> str:
+    """Return what is wrong with a file that should have been a `model`.
+
+    All errors are named, each with its line. A misspelt key is one error, not an
+    unknown key and a missing one.
+
+    Args:
+        model: what the file should be.
+        name: of the file.
+        text: its content.
+        error: what pydantic says of it.
+    """
+    errors = sorted(error.errors(), key=lambda e: e["type"] == "missing")
+    parts: list[str] = []
+    meant: set[tuple[int | str, ...]] = set()
+    for each in errors:
+        where = each["loc"]
+        if each["type"] == "extra_forbidden":
+            missing = {
+                str(e["loc"][-1]): e["loc"]
+                for e in errors
+                if e["type"] == "missing" and e["loc"][:-1] == where[:-1]
+            }
+            near = get_close_matches(str(where[-1]), missing, n=1)
+            meant.update(missing[key] for key in near)
+        if where not in meant:
+            parts.append(_sentence(model, text, each))
+    more = [f"and {len(parts) - _MOST} more"] if parts[_MOST:] else []
+    return f"{name}: {'; '.join([*parts[:_MOST], *more])}."
+
+
+def _sentence(model: type[BaseModel], text: str, error: ErrorDetails) -> str:
+    """Return one error without its full stop, its line at the end."""
+    location = _locate(model, error["loc"])
+    line = line_of(text, location.place)
+    return _reason(location, error) + (f" (line {line})" if line else "")
+
+
+def _reason(location: "_Location", error: ErrorDetails) -> str:
+    place = location.place
+    if error["type"] == "missing":
+        return f"{place} is missing{location.example}"
+    if error["type"] == "extra_forbidden":
+        option = str(error["loc"][-1])
+        asked = did_you_mean(option, location.siblings).rstrip("?")
+        asked = asked.replace("Did", " - did", 1) + "?" if asked else ""
+        return f"{place} {_refusal(location, option)}{asked}"
+    if error["type"] == "union_tag_not_found":
+        return f"{place}.kind is missing, e.g. {_kinds(location.kinds)}"
+    if error["type"] == "union_tag_invalid":
+        got = error.get("ctx", {}).get("tag")
+        return f'{place}.kind = "{got}" - expected {_kinds(location.kinds)}'
+    got = error["input"]
+    shown = f'"{got:.80}"' if isinstance(got, str) else f"{got!r:.80}"
+    expected = _expected(location.field, error["msg"])
+    return f"{place} = {shown} - expected {expected}{location.example}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Location:
+    """A place in a settings file.
+
+    Attributes:
+        place: its dotted name as a person writes it.
+        field: what should stand there; None where nothing is known.
+        kinds: the sections that a `kind` chooses between, on the way to it; or none.
+        kind: the chosen one.
+        siblings: the keys that may stand beside it.
+    """
+
+    place: str
+    field: FieldInfo | None
+    kinds: Mapping[str, type[BaseModel]]
+    kind: str
+    siblings: Sequence[str]
+
+    @property
+    def example(self) -> str:
+        """An example of the field for the end of a sentence; or nothing."""
+        examples = self.field.examples if self.field else None
+        return f", e.g. {examples[0]}" if examples else ""
+
+
+def _locate(model: type[BaseModel], location: tuple[int | str, ...]) -> _Location:
+    """Follow the `location` of an error; a kind stands in it like a table."""
+    current: type[BaseModel] | None = model
+    field: FieldInfo | None = None
+    kinds: Mapping[str, type[BaseModel]] = {}
+    place = kind = ""
+    siblings: Sequence[str] = ()
+    for part in location:
+        siblings = tuple(current.model_fields) if current else siblings
+        if isinstance(part, int):
+            place += f"[{part}]"
+        elif current is None and part in kinds and not kind:
+            kind, current = part, kinds[part]
+        else:
+            place += f".{part}"
+            field = current.model_fields.get(part) if current else None
+            sections = _sections_of(field.annotation) if field else []
+            current = sections[0] if len(sections) == 1 else None
+            if len(sections) > 1:
+                kinds = {_kind_of(section): section for section in sections}
+    return _Location(place.lstrip("."), field, kinds, kind, siblings)
+
+
+def _sections_of(annotation: Any) -> list[type[BaseModel]]:  # noqa: ANN401
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [
+        section for inner in get_args(annotation) for section in _sections_of(inner)
+    ]
+
+
+def _kind_of(section: type[BaseModel]) -> str:
+    return str(get_args(section.model_fields["kind"].annotation)[0])
+
+
+def _kinds(kinds: Mapping[str, type[BaseModel]]) -> str:
+    *others, last = (f"'{kind}'" for kind in kinds)
+    return f"{', '.join(others)} or {last}"
+
+
+def _refusal(location: _Location, option: str) -> str:
+    """Return why there is no such `option`; that of another kind has a name."""
+    others = [kind for kind, s in location.kinds.items() if option in s.model_fields]
+    if not others:
+        return "is no setting Traction knows"
+    names = " and ".join(f'"{kind}"' for kind in others)
+    return f'belongs to kind {names}, this is a "{location.kind}"'
+
+
+def _expected(field: FieldInfo | None, otherwise: str) -> str:
+    """Return what a number should be, with its bounds; else what pydantic says."""
+    kind = _NUMBERS.get(field.annotation) if field else None
+    if field is None or kind is None:
+        return otherwise.removeprefix("Input should be ")
+    bounds = [
+        f"{sign} {getattr(constraint, name)}"
+        for constraint in field.metadata
+        for name, sign in _BOUNDS
+        if hasattr(constraint, name)
+    ]
+    return f"{kind} {' and '.join(bounds)}".rstrip()
