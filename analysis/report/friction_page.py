@@ -123,16 +123,26 @@ def friction_html(page: FrictionPage) -> str:
         is_foreign=False,
         generated_utc=calibration.measured_utc,
     )
+    tables = friction_tables(page)
+    parts = {
+        ReportSection.FRICTION: ((), [_figure(page)]),
+        ReportSection.LOADS: (_LOAD_SENTENCES, ()),
+    }
     sections = [
         PageSection(
-            ReportSection.FRICTION,
-            (),
-            [_values(page), *_comparison(page), _quality(page)],
-            [_figure(page)],
-        ),
-        PageSection(ReportSection.LOADS, _LOAD_SENTENCES, [_loads(page)], ()),
+            heading,
+            sentences,
+            [table for table in tables if table.section is heading],
+            figures,
+        )
+        for heading, (sentences, figures) in parts.items()
     ]
-    return html_page(context, sections, _warnings(page))
+    return html_page(context, sections, change_sentences(page))
+
+
+def friction_tables(page: FrictionPage) -> list[ReportTable]:
+    """Return the tables of the page."""
+    return [_values(page), *_comparison(page), _quality(page), _loads(page)]
 
 
 _LOAD_SENTENCES = (
@@ -144,7 +154,7 @@ _LOAD_SENTENCES = (
 )
 
 
-def _warnings(page: FrictionPage) -> list[str]:
+def change_sentences(page: FrictionPage) -> list[str]:
     """Return what has changed since the last calibration."""
     if not page.earlier:
         return []

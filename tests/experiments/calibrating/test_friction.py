@@ -111,6 +111,15 @@ def test_the_operator_sees_the_friction_of_every_joint(calibrated):
     assert done.out.rstrip().endswith("ARM: idle, braked.")
 
 
+def test_a_page_lies_beside_the_calibration(calibrated):
+    done, folder, _ = calibrated
+    page = (folder / "friction.html").read_text()
+    coulomb = read(folder)[0]["coulomb"]
+    assert f"{coulomb[0]:.3f}" in page
+    assert "friction.html" in done.out
+    assert "SIMULATED" in page
+
+
 def test_the_file_says_where_it_is_from(calibrated):
     found, _ = read(calibrated[1])
     assert (found["foot"], found["gravity"]) == ("tread", "cad")
@@ -144,8 +153,10 @@ def test_an_arm_that_somebody_holds_is_stopped_and_nothing_is_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", ["friction.toml", "friction.truth.toml"])
-def test_neither_file_is_ever_overwritten(tmp_path, name):
+@pytest.mark.parametrize(
+    "name", ["friction.toml", "friction.truth.toml", "friction.html"]
+)
+def test_no_file_is_ever_overwritten(tmp_path, name):
     (tmp_path / name).write_text("mine")
     done, made = calibrate(tmp_path / "friction.toml")
     assert done.code == 2
