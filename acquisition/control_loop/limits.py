@@ -67,7 +67,7 @@ class GuardLimits:
     contact_growth: float
     late_per_second: int
     contact_force_move: float = 40.0
-    still_ways: Sequence[float] = (inf, 0.02, 0.02, 0.02, 0.045, 0.045, inf)
+    still_ways: Sequence[float] = (inf, 0.045, 0.045, 0.045, 0.045, 0.045, inf)
     hold_after_missing: int = 5
     idle_after_missing: int = 25
     idle_after_safety_ms: float = 400.0
