@@ -105,9 +105,12 @@ def _deviation(values: np.ndarray) -> float:
 
 
 def run(*arguments: str) -> int:
-    """Run the program; return its exit code."""
+    """Run the program; print what went wrong; return its exit code."""
     command = [sys.executable, "-m", "experiments", *arguments]
-    return subprocess.run(command, capture_output=True, check=False).returncode
+    done = subprocess.run(command, capture_output=True, check=False, text=True)
+    if done.returncode:
+        print(done.stderr.strip(), file=sys.stderr)
+    return done.returncode
 
 
 def figures_of(folder: Path, share: float, compensated: str) -> SessionFigures:
@@ -165,6 +168,11 @@ def _reach(
     return friction_reach(model, q, trial.frame.axes(), torques)
 
 
+def words_of(folder: Path) -> tuple[str, ...]:
+    """Return what is compensated; nothing where the calibration was refused."""
+    return COMPENSATED if (folder / "friction.fake.toml").exists() else ("none",)
+
+
 def record(share: float, options: argparse.Namespace, folder: Path) -> None:
     """Calibrate at `share` and record the sessions that `folder` lacks."""
     config = folder / "rig.toml"
@@ -178,7 +186,7 @@ def record(share: float, options: argparse.Namespace, folder: Path) -> None:
         code = run("calibrate", "friction", *fake, *data)
         print(f"calibration at {share:g}: exit {code}", file=sys.stderr)
     text = config.read_text()
-    for word in COMPENSATED:
+    for word in words_of(folder):
         if (folder / word).exists():
             continue
         if word != "none":
@@ -198,7 +206,7 @@ def measure(options: argparse.Namespace, place: Path) -> Iterator[SessionFigures
     for share in options.shares:
         folder = place / f"{share:g}"
         record(share, options, folder)
-        for word in COMPENSATED:
+        for word in words_of(folder):
             yield figures_of(folder, share, word)
 
 

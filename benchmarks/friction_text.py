@@ -32,6 +32,9 @@ force while the foot is faster than 0.02 m/s. Slips back: smoothed v_t below -0.
 within 0.6 s; medians of the way back and of joint 6's part of the lowest v_t (above 1
 the other joints go the other way).
 
+At 0.02 the calibration is refused: such a friction is hardly above what gravity and
+inertia leave unexplained, and needs no compensation.
+
 What the compensation cannot reach: it takes off at most {most:g} of the *lower end* of
 what slides, at the worst place of a motor's turn, because more would drive an arm whose
 cables have worn in. Of the break-away of a joint it leaves a third to a half. The foot

@@ -42,7 +42,7 @@ class GuardLimits:
         late_per_second: late cycles in a second that end in hold.
         still_ways: how far the sole may go in a trial while a motor stands still [m],
             seven. An arm that sticks moves joint 2 by one motor of its differential
-            alone: at the friction of another arm motors 2 to 6 stood for 35, 17, 12,
+            only. At the friction of another arm, motors 2 to 6 stood for 35, 17, 12,
             21 and 33 mm at most in simulated trials; joints 1 and 7 may stand.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
