@@ -37,6 +37,7 @@ from wam.model import ArmModel, Body, Tool
 _REST = 0.4  # s of a record in which the foot stands
 _SLIDING = 0.02  # m/s
 _BOUNCE = 0.6  # s after a slip in which the foot may go back
+_MEAN_OFF, _SPREAD = 0.1, 0.3  # goal at rest: share of the load, N
 _HALF = 5  # samples on each side of a slope
 _J6 = 5
 _NOTHING = Body(0.0, np.zeros(3), np.zeros((3, 3)))
@@ -98,6 +99,25 @@ class SessionFigures:
             f"{np.median(wrist):.2f}" if wrist else "–",
         )
         return f"| {' | '.join(cells)} |"
+
+
+def goal_lines(sessions: Sequence[SessionFigures], load: float) -> str:
+    """Return which sessions have the load that was set [N] at rest, as a list."""
+    lines: list[str] = []
+    for session in sessions:
+        rest = np.array(session.rest)
+        off, spread = rest.mean() / load - 1.0, _deviation(rest)
+        words = [
+            f"mean {off:+.0%} ({_met(abs(off) <= _MEAN_OFF)})",
+            f"deviation {spread:.2f} N ({_met(spread <= _SPREAD)})",
+        ]
+        name = f"{session.share:g}, compensated {session.compensated}"
+        lines.append(f"- {name}: {', '.join(words)}")
+    return "\n".join(lines)
+
+
+def _met(is_met: bool) -> str:
+    return "met" if is_met else "missed"
 
 
 def _deviation(values: np.ndarray) -> float:
@@ -261,7 +281,9 @@ def main() -> None:
         image = options.write.with_suffix(".png")
         image.write_bytes(picture(sessions, load))
         old = options.write.read_text() if options.write.exists() else ""
-        options.write.write_text(page_text(old, rows, image.name, load))
+        options.write.write_text(
+            page_text(old, rows, image.name, load, goal_lines(sessions, load))
+        )
 
 
 if __name__ == "__main__":
