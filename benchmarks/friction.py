@@ -201,7 +201,7 @@ def record(share: float, options: argparse.Namespace, folder: Path) -> None:
         run("init", str(folder))
     fake = ["--fake", "--fast", "--operator-script", "auto", "--config", str(config)]
     fake += ["--friction", str(share), "--seed", str(options.seed)]
-    if not (folder / "friction.fake.toml").exists():
+    if not (folder / "none").exists():  # the first session follows the calibration
         data = ["--data", str(folder / "calibration")]
         code = run("calibrate", "friction", *fake, *data)
         print(f"calibration at {share:g}: exit {code}", file=sys.stderr)
@@ -240,7 +240,7 @@ def picture(sessions: Sequence[SessionFigures], load: float) -> bytes:
             k = COMPENSATED.index(session.compensated)
             x = shares.index(session.share) + 0.22 * (k - 1)
             style = {"color": _COLOURS[k], "ls": "none", "ms": 3.5, "alpha": 0.7}
-            label = session.compensated if session.share == shares[0] else None
+            label = session.compensated if session.share == shares[-1] else None
             for ax, values in ((rest, session.rest), (hand, session.hand)):
                 ax.plot([x] * len(values), values, "osD"[k], label=label, **style)
             travel = [1e3 * bounce.travel for bounce in session.bounces]
@@ -253,9 +253,10 @@ def picture(sessions: Sequence[SessionFigures], load: float) -> bytes:
         ):
             ax.set_title(name, loc="left")
             ax.set_xticks(range(len(shares)), [f"{share:g}" for share in shares])
-            ax.set_ylim(bottom=0.0)
+        hand.set_ylim(bottom=0.0)
+        back.set_ylim(bottom=0.0)
         figure.supxlabel("share of another arm's friction", fontsize=8)
-        hand.legend(title="compensated", title_fontsize=7)
+        hand.legend(title="compensated", title_fontsize=7, loc="upper left")
         return render("friction", figure, is_simulated=True).png
 
 
