@@ -112,10 +112,11 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
     from analysis.report import friction_html
     from experiments.calibrating import FrictionGuide
     from experiments.session import write_new_text
-    from wam.calibration import friction_to_toml, truth_to_toml
+    from wam.calibration import CENTRES, friction_to_toml, truth_to_toml
     from wam.model import friction_of
 
-    rig = console_loop.rig
+    rig, console = console_loop.rig, console_loop.console
+    console.say(f"To and fro around {CENTRES} poses, each motor slowly and fast.")
     guide = FrictionGuide(console_loop)
     result = guide.run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
@@ -127,10 +128,10 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
         text = truth_to_toml(true, load_at, rig.model.constants)
         write_new_text(_truth_path(out), text)
         where = f"What the simulated arm really has: {_truth_path(out)}."
-        console_loop.console.say(where)
+        console.say(where)
     page = guide.page(result, out, true)
     write_new_text(_page_path(out), console_loop.run_aside(lambda: friction_html(page)))
-    console_loop.console.say(f"Its page: {_page_path(out)}.")
+    console.say(f"Its page: {_page_path(out)}.")
 
 
 def _page_path(out: Path) -> Path:

@@ -1,4 +1,4 @@
-from .excitation import FrictionLeg, LegUse, plan_friction
+from .excitation import CENTRES, FrictionLeg, LegUse, plan_friction
 from .free_space import FreeSpace, check_poses
 from .friction_file import (
     FrictionCalibration,
@@ -44,6 +44,7 @@ from .sliding import RecordedLeg, SlidingRows, sliding_rows
 
 __all__ = [
     "APPROACH_SPEED",
+    "CENTRES",
     "FreeSpace",
     "FrictionCalibration",
     "FrictionFit",

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import PERIOD_NS
-from wam.calibration.excitation import SLOW
 from wam.model import ArmModel, Array, motor_turns, regressor
 
 HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
 # Joint 7 turns at its own pace and breaks away within 20 ms, which HALF would flatten.
 _QUICK_MOTOR, _QUICK_HALF = 6, 4
 _QUICK_SPAN = 60  # samples before it has broken away
+_SLOW = 0.02  # rad/s up to which a leg shows where motors break away
 _PERIOD = PERIOD_NS * 1e-9  # s
 _STRIDE = 10  # samples from one row to the next
 _SLOWEST = 2e-3  # rad/s of the joint: below it nothing is called sliding
@@ -157,7 +157,7 @@ def _of_motor(
     v = speed[rows]
     sense = np.where(v < 0.0, -1.0, 1.0)
     friction = motion.friction[rows, motor]
-    if leg.speed <= SLOW:
+    if leg.speed <= _SLOW:
         friction_before = motion.friction[:, motor]
         if motor == _QUICK_MOTOR:
             friction_before = _quick_friction(models, leg, motor, turns)
