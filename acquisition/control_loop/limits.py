@@ -41,8 +41,9 @@ class GuardLimits:
             side makes 20.
         late_per_second: late cycles in a second that end in hold.
         still_ways: how far the sole may go in a trial while a motor stands still [m],
-            seven. In simulated trials it is 3 mm for motors 2 and 3, 5 mm for 4 and
-            15 mm for 5 and 6, whatever the friction; joints 1 and 7 may stand.
+            seven. An arm that sticks moves joint 2 by one motor of its differential
+            only. At the friction of another arm, motors 2 to 6 stood for 35, 17, 12,
+            21 and 33 mm at most in simulated trials; joints 1 and 7 may stand.
         hold_after_missing: incomplete cycles in a row that end in hold.
         idle_after_missing: incomplete cycles in a row that end in idle.
         idle_after_safety_ms: age of the safety module's last answer that ends in idle
@@ -67,7 +68,7 @@ class GuardLimits:
     contact_growth: float
     late_per_second: int
     contact_force_move: float = 40.0
-    still_ways: Sequence[float] = (inf, 0.02, 0.02, 0.02, 0.045, 0.045, inf)
+    still_ways: Sequence[float] = (inf, 0.06, 0.06, 0.06, 0.06, 0.06, inf)
     hold_after_missing: int = 5
     idle_after_missing: int = 25
     idle_after_safety_ms: float = 400.0

@@ -51,6 +51,7 @@ class RecordedTrial:
         bracket: the tares before and after it; None where one is not known.
         sensor_height: of the sensor's origin above the tool plate [m]; None where the
             recorded settings do not tell.
+        friction_text: calibration of the arm's friction; empty where none was there.
     """
 
     path: Path
@@ -70,6 +71,7 @@ class RecordedTrial:
     sole_point: Array
     bracket: TareBracket | None = None
     sensor_height: float | None = None
+    friction_text: str = ""
 
     @property
     def name(self) -> str:
@@ -188,7 +190,7 @@ def load_trial(path: Path) -> RecordedTrial:
     raw = np.ascontiguousarray(cycles["wrench_raw"])
     contact = payload.contact(raw, path_of_sole.rotation)
     force = payload.to_base(contact, path_of_sole.rotation)
-    axes = frame.axes()
+    axes, friction = frame.axes(), reader.attachments.get("friction.toml", b"")
     trial = RecordedTrial(
         path=path,
         metadata=reader.metadata,
@@ -207,6 +209,7 @@ def load_trial(path: Path) -> RecordedTrial:
         sole_point=at_hand.sole_point,
         bracket=_bracket(reader, payload, int(cycles["host_ns"][0])),
         sensor_height=_sensor_height(reader),
+        friction_text=friction.decode(errors="ignore"),
     )
     try:
         trial.series()
@@ -251,8 +254,7 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
 def _bracket(
     reader: TrialReader, payload: Payload, start_ns: int
 ) -> TareBracket | None:
-    metadata = reader.metadata["trial"]
-    return read_bracket(reader.path, metadata, payload.bias, start_ns)
+    return read_bracket(reader.path, reader.metadata["trial"], payload.bias, start_ns)
 
 
 def _sensor_height(reader: TrialReader) -> float | None:

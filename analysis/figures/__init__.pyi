@@ -12,9 +12,10 @@ from . import (
 )
 from .sections import ReportSection
 from .spec import FigureSpec
-from .style import Picture, render, styled
+from .style import Figure, Picture, new_figure, render, styled
 
 __all__ = [
+    "Figure",
     "FigureSpec",
     "Picture",
     "ReportSection",
@@ -23,6 +24,7 @@ __all__ = [
     "curves",
     "errors",
     "excerpts",
+    "new_figure",
     "render",
     "rig",
     "styled",

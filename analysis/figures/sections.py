@@ -1,4 +1,4 @@
-"""The sections of a report, in the order of the page."""
+"""The sections of a page, in the order in which they stand."""
 
 from enum import Enum
 
@@ -10,6 +10,8 @@ class ReportSection(Enum):
     CHANGED = "Under another choice"
     PAPER = "The paper's table and figures"
     BEYOND = "Beyond the paper"
+    FRICTION = "Friction of the drives"
+    LOADS = "Loads that friction leaves"
     HEALTH = "Rig health"
     REACH = "What this rig could have seen"
     ORIGIN = "Choices and provenance"

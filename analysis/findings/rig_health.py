@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import Flag
+from acquisition import Flag, SettingsError
 from analysis.data import Array, RecordedTrial, moving_average
 from analysis.findings.force_uncertainty import (
     ForceUncertainty,
@@ -16,7 +16,13 @@ from analysis.findings.force_uncertainty import (
     uncertainty_of,
 )
 from ft_sensor import largest_traction
-from wam.model import GRAVITY
+from wam.calibration import (
+    FrictionTorques,
+    friction_from_toml,
+    friction_reach,
+    remaining_friction,
+)
+from wam.model import GRAVITY, ArmModel, Body, Tool
 
 HEALTH_UNITS = {
     "period": "ms",
@@ -35,6 +41,7 @@ HEALTH_UNITS = {
     "floor": "N",
     "load_bias": "N",
     "drag": "N",
+    "rest_open": "N",
     "lateral": "N",
 }
 PERIOD_EDGES = np.append(np.arange(0.05, 8.0, 0.1), np.inf)  # ms, 2 in mid-bin
@@ -78,7 +85,10 @@ class RigTrial:
             alone where the tares are not known; None without rest.
         load_bias: median F_n of the moving foot less the set load [N].
         drag: what the joints' Coulomb friction asks of the hand along x_T [N], by the
-            figures of the arm model, median over the moving samples.
+            recorded calibration less what was compensated, else by the figures of the
+            arm model; median over the moving samples.
+        rest_open: half the width of the interval in which friction leaves F_n at rest
+            [N], at the worse end of the trial; None without a recorded calibration.
         lateral: mean |F_y| while moving [N].
     """
 
@@ -104,6 +114,7 @@ class RigTrial:
     floor: float | None
     load_bias: float | None
     drag: float | None
+    rest_open: float | None
     lateral: float | None
 
     def numbers(self) -> dict[str, Any]:
@@ -140,6 +151,7 @@ def health_of(
     is_moving = np.abs(np.nan_to_num(trial.traction[:, 0])) > _MOVING
     is_saturated = (trial.cycles["flags"] & int(Flag.FT_SATURATED)) != 0
     provenance = trial.metadata["provenance"]
+    torques = _friction_of(trial)
     return RigTrial(
         terrain=trial.terrain,
         name=trial.name,
@@ -162,7 +174,8 @@ def health_of(
         force_uncertainty=None if uncertainty is None else uncertainty.mean,
         floor=_floor(noise, uncertainty),
         load_bias=_load_bias(trial, is_moving),
-        drag=_drag(trial, is_moving),
+        drag=_drag(trial, is_moving, torques),
+        rest_open=None if torques is None else _rest_open(trial, torques),
         lateral=float(np.abs(trial.lateral[is_moving]).mean())
         if is_moving.any()
         else None,
@@ -220,15 +233,41 @@ def _load_bias(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
     return float(np.median(trial.traction[is_moving, 2]) - set_load)
 
 
-def _drag(trial: RecordedTrial, is_moving: np.ndarray) -> float | None:
+def _friction_of(trial: RecordedTrial) -> FrictionTorques | None:
+    """Return the friction that the trial met, by the calibration in its file."""
+    try:
+        stored = friction_from_toml(trial.friction_text, trial.name)
+        share = float(trial.metadata["trial"].get("friction_compensation", "0"))
+    except (SettingsError, ValueError):
+        return None
+    if stored.is_simulated != trial.is_simulated or not 0.0 <= share <= 1.0:
+        return None
+    return remaining_friction(stored.fit, share)
+
+
+def _drag(
+    trial: RecordedTrial, is_moving: np.ndarray, torques: FrictionTorques | None
+) -> float | None:
     """Return the force along x_T [N] whose power the joints' Coulomb friction takes.
 
     F v_t = sum_j c_j |qd_j|: power in is power lost, whatever the joints do.
     """
     if not is_moving.any():
         return None
-    lost = np.abs(trial.cycles["velocity"][is_moving]) @ trial.constants.coulomb
+    speeds, coulomb = trial.cycles["velocity"][is_moving], trial.constants.coulomb
+    if torques is not None:
+        speeds, coulomb = speeds @ trial.constants.j2mp.T, torques.sliding
+    lost = np.abs(speeds) @ coulomb
     return float(np.median(lost / np.abs(trial.traction[is_moving, 0])))
+
+
+def _rest_open(trial: RecordedTrial, torques: FrictionTorques) -> float:
+    """Return half the width of the interval of F_n at rest [N], at the worse end."""
+    nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    tool = Tool(nothing, nothing, trial.sole_point)
+    model, axes = ArmModel(trial.constants, tool), trial.frame.axes()
+    ends = [np.ascontiguousarray(trial.cycles["position"][i]) for i in (0, -1)]
+    return max(friction_reach(model, q, axes, torques).rest for q in ends)
 
 
 def _row(text: str) -> tuple[float, ...]:

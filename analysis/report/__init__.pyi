@@ -1,12 +1,22 @@
+from .friction_page import (
+    FRICTION_HEADER,
+    FrictionPage,
+    friction_html,
+    friction_rows,
+)
 from .page import ReportContext, write_report
 from .page_model import ReportTable
 from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
 __all__ = [
+    "FRICTION_HEADER",
+    "FrictionPage",
     "ReportContext",
     "ReportTable",
     "StudyVariant",
+    "friction_html",
+    "friction_rows",
     "parse_choice",
     "parse_window",
     "plain_choice",

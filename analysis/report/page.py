@@ -35,7 +35,7 @@ from analysis.findings import (
     plain_findings,
 )
 from analysis.report.further_tables import beyond_tables
-from analysis.report.page_model import ReportFigure, ReportTable
+from analysis.report.page_model import PageSection, ReportFigure, ReportTable
 from analysis.report.paper_tables import (
     parameters,
     statements,
@@ -185,23 +185,6 @@ class ReportContext:
         return "FOREIGN" if self.is_foreign else "LIVE"
 
 
-@dataclass(frozen=True, slots=True)
-class PageSection:
-    """One section of the page with everything in it.
-
-    Attributes:
-        heading: which one.
-        sentences: what stands first.
-        tables: its tables, before the figures.
-        figures: its figures.
-    """
-
-    heading: ReportSection
-    sentences: Sequence[str]
-    tables: Sequence[ReportTable]
-    figures: Sequence[ReportFigure]
-
-
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     """Write the report of a study and return the path of its page.
 
@@ -249,7 +232,30 @@ def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]
 def render_page(
     results: StudyResults, shown: Sequence[ReportFigure], context: ReportContext
 ) -> str:
-    """Return the page as HTML; every text is escaped, every picture embedded."""
+    """Return the page of a study as HTML."""
+    study = results.study
+    return html_page(
+        context,
+        sections(results, shown, context),
+        [*context.warnings, *study.warnings],
+        [*study.notes, *([] if context.rig else [_NO_RIG])],
+    )
+
+
+def html_page(
+    context: ReportContext,
+    shown: Sequence[PageSection],
+    warnings: Sequence[str],
+    notes: Sequence[str] = (),
+) -> str:
+    """Return a page as HTML; every text is escaped, every picture embedded.
+
+    Args:
+        context: its heading.
+        shown: its sections.
+        warnings: what stands first.
+        notes: what could not be done.
+    """
     environment = Environment(
         loader=PackageLoader("analysis"),
         autoescape=True,
@@ -259,12 +265,9 @@ def render_page(
     )
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
     environment.filters["unbroken"] = lambda text: text.replace(" ± ", "\u00a0±\u00a0")
-    study = results.study
-    return environment.get_template("report.html.j2").render(
-        context=context,
-        sections=sections(results, shown, context),
-        warnings=[*context.warnings, *study.warnings],
-        notes=[*study.notes, *([] if context.rig else [_NO_RIG])],
+    template = environment.get_template("report.html.j2")
+    return template.render(
+        context=context, sections=shown, warnings=warnings, notes=notes
     )
 
 

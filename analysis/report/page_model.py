@@ -35,6 +35,7 @@ class ReportFigure:
         alt: what the picture shows, for those who cannot see it.
         caption: what is seen in it.
         picture: its files.
+        is_filed: the files lie in a folder of figures, not in the page alone.
     """
 
     section: ReportSection
@@ -42,3 +43,21 @@ class ReportFigure:
     alt: str
     caption: str
     picture: Picture
+    is_filed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PageSection:
+    """One section of the page with everything in it.
+
+    Attributes:
+        heading: which one.
+        sentences: what stands first.
+        tables: its tables, before the figures.
+        figures: its figures.
+    """
+
+    heading: ReportSection
+    sentences: Sequence[str]
+    tables: Sequence[ReportTable]
+    figures: Sequence[ReportFigure]

@@ -22,9 +22,12 @@ _REACH_NOTE = (
     "it is four fifths of that. Floor: mean |error| of smoothed "
     "F_t by these changes and by the noise at rest, which no model can be better than; "
     "by the noise alone where a session has one tare only. "
-    "Drag: what the joints' Coulomb friction takes from the hand's push if they "
-    "rub as the arm model says. It is not in F_t, which is measured below them, "
-    "but tilts the push, so that it biases F_n. Medians over trials."
+    "Drag: what the joints' Coulomb friction takes from the hand's push, by the "
+    "calibration of friction that was recorded, less what was compensated; without "
+    "one, if they rub as the arm model says. At rest F_n lies within ± of the set "
+    "load by friction, anywhere; – without a calibration. F_t and F_n are measured at "
+    "the wrist, below the joints, and v_t at the joints: friction falsifies no model, "
+    "but it takes loads and speeds out of reach. Medians over trials."
 )
 
 
@@ -99,6 +102,7 @@ def reach(results: StudyResults) -> ReportTable:
                 _number(ratio, 1),
                 _number(_median(trials, lambda trial: trial.load_bias)),
                 _number(_median(trials, lambda trial: trial.drag)),
+                _number(_median(trials, lambda trial: trial.rest_open)),
             )
         )
     return ReportTable(
@@ -114,6 +118,7 @@ def reach(results: StudyResults) -> ReportTable:
             "error over floor",
             "F_n above set load [N]",
             "drag of the joints [N]",
+            "F_n at rest open ± [N]",
         ),
         rows,
         note=_REACH_NOTE,

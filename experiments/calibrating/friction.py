@@ -1,10 +1,14 @@
 """traction calibrate friction: turn every motor both ways, fit what resists it."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from acquisition import SettingsError, read_text
+from analysis.report import FRICTION_HEADER, FrictionPage, friction_rows
 from experiments.run import ConsoleLoop, PoseWalk, activate
 from experiments.session import iso_utc
 from wam.calibration import (
@@ -17,19 +21,14 @@ from wam.calibration import (
     RecordedLeg,
     check_friction,
     fit_friction,
-    joint_asymmetry,
-    joint_breakaway,
-    joint_deviation,
+    friction_from_toml,
     plan_friction,
     sliding_rows,
-    speed_curve,
 )
-from wam.model import Array, joint_coulomb
+from wam.model import Array, MotorFriction
 
 # kg m to which first moments are known: calibrated ones, and those of drawings.
 _KNOWN, _DRAWN = 0.02, 0.1
-_SPEEDS = np.array([0.01, 0.05, 0.1, 0.4])  # rad/s, of the printed table
-_SIGMAS = 1.96
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +81,30 @@ class FrictionGuide:
             is_simulated=rig.is_simulated,
         )
 
+    def page(
+        self,
+        calibration: FrictionCalibration,
+        out: Path,
+        truth: MotorFriction | None,
+    ) -> FrictionPage:
+        """Return what stands on the page of a calibration.
+
+        Args:
+            calibration: the new one.
+            out: its file; the earlier ones lie beside it, as friction*.toml.
+            truth: friction of a simulated arm; None = it is a real one.
+        """
+        rig = self._rig
+        return FrictionPage(
+            model=rig.model,
+            calibration=calibration,
+            earlier=_earlier(calibration, out),
+            terrain=rig.row.name,
+            frame=rig.frame,
+            start_q=np.array(rig.row.start_q),
+            truth=truth,
+        )
+
     def _record(self, legs: Sequence[FrictionLeg]) -> _RecordedWay:
         recorded = _RecordedWay([], [])
         clock, loop_client = self._rig.clock, self._rig.backend.loop_client
@@ -113,19 +136,8 @@ class FrictionGuide:
         )
 
     def _say(self, fit: FrictionFit) -> None:
-        constants, friction = self._rig.model.constants, fit.friction
-        deviation = _SIGMAS * joint_deviation(constants, fit.deviation)
-        rows = [
-            _row("Coulomb", joint_coulomb(constants, friction.coulomb)),
-            _row("  ± (95 %)", deviation),
-            _row("asymmetry", joint_asymmetry(constants, friction.asymmetry)),
-            _row("break-away", joint_breakaway(constants, friction)),
-        ]
-        curves = [speed_curve(constants, friction, j, _SPEEDS) for j in range(7)]
-        for speed, torques in zip(_SPEEDS, np.array(curves).T, strict=True):
-            rows.append(_row(f"at {speed:g} rad/s", torques))
-        header = ["friction [N m]", *(f"joint {joint}" for joint in range(1, 8))]
-        self._console.table(header, rows)
+        rows = friction_rows(self._rig.model.constants, fit)
+        self._console.table(list(FRICTION_HEADER), rows)
         shares = ", ".join(f"{share:.2f}" for share in fit.residual)
         self._console.say(
             f"unexplained on the way that was kept back, of Coulomb friction: {shares} "
@@ -133,5 +145,17 @@ class FrictionGuide:
         )
 
 
-def _row(name: str, values: Array) -> list[str]:
-    return [name, *(f"{value:.3f}" for value in values)]
+def _earlier(now: FrictionCalibration, out: Path) -> list[FrictionCalibration]:
+    """Return other calibrations of the same arm beside `out`, the oldest first."""
+    calibrations: list[FrictionCalibration] = []
+    for path in out.parent.glob("friction*.toml"):
+        if path == out:
+            continue
+        with suppress(SettingsError, OSError, ValueError):
+            calibrations.append(friction_from_toml(read_text(path), path.name))
+    before = [
+        calibration
+        for calibration in calibrations
+        if calibration.is_simulated == now.is_simulated
+    ]
+    return sorted(before, key=lambda calibration: calibration.measured_utc)

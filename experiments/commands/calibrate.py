@@ -109,22 +109,33 @@ def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> 
 
 
 def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:
+    from analysis.report import friction_html
     from experiments.calibrating import FrictionGuide
     from experiments.session import write_new_text
-    from wam.calibration import friction_to_toml, truth_to_toml
+    from wam.calibration import CENTRES, friction_to_toml, truth_to_toml
     from wam.model import friction_of
 
-    rig = console_loop.rig
-    result = FrictionGuide(console_loop).run(is_forced=args.force)
+    rig, console = console_loop.rig, console_loop.console
+    console.say(f"To and fro around {CENTRES} poses, each motor slowly and fast.")
+    guide = FrictionGuide(console_loop)
+    result = guide.run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
     _say_use(console_loop, out, _section("friction", out), "rig.toml")
-    if rig.simulation is None:
-        return
-    true = friction_of(rig.simulation.friction())
-    load_at = result.fit.friction.load_at
-    text = truth_to_toml(true, load_at, rig.model.constants)
-    write_new_text(_truth_path(out), text)
-    console_loop.console.say(f"What the simulated arm really has: {_truth_path(out)}.")
+    true = None
+    if rig.simulation is not None:
+        true = friction_of(rig.simulation.friction())
+        load_at = result.fit.friction.load_at
+        text = truth_to_toml(true, load_at, rig.model.constants)
+        write_new_text(_truth_path(out), text)
+        where = f"What the simulated arm really has: {_truth_path(out)}."
+        console.say(where)
+    page = guide.page(result, out, true)
+    write_new_text(_page_path(out), console_loop.run_aside(lambda: friction_html(page)))
+    console.say(f"Its page: {_page_path(out)}.")
+
+
+def _page_path(out: Path) -> Path:
+    return out.with_suffix(".html")
 
 
 def _truth_path(out: Path) -> Path:
@@ -133,8 +144,9 @@ def _truth_path(out: Path) -> Path:
 
 def _written(args: argparse.Namespace, out: Path) -> list[Path]:
     """Return the files that the calibration will write."""
-    has_truth = args.fake and args.what == "friction"
-    return [out, _truth_path(out)] if has_truth else [out]
+    if args.what != "friction":
+        return [out]
+    return [out, _page_path(out), *([_truth_path(out)] if args.fake else [])]
 
 
 def _sensor(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:

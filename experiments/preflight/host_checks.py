@@ -1,4 +1,4 @@
-"""What the preflight says of the computer and of the running force sensor."""
+"""What the preflight says of the computer, the running force sensor and the loads."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -6,13 +6,21 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Record
+from acquisition import Record, SettingsError
 from experiments.messages import preflight_error
 from experiments.operator import BAD, GOOD, WARNING
 from experiments.preflight.page import Add, CheckResult
+from experiments.rig import Rig
 from ft_sensor import axis_names, largest_traction
 from ft_sensor.serial_line import BURSTY
 from wam.bus import LONGEST_QUEUE, interface_state
+from wam.calibration import (
+    friction_from_toml,
+    reaches_along,
+    remaining_friction,
+    rendered_masses,
+)
+from wam.model import MAX_VIRTUAL_MASS
 
 CPUS = Path("/sys/devices/system/cpu")
 FAST = "performance"
@@ -52,6 +60,36 @@ def check_code(fields: dict[str, str]) -> CheckResult:
         text = f"{fields['software']} {commit}, changed since: the diff is recorded"
         return CheckResult(WARNING, "code", text)
     return CheckResult(GOOD, "code", f"{fields['software']} {commit}")
+
+
+def check_masses(rig: Rig) -> CheckResult | None:
+    """Grade the virtual mass by the friction of this arm; None = it is not known."""
+    section, text = rig.settings.rig.friction, rig.calibrations.friction
+    if not text:
+        return None
+    try:
+        stored = friction_from_toml(text, section.file)
+    except SettingsError as error:
+        return CheckResult(WARNING, "load", error.message)
+    if stored.is_simulated != rig.is_simulated:
+        return None
+    reaches = reaches_along(
+        rig.model,
+        np.array(rig.row.start_q),
+        rig.frame.axes(),
+        rig.frame.travel,
+        remaining_friction(stored.fit, section.share),
+    )
+    masses = rendered_masses(reaches, rig.frame.incline)
+    mass = rig.settings.rig.control.virtual_mass
+    steps = (
+        f"surely down from {masses.down:.2f} kg",
+        f"within 50 % from {masses.half:.2f}",
+        f"within 10 % from {masses.tenth:.2f}",
+    )
+    most = f"set {mass:.2f}, at most {MAX_VIRTUAL_MASS:g}"
+    mark = GOOD if mass >= masses.down else WARNING
+    return CheckResult(mark, "load", f"foot {', '.join(steps)} ({most})")
 
 
 def check_wrenches(samples: Record, now_ns: int, stale_ms: float) -> CheckResult:

@@ -23,6 +23,7 @@ from experiments.preflight.host_checks import (
     check_disk,
     check_governor,
     check_interface,
+    check_masses,
     check_stream,
     check_wrenches,
     free_bytes,
@@ -122,6 +123,7 @@ def _check_host(rig: Rig, data: Path, page: ChecksPage, probe: DiskProbe) -> Non
     settings = rig.settings.rig
     law = law_words(settings, rig.calibrations, rig.row.foot)
     page.add(GOOD, "config", f"{rig.settings.origin}, {rig.row.name}, {law}")
+    page.add_result(check_masses(rig))
     page.add_result(check_code(provenance.collect()))
     if not rig.is_stepped:
         page.add_result(check_governor())

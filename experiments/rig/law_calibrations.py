@@ -1,9 +1,10 @@
 """What floats the arm: [gravity] and [friction] of rig.toml, the files behind them."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import SettingsError
+from acquisition import SettingsError, read_text
 from experiments.rig.build import LawParts, build_tool
 from experiments.settings import (
     NOTHING,
@@ -39,7 +40,8 @@ class LawCalibrations:
 
     Attributes:
         gravity: of the gravity calibration; "" for none.
-        friction: of the friction calibration; "" for none.
+        friction: of the friction calibration, whether it is compensated or not; "" for
+            none.
     """
 
     gravity: str = ""
@@ -64,6 +66,8 @@ def friction_path(settings: Settings) -> Path:
 def read_law_calibrations(settings: Settings) -> LawCalibrations:
     """Return the texts of the calibrations that rig.toml chooses.
 
+    A calibration of friction that is not chosen tells what the rig can do without it.
+
     Raises:
         SettingsError: one cannot be read.
     """
@@ -72,6 +76,9 @@ def read_law_calibrations(settings: Settings) -> LawCalibrations:
         gravity = read_calibration(gravity_path(settings), "gravity", _INSTEAD)
     if settings.rig.friction.model == "calibrated":
         friction = read_calibration(friction_path(settings), "friction", _WITHOUT)
+    else:
+        with suppress(OSError, ValueError):
+            friction = read_text(friction_path(settings))
     return LawCalibrations(gravity, friction)
 
 

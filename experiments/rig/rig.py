@@ -58,7 +58,7 @@ class Rig:
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
-        calibrations: of gravity and friction, as far as they are in use.
+        calibrations: of gravity and friction.
         simulation: handle of the simulation; None on the real rig.
         is_stepped: time passes only while the loop runs.
     """

@@ -73,7 +73,7 @@ OK = Cell(End.COMPLETE)
 NO_LOOP = Cell(End.ABSENT, why="the loop does not run yet")
 UNSEEN = Cell(
     End.COMPLETE,
-    why="not while the sole stands; motors 2 to 6 end a trial after 20 to 45 mm of it",
+    why="not while the sole stands; motors 2 to 6 end a trial after 60 mm of it",
 )
 OTHER_REFUSED = Cell(End.COMPLETE, why="the other command is refused (arm-busy)")
 AT_REVIEW = ("session ended at the review",)

@@ -1,4 +1,4 @@
-from .excitation import FrictionLeg, LegUse, plan_friction
+from .excitation import CENTRES, FrictionLeg, LegUse, plan_friction
 from .free_space import FreeSpace, check_poses
 from .friction_file import (
     FrictionCalibration,
@@ -14,6 +14,16 @@ from .friction_fit import (
     joint_breakaway,
     joint_deviation,
     speed_curve,
+)
+from .friction_reach import (
+    FrictionReach,
+    FrictionTorques,
+    RenderedMasses,
+    friction_reach,
+    poses_along,
+    reaches_along,
+    remaining_friction,
+    rendered_masses,
 )
 from .gravity_file import (
     GravityCalibration,
@@ -34,14 +44,18 @@ from .sliding import RecordedLeg, SlidingRows, sliding_rows
 
 __all__ = [
     "APPROACH_SPEED",
+    "CENTRES",
     "FreeSpace",
     "FrictionCalibration",
     "FrictionFit",
     "FrictionLeg",
+    "FrictionReach",
+    "FrictionTorques",
     "GravityCalibration",
     "LegUse",
     "MeasurementPose",
     "RecordedLeg",
+    "RenderedMasses",
     "SlidingRows",
     "check_friction",
     "check_poses",
@@ -50,6 +64,7 @@ __all__ = [
     "fit_friction",
     "fits_tool",
     "friction_from_toml",
+    "friction_reach",
     "friction_to_toml",
     "gravity_from_toml",
     "gravity_to_toml",
@@ -58,6 +73,10 @@ __all__ = [
     "joint_deviation",
     "plan_friction",
     "plan_halts",
+    "poses_along",
+    "reaches_along",
+    "remaining_friction",
+    "rendered_masses",
     "sliding_rows",
     "speed_curve",
     "tilted_pair",

@@ -17,7 +17,6 @@ from wam.calibration.poses import (
 )
 from wam.model import ArmModel, Array
 
-SLOW = 0.02  # rad/s up to which a leg shows where motors break away
 CENTRES = 3  # around which the joints go to and fro, with gravity from elsewhere
 _CANDIDATES = 12
 # Joints that go together; signs differ so that both motors of a differential turn.

@@ -7,10 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import PERIOD_NS
-from wam.calibration.excitation import SLOW
 from wam.model import ArmModel, Array, motor_turns, regressor
 
 HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
+# Joint 7 turns at its own pace and breaks away within 20 ms, which HALF would flatten.
+_QUICK_MOTOR, _QUICK_HALF = 6, 4
+_QUICK_SPAN = 60  # samples before it has broken away
+_SLOW = 0.02  # rad/s up to which a leg shows where motors break away
 _PERIOD = PERIOD_NS * 1e-9  # s
 _STRIDE = 10  # samples from one row to the next
 _SLOWEST = 2e-3  # rad/s of the joint: below it nothing is called sliding
@@ -91,7 +94,7 @@ def sliding_rows(
             continue
         motion = _motion(models, leg)
         for motor in range(7):
-            parts[motor].append(_of_motor(models[0], motion, motor, leg, first))
+            parts[motor].append(_of_motor(models, motion, motor, leg, first))
         first += 1 + int(len(leg.q) * _PERIOD / BLOCK)
     return [_joined(part) for part in parts]
 
@@ -127,21 +130,26 @@ def _every(count: int) -> NDArray[np.int64]:
     return np.arange(2 * HALF, count - 2 * HALF, _STRIDE)
 
 
-def _line(values: Array) -> tuple[Array, Array]:
+def _line(values: Array, half: int = HALF) -> tuple[Array, Array]:
     """Return value and slope [1/s] of centred line fits, shapes as `values` (n, 7)."""
-    steps = np.arange(-HALF, HALF + 1)
-    mean = np.full(2 * HALF + 1, 1.0 / (2 * HALF + 1))
+    steps = np.arange(-half, half + 1)
+    mean = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     slope = steps / (float(steps @ steps) * _PERIOD)
-    padded = np.pad(values, ((HALF, HALF), (0, 0)), mode="edge")
+    padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
     level = [np.convolve(column, mean, "valid") for column in padded.T]
     rate = [np.correlate(column, slope, "valid") for column in padded.T]
     return np.stack(level, axis=-1), np.stack(rate, axis=-1)
 
 
 def _of_motor(
-    model: ArmModel, motion: _Motion, motor: int, leg: RecordedLeg, first: int
+    models: tuple[ArmModel, ArmModel],
+    motion: _Motion,
+    motor: int,
+    leg: RecordedLeg,
+    first: int,
 ) -> SlidingRows:
     """Return the rows of one motor on one leg; its blocks are counted from `first`."""
+    model = models[0]
     turns = float(motor_turns(model.constants)[motor])
     angle, speed = motion.angle[:, motor], motion.speed[:, motor]
     rows = _every(len(angle))
@@ -149,13 +157,16 @@ def _of_motor(
     v = speed[rows]
     sense = np.where(v < 0.0, -1.0, 1.0)
     friction = motion.friction[rows, motor]
-    if leg.speed <= SLOW:
-        broken = _break_away(motion, motor, turns)
+    if leg.speed <= _SLOW:
+        friction_before = motion.friction[:, motor]
+        if motor == _QUICK_MOTOR:
+            friction_before = _quick_friction(models, leg, motor, turns)
+        broken = _break_away(motion.angle[:, motor], friction_before, motor, turns)
         if broken is not None:
             index, way = broken
             rows = np.append(rows, index)
             v, sense = np.append(v, 0.0), np.append(sense, way)
-            friction = np.append(friction, motion.friction[index, motor])
+            friction = np.append(friction, friction_before[index])
     to_motors = np.linalg.inv(model.constants.j2mp)[:, motor]
     weighing = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
     return SlidingRows(
@@ -190,16 +201,46 @@ def _is_sliding(
     return is_sliding
 
 
-def _break_away(motion: _Motion, motor: int, turns: float) -> tuple[int, float] | None:
-    """Return (sample, sense) where the motor resisted most before it turned."""
-    moved = motion.angle[:, motor] - motion.angle[0, motor]
-    beyond = np.flatnonzero(np.abs(moved) > float(_BREAKING[motor]) * turns)
+def _broken_at(angle: Array, motor: int, turns: float) -> int | None:
+    """Return the sample at which a motor has broken away; None = too soon or never."""
+    moved = np.abs(angle - angle[0])
+    beyond = np.flatnonzero(moved > float(_BREAKING[motor]) * turns)
     if not len(beyond) or beyond[0] <= 3 * HALF:
         return None
-    end = int(beyond[0])
-    way = float(np.sign(moved[end]))
-    resisting = way * motion.friction[2 * HALF : end, motor]
+    return int(beyond[0])
+
+
+def _break_away(
+    angle: Array, friction: Array, motor: int, turns: float
+) -> tuple[int, float] | None:
+    """Return (sample, sense) where the motor resisted most before it turned."""
+    end = _broken_at(angle, motor, turns)
+    if end is None:
+        return None
+    way = float(np.sign(angle[end] - angle[0]))
+    resisting = way * friction[2 * HALF : end]
     return 2 * HALF + int(resisting.argmax()), way
+
+
+def _quick_friction(
+    models: tuple[ArmModel, ArmModel], leg: RecordedLeg, motor: int, turns: float
+) -> Array:
+    """Return the friction of a motor before it breaks away, smoothed over 18 ms.
+
+    0 where it is not asked for, shape (n,).
+    """
+    model, weighed = models
+    friction = np.zeros(len(leg.q))
+    end = _broken_at(leg.q @ model.constants.j2mp[motor], motor, turns)
+    if end is None:
+        return friction
+    to_motor = np.linalg.inv(model.constants.j2mp)[:, motor]
+    q, qd = _line(leg.q, _QUICK_HALF)
+    tau, qdd = _line(leg.tau, _QUICK_HALF)[0], _line(qd, _QUICK_HALF)[1]
+    for i in range(max(end - _QUICK_SPAN, 0), end):
+        inertial = model.mass_matrix(q[i]) @ qdd[i] + model.coriolis(q[i], qd[i])
+        friction[i] = (tau[i] - inertial - weighed.gravity(q[i])) @ to_motor
+    return friction
 
 
 def _joined(parts: Sequence[SlidingRows]) -> SlidingRows:

@@ -18,7 +18,7 @@ from .friction import (
     motor_turns,
     plastic_share,
 )
-from .gravity import VirtualMass, compensation, gravity_model
+from .gravity import MAX_VIRTUAL_MASS, VirtualMass, compensation, gravity_model
 from .moments import (
     MomentFit,
     ZeroErrors,
@@ -35,6 +35,7 @@ __all__ = [
     "CLEARANCE_MARGIN",
     "ELASTIC",
     "GRAVITY",
+    "MAX_VIRTUAL_MASS",
     "ArmClearance",
     "ArmConstants",
     "ArmModel",

@@ -248,6 +248,34 @@ def test_a_motor_that_stands_shows_nothing(model):
     assert [len(shown) for shown in rows] == [0, 0, 0, len(rows[3]), 0, 0, 0]
 
 
+def jumping_leg(model, peak):
+    """Return joint 7 held by friction up to `peak` [N m at the motor], then thrown.
+
+    The torque grows within 80 ms; 40 rad/s^2 for 40 ms follow.
+    """
+    time = np.arange(600) * 0.002
+    begun, loose = 0.8, 0.88  # s
+    after = np.clip(time - loose, 0.0, None)
+    q7 = np.where(after < 0.04, 20.0 * after**2, 0.032 + 1.6 * (after - 0.04))
+    accelerating = (after > 0.0) & (after < 0.04)
+    resisting = peak * np.clip((time - begun) / (loose - begun), 0.0, 1.0)
+    resisting = np.where(after > 0.0, 0.6 * peak, resisting)
+    q = np.tile(UPRIGHT, (600, 1))
+    q[:, 6] += q7
+    tau = np.array([model.gravity(row) for row in q])
+    thrown = np.array([model.mass_matrix(row)[:, 6] for row in q])
+    tau += np.where(accelerating, 40.0, 0.0)[:, None] * thrown
+    tau[:, 6] += TURNS[6] * resisting
+    return RecordedLeg(q, tau, 0.015)
+
+
+def test_a_light_joint_shows_its_break_away_before_it_is_thrown(model):
+    peak = 0.007
+    rows = sliding_rows((model, model), [jumping_leg(model, peak)])[6]
+    broken = rows.friction[rows.speed == 0.0]
+    assert np.abs(broken) == pytest.approx([peak], rel=0.15)
+
+
 def calibration(fit):
     return FrictionCalibration(fit, "tread", "cad", "2027-01-15T08:00:00Z", True)
 
