@@ -1,5 +1,7 @@
 from . import kernels, noise, trial_noise
 from .arcsine import Arcsine
+from .ground import Ground, GroundRows
+from .hierarchy import GroundPosterior, GroundProcess, PredictiveProcess, in_unit
 from .kernels import Kernel, SquaredExponential
 from .noise import ConstantNoise, LogLinearNoise
 from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
@@ -10,13 +12,19 @@ __all__ = [
     "Arcsine",
     "ConstantNoise",
     "GaussianProcess",
+    "Ground",
+    "GroundPosterior",
+    "GroundProcess",
+    "GroundRows",
     "Kernel",
     "LogLinearNoise",
+    "PredictiveProcess",
     "SquaredExponential",
     "Start",
     "TrialNoise",
     "TrialRows",
     "fit_gp",
+    "in_unit",
     "kernels",
     "noise",
     "refit_gp",
