@@ -7,7 +7,7 @@ rows for eight terrains are factorised exactly.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from analysis.gp import (
     in_unit,
 )
 from analysis.study.distribution import FEWEST, NewTrialPrediction
-from analysis.study.skew import log_warp_slope, warped
+from analysis.study.skew import ShapeMap, choose_shape, log_warp_slope, warped
 
 GIVEN = 300  # rows of a terrain that predictions are made from
 _TUNED = 60  # rows of a terrain that hyperparameters come from
@@ -72,12 +72,14 @@ class AllGroundModel:
         given: the process given rows.
         freedom: degrees of freedom of the spread between trials, on stones and plates.
         c: of the warp [N]; None for z = y.
+        shapes: of the distribution on stones and plates, where they were worth one.
     """
 
     process: GroundProcess
     given: PredictiveProcess
     freedom: tuple[int, int]
     c: float | None
+    shapes: tuple[ShapeMap | None, ShapeMap | None] = (None, None)
 
     @classmethod
     def of(
@@ -105,7 +107,23 @@ class AllGroundModel:
             between=np.full(z.mean.shape, z.between),
             freedom=max(self.freedom[ground.is_plate], FEWEST),
             c=self.c,
+            shape=self.shapes[ground.is_plate],
         )
+
+    def shaped(self, known: Sequence[TerrainRows]) -> "AllGroundModel":
+        """Return the model with the shapes that trials of stones and plates ask for.
+
+        Scored are rows that the process was given: 300 of a terrain, of which its
+        function takes up about thirty. A shape has to raise the density of trials
+        that it was not fitted to.
+        """
+        scores: tuple[list[Array], list[Array]] = ([], [])
+        for of in known:
+            scores[of.ground.is_plate].extend(
+                self.predict(of.ground, t.inputs).normal_score(t.F_t) for t in of.trials
+            )
+        (stones, _), (plates, _) = (choose_shape(parts) for parts in scores)
+        return replace(self, shapes=(stones, plates))
 
     def dissipation(self, ground: Ground, rows: SampleTable) -> Dissipation:
         """Return how far forces at these rows keep to F_t v_t >= 0."""
@@ -164,7 +182,8 @@ def fit_all_ground(
         c = start.c
         posterior = GroundPosterior(rows_of(few, c), unit[c])
         process = posterior.climbed(start.process.theta)
-    return AllGroundModel.of(process, c, [of.thinned(GIVEN) for of in known])
+    given = [of.thinned(GIVEN) for of in known]
+    return AllGroundModel.of(process, c, given).shaped(given)
 
 
 def _rated(

@@ -9,7 +9,7 @@ they need a clear gain, as three trials are a noisy judge.
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -239,7 +239,8 @@ def _inner(joint: AllGroundModel, task: RelativesTask) -> float:
     scores: list[float] = []
     for k, table in enumerate(own):
         rest = TerrainRows(ground, (*own[:k], *own[k + 1 :])).thinned(_INNER)
-        model = AllGroundModel.of(joint.process, joint.c, [rest, *others])
+        given = AllGroundModel.of(joint.process, joint.c, [rest, *others])
+        model = replace(given, shapes=joint.shapes)
         scores += [s.nlpd for s in _scores(model, ground, _every([table]))]
     return float(np.mean(scores))
 
