@@ -1,8 +1,15 @@
 from . import kernels, noise, trial_noise
 from .arcsine import Arcsine
 from .ground import Ground, GroundRows
-from .hierarchy import GroundPosterior, GroundProcess, PredictiveProcess, in_unit
+from .hierarchy import (
+    GroundPosterior,
+    GroundProcess,
+    PredictiveProcess,
+    in_unit,
+    prior_of,
+)
 from .kernels import Kernel, SquaredExponential
+from .likelihood import Likelihood
 from .noise import ConstantNoise, LogLinearNoise
 from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
 from .search import Start
@@ -17,6 +24,7 @@ __all__ = [
     "GroundProcess",
     "GroundRows",
     "Kernel",
+    "Likelihood",
     "LogLinearNoise",
     "PredictiveProcess",
     "SquaredExponential",
@@ -27,6 +35,7 @@ __all__ = [
     "in_unit",
     "kernels",
     "noise",
+    "prior_of",
     "refit_gp",
     "trial_noise",
     "without_idle_inputs",

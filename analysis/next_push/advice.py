@@ -1,0 +1,186 @@
+"""The next push: of those that a person can aim at, the one that teaches most.
+
+Nine aims, three loads by three velocities. Nobody meets an aim: by how much this
+operator misses is learnt from the earlier trials that had one, and the gain of an aim
+is its mean over that scatter. The rows of a push are those of the last two trials,
+moved to where it would come out. Slips cross the whole plane in every trial, so aims
+differ less than one would hope.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition import TractionError
+from analysis.data import Array
+from analysis.next_push.knowledge import Knowledge
+from analysis.next_push.records import Aim, PushRecord
+from analysis.next_push.stopping import (
+    Stopping,
+    points_of,
+    slip_information,
+    stopping_with,
+)
+
+LOADS = ((3.0, "lightly"), (4.5, "as usual"), (7.0, "firmly"))  # N
+SPEEDS = ((0.025, "slowly"), (0.04, "evenly"), (0.065, "fast"))  # m/s
+AIMS = tuple(Aim(load, speed) for load, _ in LOADS for speed, _ in SPEEDS)
+_WORDS = {
+    Aim(load, speed): f"{pressed} (about {load:g} N), {pushed} (about {speed:g} m/s)"
+    for load, pressed in LOADS
+    for speed, pushed in SPEEDS
+}
+_SCATTER = np.array([0.25, 0.30])  # of log load and log velocity around an aim
+_BELIEF, _CALM = 3.0, 2.0  # trials that these, and no bias, are worth
+_TEMPLATES = 2  # trials whose rows stand for the next ones'
+_SIGMA = (
+    (-1.0, -1.0),
+    (-1.0, 1.0),
+    (1.0, -1.0),
+    (1.0, 1.0),
+)  # that scatter is taken at
+_SLOWEST, _FASTEST = 0.005, 0.2  # window of the analysis [m/s]
+
+
+class AimFollowing(NamedTuple):
+    """How this operator meets aims.
+
+    Attributes:
+        bias: mean of log(achieved / aimed), load and velocity, shape (2,).
+        scatter: standard deviation around it, shape (2,).
+        trials: how many had an aim.
+    """
+
+    bias: Array
+    scatter: Array
+    trials: int
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What to do next.
+
+    Attributes:
+        aim: of the push that teaches most.
+        reason: why, in words.
+        gains: expected gain of every aim [nats], in the order of `AIMS`.
+        stopping: whether further trials would change the answer; None with too few.
+    """
+
+    aim: Aim
+    reason: str
+    gains: tuple[float, ...]
+    stopping: Stopping | None
+
+    @property
+    def text(self) -> str:
+        """The aim and its reason in one line."""
+        return f"{_WORDS[self.aim]} - {self.reason}"
+
+
+def advise(records: Sequence[PushRecord], kind: str, target: str) -> Advice | None:
+    """Return the push that teaches most about a target; None without a record.
+
+    Args:
+        records: of the kept trials, oldest first.
+        kind: "flat" for a plate; anything else counts as stones.
+        target: "grid", "corner" (firm and fast) or "break-away".
+    """
+    if not records:
+        return None
+    following = following_of(records)
+    pushes = [expected_pushes(records, aim, following) for aim in AIMS]
+    try:
+        knowledge = Knowledge.of(records, kind)
+    except TractionError:
+        return None
+    if target == "break-away":
+        gains = _slip_gains(knowledge.records, pushes)
+        best = int(np.argmax(gains))
+        reason = _slip_reason(knowledge.records, pushes[best])
+    else:
+        gains, reasons = _function_gains(knowledge, pushes, points_of(target))
+        best = int(np.argmax(gains))
+        reason = reasons[best]
+    return Advice(
+        AIMS[best], reason, tuple(gains.tolist()), stopping_with(knowledge, target)
+    )
+
+
+def following_of(records: Sequence[PushRecord]) -> AimFollowing:
+    """Return how an operator meets aims, as far as the trials show it."""
+    errors = np.array(
+        [np.log(np.array(r.mean) / np.array(r.aim)) for r in records if r.aim]
+    ).reshape(-1, 2)
+    count = len(errors)
+    bias = errors.sum(axis=0) / (count + _CALM)
+    squares = ((errors - bias) ** 2).sum(axis=0)
+    scatter = np.sqrt((_BELIEF * _SCATTER**2 + squares) / (_BELIEF + count))
+    return AimFollowing(bias, scatter, count)
+
+
+def expected_pushes(
+    records: Sequence[PushRecord], aim: Aim, following: AimFollowing
+) -> list[PushRecord]:
+    """Return trials that may come of an aim, equally likely; their forces are void."""
+    templates = records[-_TEMPLATES:]
+    pushes: list[PushRecord] = []
+    for k, sigma in enumerate(_SIGMA):
+        of = templates[k % len(templates)]
+        where = np.log(aim) + following.bias + following.scatter * np.array(sigma)
+        load, speed = np.exp(where) / np.maximum(np.array(of.mean), 1e-3)
+        pushes.append(
+            replace(
+                of,
+                F_n=of.F_n * load,
+                v_t=np.clip(of.v_t * speed, _SLOWEST, _FASTEST),
+                slips=of.slips * load,
+                aim=aim,
+            )
+        )
+    return pushes
+
+
+def _function_gains(
+    knowledge: Knowledge, pushes: Sequence[Sequence[PushRecord]], points: Array
+) -> tuple[Array, list[str]]:
+    """Return the expected gain of every aim, and the reason for each."""
+    _, variance = knowledge.function(points)
+    single = [[push] for aim in pushes for push in aim]
+    after = knowledge.variance_after(points, single)
+    after = after.reshape(len(pushes), -1, len(points))
+    gains = 0.5 * np.log(variance / after).sum(axis=2).mean(axis=1)
+    reasons: list[str] = []
+    for each in after.mean(axis=1):
+        k = int(np.argmax(variance - each))
+        F_n, v_t = points[k]
+        now, then = 2.0 * np.sqrt(variance[k]), 2.0 * np.sqrt(each[k])
+        reasons.append(
+            f"F_t at {F_n:g} N, {v_t:g} m/s is known to ± {now:.1f} N, "
+            f"then ± {then:.1f} N"
+        )
+    return gains, reasons
+
+
+def _slip_gains(
+    records: Sequence[PushRecord], pushes: Sequence[Sequence[PushRecord]]
+) -> Array:
+    """Return the expected gain about the break-away force of every aim."""
+    now = np.linalg.slogdet(slip_information(records))[1]
+    after = [
+        [np.linalg.slogdet(slip_information([*records, push]))[1] for push in aim]
+        for aim in pushes
+    ]
+    return 0.5 * (np.array(after).mean(axis=1) - now)
+
+
+def _slip_reason(records: Sequence[PushRecord], pushes: Sequence[PushRecord]) -> str:
+    loads = np.concatenate([push.slips for push in pushes] or [np.zeros(0)])
+    every = np.concatenate([r.slips for r in records])
+    if not loads.size:
+        return f"{every.size} slips so far"
+    low, high = np.percentile(loads, [10.0, 90.0])
+    inside = int(np.count_nonzero((every >= low) & (every <= high)))
+    return f"{inside} of {every.size} slips so far were at {low:.1f} to {high:.1f} N"
