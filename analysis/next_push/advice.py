@@ -2,9 +2,9 @@
 
 Nine aims, three loads by three velocities. Nobody meets an aim: by how much this
 operator misses is learnt from the earlier trials that had one, and the gain of an aim
-is its mean over that scatter. The rows of a push are those of the last two trials,
-moved to where it would come out. Slips cross the whole plane in every trial, so aims
-differ less than one would hope.
+is its mean over that scatter. The rows of a push are those of the two trials nearest to
+it, moved to where it would come out. Slips cross the whole plane in every trial, so
+aims differ less than one would hope.
 """
 
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from analysis.next_push.stopping import (
     stopping_with,
 )
 
-LOADS = ((3.0, "lightly"), (4.5, "as usual"), (7.0, "firmly"))  # N
+LOADS = ((3.0, "lightly"), (4.0, "as usual"), (5.5, "firmly"))  # N
 SPEEDS = ((0.025, "slowly"), (0.04, "evenly"), (0.065, "fast"))  # m/s
 AIMS = tuple(Aim(load, speed) for load, _ in LOADS for speed, _ in SPEEDS)
 _WORDS = {
@@ -125,11 +125,12 @@ def expected_pushes(
     records: Sequence[PushRecord], aim: Aim, following: AimFollowing
 ) -> list[PushRecord]:
     """Return trials that may come of an aim, equally likely; their forces are void."""
-    templates = records[-_TEMPLATES:]
+    centre = np.log(aim) + following.bias
+    nearest = sorted(records, key=lambda r: _apart(r, centre))[:_TEMPLATES]
     pushes: list[PushRecord] = []
     for k, sigma in enumerate(_SIGMA):
-        of = templates[k % len(templates)]
-        where = np.log(aim) + following.bias + following.scatter * np.array(sigma)
+        of = nearest[k % len(nearest)]
+        where = centre + following.scatter * np.array(sigma)
         load, speed = np.exp(where) / np.maximum(np.array(of.mean), 1e-3)
         pushes.append(
             replace(
@@ -141,6 +142,12 @@ def expected_pushes(
             )
         )
     return pushes
+
+
+def _apart(record: PushRecord, centre: Array) -> float:
+    """Return how far a trial came out from a place (log load, log velocity)."""
+    far = np.log(np.maximum(np.array(record.mean), 1e-3)) - centre
+    return float(far @ far)
 
 
 def _function_gains(

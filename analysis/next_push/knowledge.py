@@ -104,9 +104,15 @@ class Knowledge:
         return cls(records, theta, half, alpha, offset)
 
     @property
-    def spread(self) -> float:
-        """How much trials differ, sc [N]."""
-        return float(np.exp(self.theta[4]))
+    def level_spread(self) -> float:
+        """How much the levels of single trials differ, their residual included [N].
+
+        sqrt(sc^2 + 2 so^2 tau / T), T the mean duration of a trial.
+        """
+        sc, so, tau = np.exp(self.theta[4:])
+        seconds = float(np.mean([np.ptp(r.t) for r in self.records]))
+        along = so**2 * min(1.0, 2.0 * tau / max(seconds, 1e-3))
+        return float(np.sqrt(sc**2 + along))
 
     def function(self, inputs: Array) -> tuple[Array, Array]:
         """Return mean [N] and variance [N^2] of the function at inputs (m, 2)."""

@@ -1,9 +1,10 @@
 """Whether further trials of a terrain would change the answer.
 
 Enough is where two more trials like the last two would move the answer, at the point of
-the target where they move it most, by less than trials differ: two standard deviations
-of the move against the level of a trial, sc. The matrix still decides how many there
-are to be.
+the target where they move it most, by less than single trials differ: two standard
+deviations of the move against sqrt(sc^2 + 2 so^2 tau / T). One trial earlier it must
+have been so, too: hyperparameters of a few trials wander. The matrix still decides how
+many there are to be.
 """
 
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ _GRID = ((2.0, 4.0, 6.0, 8.0), (0.01, 0.03, 0.06, 0.12))  # F_n [N], v_t [m/s]
 _CORNER = ((6.0, 8.0), (0.06, 0.12))  # firm and fast
 _REFERENCE_LOAD, _LOADS = 3.5, (1.75, 7.0)  # N, of break-away; light and firm
 _PEAK_SPREAD = 0.35  # of log peak at a load
-_FEWEST = 3  # trials before which nothing is enough
+_FEWEST = 4  # trials before which nothing is enough
 
 
 class Stopping(NamedTuple):
@@ -84,7 +85,7 @@ def stopping_of(
 ) -> Stopping | None:
     """Return whether two more trials like the last ones would change the answer.
 
-    None with fewer than three.
+    None with fewer than four.
 
     Args:
         records: of the kept trials, oldest first.
@@ -103,16 +104,25 @@ def stopping_of(
 def stopping_with(knowledge: Knowledge, target: str) -> Stopping:
     """Return the same from what is known."""
     records = knowledge.records
-    if target == "break-away":
-        change, spread = _slip_change(records)
-    else:
-        points = points_of(target)
-        _, variance = knowledge.function(points)
-        after = knowledge.variance_after(points, [list(records[-2:])])[0]
-        change = 2.0 * float(np.sqrt(np.maximum(variance - after, 0.0)).max())
-        spread = knowledge.spread
+    change, spread = _change(knowledge, target)
     is_enough = len(records) >= _FEWEST and change < spread
+    if is_enough:
+        before = Knowledge.at(records[:-1], knowledge.theta)
+        change_before, spread_before = _change(before, target)
+        is_enough = change_before < spread_before
     return Stopping(target, len(records), change, spread, is_enough)
+
+
+def _change(knowledge: Knowledge, target: str) -> tuple[float, float]:
+    """Return how two more trials would move the answer, and how much trials differ."""
+    records = knowledge.records
+    if target == "break-away":
+        return _slip_change(records)
+    points = points_of(target)
+    _, variance = knowledge.function(points)
+    after = knowledge.variance_after(points, [list(records[-2:])])[0]
+    moved = float(np.sqrt(np.maximum(variance - after, 0.0)).max())
+    return 2.0 * moved, knowledge.level_spread
 
 
 def _slip_change(records: Sequence[PushRecord]) -> tuple[float, float]:
