@@ -31,7 +31,7 @@ from analysis.gp import (
 )
 from analysis.next_push.records import PushRecord
 
-MOST_TRIALS = 40  # the newest that are looked at
+MOST_TRIALS = 16  # the newest that are looked at: 400 rows
 
 _CENTRE, _SCALE = np.array([4.0, 0.05]), np.array([2.0, 0.04])  # of the inputs
 # log sf, l1, l2, sn, sc, so, tau: means and standard deviations of their priors

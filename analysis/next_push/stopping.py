@@ -1,7 +1,7 @@
 """Whether further trials of a terrain would change the answer.
 
-Enough is where two more trials like the last two would move the answer, at the point of
-the target where they move it most, by less than single trials differ: two standard
+Enough is where two more trials, at the aim and the point of the target where they move
+the answer most, would move it by less than single trials differ: two standard
 deviations of the move against sqrt(sc^2 + 2 so^2 tau / T). One trial earlier it must
 have been so, too: hyperparameters of a few trials wander. The matrix still decides how
 many there are to be.
@@ -14,6 +14,7 @@ import numpy as np
 
 from acquisition import TractionError
 from analysis.data import Array
+from analysis.next_push.aims import expected_by_aim
 from analysis.next_push.knowledge import Knowledge
 from analysis.next_push.records import PushRecord
 
@@ -23,7 +24,7 @@ _GRID = ((2.0, 4.0, 6.0, 8.0), (0.01, 0.03, 0.06, 0.12))  # F_n [N], v_t [m/s]
 _CORNER = ((6.0, 8.0), (0.06, 0.12))  # firm and fast
 _REFERENCE_LOAD, _LOADS = 3.5, (1.75, 7.0)  # N, of break-away; light and firm
 _PEAK_SPREAD = 0.35  # of log peak at a load
-_FEWEST = 4  # trials before which nothing is enough
+_FEWEST = 7  # trials; fewer show the spread between them to no better than 30 %
 
 
 class Stopping(NamedTuple):
@@ -83,9 +84,9 @@ def slip_information(trials: Sequence[PushRecord]) -> Array:
 def stopping_of(
     records: Sequence[PushRecord], kind: str, target: str
 ) -> Stopping | None:
-    """Return whether two more trials like the last ones would change the answer.
+    """Return whether two more trials would change the answer.
 
-    None with fewer than four.
+    None with fewer than seven.
 
     Args:
         records: of the kept trials, oldest first.
@@ -120,9 +121,14 @@ def _change(knowledge: Knowledge, target: str) -> tuple[float, float]:
         return _slip_change(records)
     points = points_of(target)
     _, variance = knowledge.function(points)
-    after = knowledge.variance_after(points, [list(records[-2:])])[0]
+    after = knowledge.variance_after(points, _pairs(records))
     moved = float(np.sqrt(np.maximum(variance - after, 0.0)).max())
     return 2.0 * moved, knowledge.level_spread
+
+
+def _pairs(records: Sequence[PushRecord]) -> list[list[PushRecord]]:
+    """Return two trials that may come of every aim, one below it and one above."""
+    return [[pushes[0], pushes[-1]] for pushes in expected_by_aim(records)]
 
 
 def _slip_change(records: Sequence[PushRecord]) -> tuple[float, float]:
@@ -132,10 +138,10 @@ def _slip_change(records: Sequence[PushRecord]) -> tuple[float, float]:
     themselves; a trial's mean peak therefore by that over the root of its slips.
     """
     now = np.linalg.inv(slip_information(records))
-    after = np.linalg.inv(slip_information([*records, *records[-2:]]))
+    further = [slip_information([*records, *pair]) for pair in _pairs(records)]
     x = np.log(np.array(_LOADS) / _REFERENCE_LOAD)
     ends = np.array([np.ones(2), x])
-    lost = np.einsum("ie,ij,je->e", ends, now - after, ends)
+    lost = np.einsum("ie,kij,je->ke", ends, now - np.linalg.inv(further), ends)
     slips = sum(r.slips.size for r in records) / len(records)
     change = 2.0 * _PEAK_SPREAD * float(np.sqrt(max(lost.max(), 0.0)))
     return change, _PEAK_SPREAD / float(np.sqrt(max(slips, 1.0)))
