@@ -22,7 +22,7 @@ from analysis.next_push.stopping import (
 )
 
 _WORDS = {
-    Aim(load, speed): f"{pressed} (about {load:g} N), {pushed} (about {speed:g} m/s)"
+    Aim(load, speed): f"{pressed} ({load:g} N), {pushed} ({speed:g} m/s)"
     for load, pressed in LOADS
     for speed, pushed in SPEEDS
 }
@@ -47,7 +47,7 @@ class Advice:
     @property
     def text(self) -> str:
         """The aim and its reason in one line."""
-        return f"{_WORDS[self.aim]} - {self.reason}"
+        return f"{_WORDS[self.aim]}: {self.reason}"
 
 
 def advise(records: Sequence[PushRecord], kind: str, target: str) -> Advice | None:
@@ -92,10 +92,8 @@ def _function_gains(
         k = int(np.argmax(variance - each))
         F_n, v_t = points[k]
         now, then = 2.0 * np.sqrt(variance[k]), 2.0 * np.sqrt(each[k])
-        reasons.append(
-            f"F_t at {F_n:g} N, {v_t:g} m/s is known to ± {now:.1f} N, "
-            f"then ± {then:.1f} N"
-        )
+        place = f"{F_n:g} N, {v_t:g} m/s"
+        reasons.append(f"F_t at {place} from ± {now:.1f} to ± {then:.1f} N")
     return gains, reasons
 
 

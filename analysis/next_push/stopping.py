@@ -56,8 +56,8 @@ class Stopping(NamedTuple):
             for value in (self.change, self.spread)
         )
         return (
-            f"two more trials would move the answer ({self.target}) by up to {change}, "
-            f"trials differ by {spread}"
+            f"two more trials would move the {self.target} by {change}, trials differ "
+            f"by {spread}"
         )
 
 

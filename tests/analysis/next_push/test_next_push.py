@@ -94,7 +94,7 @@ def test_break_away_asks_for_loads_at_both_ends():
 def test_advice_is_one_line_with_a_number_for_its_reason(target):
     text = advise([drawn(0), drawn(1)], "small", target).text
     assert "\n" not in text
-    assert sum(letter.isdigit() for letter in text.partition(" - ")[2]) >= 2
+    assert sum(letter.isdigit() for letter in text.partition(": ")[2]) >= 2
 
 
 def test_without_a_record_there_is_no_advice():
