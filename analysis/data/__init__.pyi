@@ -35,6 +35,7 @@ from .terrain_kinds import (
     groups_of,
     kind_title,
     parse_stones,
+    terrain_incline,
     terrain_kind,
 )
 
@@ -83,5 +84,6 @@ __all__ = [
     "share_below",
     "suggest",
     "summed_up",
+    "terrain_incline",
     "terrain_kind",
 ]

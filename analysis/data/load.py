@@ -111,6 +111,7 @@ class RecordedTrial:
         return TractionSeries(
             *(self.terrain, self.name, self.t, v_t, F_n, F_t),
             stones=self.stones,
+            incline_deg=float(np.degrees(self.frame.incline)),
             stamped_lag=self.stamped_lag,
         )
 

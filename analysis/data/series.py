@@ -32,6 +32,7 @@ class TractionSeries:
         F_t: traction force [N], > 0 in slip.
         stones: size of the stones as recorded or given: "small", "big" or "none";
             empty where it is not known.
+        incline_deg: of the plane [degrees]; None where it is not known.
         stamped_lag: how much older than the velocity the forces are by their own time
             stamps [s]; 0 where they have none.
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
@@ -51,6 +52,7 @@ class TractionSeries:
     F_n: Array
     F_t: Array
     stones: str = ""
+    incline_deg: float | None = None
     stamped_lag: float = 0.0
     is_prepared: bool = False
     dropped_rows: int = field(init=False)

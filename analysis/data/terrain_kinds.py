@@ -7,6 +7,7 @@ Any other terrain of unknown stones is a kind of its own, under its own name.
 """
 
 from collections.abc import Iterable, Mapping
+from statistics import median
 
 from acquisition import SettingsError
 
@@ -16,6 +17,11 @@ PAPER_KINDS: Mapping[str, str] = {
     **dict.fromkeys(("S0", "S10", "S15"), SMALL),
     **dict.fromkeys(("B0", "B10", "B15"), BIG),
     **dict.fromkeys(("TF", "Tf"), FLAT),
+}
+PAPER_INCLINES: Mapping[str, float] = {
+    **dict.fromkeys(("S0", "B0", "TF", "Tf"), 0.0),
+    **dict.fromkeys(("S10", "B10"), 10.0),
+    **dict.fromkeys(("S15", "B15"), 15.0),
 }
 LEVELS = ("terrain", "stones", "surface")
 _TITLES = {SMALL: "small stones", BIG: "big stones", FLAT: "flat plate"}
@@ -34,6 +40,20 @@ def terrain_kind(terrain: str, stones: Iterable[str] = ()) -> str:
     if not stated:
         return PAPER_KINDS.get(terrain, terrain)
     return stated.pop() if len(stated) == 1 else terrain
+
+
+def terrain_incline(
+    terrain: str, inclines: Iterable[float | None] = ()
+) -> float | None:
+    """Return the incline of a terrain [degrees], None where it is unknown.
+
+    Args:
+        terrain: its name; those of the paper stand for their incline.
+        inclines: what its recordings state [degrees]; None states nothing. Their
+            median counts.
+    """
+    stated = [angle for angle in inclines if angle is not None]
+    return median(stated) if stated else PAPER_INCLINES.get(terrain)
 
 
 def kind_title(kind: str) -> str:

@@ -1,6 +1,15 @@
 from . import kernels, noise, trial_noise
 from .arcsine import Arcsine
+from .ground import Ground, GroundRows
+from .hierarchy import (
+    GroundPosterior,
+    GroundProcess,
+    PredictiveProcess,
+    in_unit,
+    prior_of,
+)
 from .kernels import Kernel, SquaredExponential
+from .likelihood import Likelihood
 from .noise import ConstantNoise, LogLinearNoise
 from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
 from .search import Start
@@ -10,15 +19,23 @@ __all__ = [
     "Arcsine",
     "ConstantNoise",
     "GaussianProcess",
+    "Ground",
+    "GroundPosterior",
+    "GroundProcess",
+    "GroundRows",
     "Kernel",
+    "Likelihood",
     "LogLinearNoise",
+    "PredictiveProcess",
     "SquaredExponential",
     "Start",
     "TrialNoise",
     "TrialRows",
     "fit_gp",
+    "in_unit",
     "kernels",
     "noise",
+    "prior_of",
     "refit_gp",
     "trial_noise",
     "without_idle_inputs",

@@ -37,6 +37,15 @@ class Factor(NamedTuple):
         """Return C^-1 r, shape (n,)."""
         return _lapack("potrs")(self.L, r, lower=1)[0]
 
+    def half(self, r: Array) -> Array:
+        """Return L^-1 r, of the shape of r."""
+        return _lapack("trtrs")(self.L, r, lower=1)[0]
+
+    def inverse(self) -> Array:
+        """Return C^-1, shape (n, n)."""
+        lower, _ = _lapack("potri")(self.L, lower=1)
+        return lower + np.tril(lower, -1).T
+
 
 def factorise(
     K: Array,

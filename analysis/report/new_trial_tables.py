@@ -1,13 +1,21 @@
 """Tables of the report about a trial that nobody has recorded yet."""
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from analysis.figures import ReportSection
 from analysis.findings import StudyResults
 from analysis.report.page_model import ReportTable
 from analysis.study import (
     GP_SE_NOISE,
     GP_SE_TRIAL,
+    Dissipation,
     NewTrialModel,
+    RelativesOutcome,
+    Score,
     Study,
+    TerrainResult,
     TrialComponents,
     compare,
     family_counts,
@@ -23,6 +31,7 @@ def new_trial_tables(results: StudyResults) -> list[ReportTable]:
     tables = [
         family_table(results.study),
         worth_table(results.study),
+        relatives_table(results.study),
         oracle_table(results),
     ]
     return [table for table in tables if table.rows]
@@ -107,6 +116,64 @@ def worth_table(study: Study) -> ReportTable:
     )
 
 
+def relatives_table(study: Study) -> ReportTable:
+    """Return what other terrains tell about one, with and without three own trials."""
+    rows = [
+        [
+            name,
+            ", ".join(of.relatives) or "none",
+            f"{_mean(of.joint, 'nlpd'):.3f}",
+            f"{_mean(of.alone, 'nlpd'):.3f}",
+            _all_own(study.terrains[name], of),
+            "relatives" if of.uses_relatives else "own trials alone",
+            f"{_mean(of.unseen, 'nlpd'):.3f}",
+            f"{_mean(of.unseen, 'coverage90'):.1%}",
+            _below_zero(of.dissipation),
+        ]
+        for name, of in study.relatives.items()
+    ]
+    return ReportTable(
+        name="What other terrains tell",
+        header=(
+            "terrain",
+            "relatives",
+            "NLPD of 3 trials and relatives [log N]",
+            "of 3 trials alone",
+            "of all its other trials",
+            "used",
+            "never recorded: NLPD",
+            "its 90% band holds",
+            "below 0 N: force, measured force, samples",
+        ),
+        rows=rows,
+        note="One Gaussian process over all terrains: a shared form, a deviation by "
+        "stones, incline and terrain, a level of every trial. Three trials of a "
+        "terrain and all other terrains predict its other trials; beside it the model "
+        "of the three alone and that of all trials but the one predicted. Without any "
+        "own trial the terrain counts as never recorded. The last column is how far "
+        "the prediction keeps to F_t v_t ≥ 0 in forward slip. "
+        + few_relatives(list(study.relatives.values())),
+        section=ReportSection.BEYOND,
+    )
+
+
+def few_relatives(outcomes: Sequence[RelativesOutcome]) -> str:
+    """Return where relatives are too few, as a sentence; empty where nowhere."""
+    few = [of for of in outcomes if of.has_few]
+    if not few:
+        return ""
+    listed = "; ".join(
+        f"{of.terrain} ({', '.join(of.relatives) or 'none'}: "
+        f"{'used' if of.uses_relatives else 'own trials alone are better'})"
+        for of in few
+    )
+    return (
+        f"Too few relatives to know how far they differ: {listed}. There the three "
+        "trials, each left out in turn, decide whether relatives are used, and a band "
+        "of a terrain never recorded rests on the prior."
+    )
+
+
 def oracle_table(results: StudyResults) -> ReportTable:
     """Return bands of a new trial beside those that assume no distribution."""
     rows = [
@@ -129,6 +196,21 @@ def oracle_table(results: StudyResults) -> ReportTable:
         "cannot show a band of 95%: that needs nineteen.",
         section=ReportSection.BEYOND,
     )
+
+
+def _mean(scores: Sequence[Score], key: str) -> float:
+    return float(np.mean([getattr(score, key) for score in scores]))
+
+
+def _all_own(result: TerrainResult, of: RelativesOutcome) -> str:
+    """Return the NLPD of the terrain's own folds on the trials predicted."""
+    nlpd = result.scores(GP_SE_TRIAL, "nlpd")
+    mean = mean_of([nlpd[k] for k in of.tested])
+    return "–" if mean is None else f"{mean:.3f}"
+
+
+def _below_zero(of: Dissipation) -> str:
+    return f"{of.latent:.1%}, {of.predicted:.1%}, {of.measured:.1%}"
 
 
 def _between(of: TrialComponents) -> str:

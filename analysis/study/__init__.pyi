@@ -1,3 +1,4 @@
+from .all_ground import AllGroundModel, Dissipation, TerrainRows, fit_all_ground
 from .crossval import FoldResult, ModelFold, plan_folds, run_fold
 from .distribution import SHARES, Distribution, NewTrialPrediction
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
@@ -5,6 +6,7 @@ from .jobs import Store, Workers, available_cores, run_tasks
 from .metrics import (
     PairedComparison,
     Prediction,
+    Score,
     adjusted_by_holm,
     compare,
     smallest_adjusted,
@@ -31,6 +33,12 @@ from .models import (
 )
 from .new_trial import NewTrialModel, family_counts
 from .noise_selection import NAMES
+from .relatives import (
+    RelativesOutcome,
+    grounds_of,
+    plan_relatives,
+    run_relatives,
+)
 from .skew import ShapeMap
 from .store import ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
@@ -53,7 +61,9 @@ __all__ = [
     "TITLES",
     "TOLD_APART",
     "TUSTIN",
+    "AllGroundModel",
     "CsvRow",
+    "Dissipation",
     "Distribution",
     "FitOptions",
     "FittedModel",
@@ -66,12 +76,15 @@ __all__ = [
     "PairedComparison",
     "PooledTustinFit",
     "Prediction",
+    "RelativesOutcome",
     "ResultStore",
+    "Score",
     "ShapeMap",
     "Store",
     "Study",
     "StudyOptions",
     "TerrainResult",
+    "TerrainRows",
     "TrialComponents",
     "TustinModel",
     "Workers",
@@ -79,10 +92,14 @@ __all__ = [
     "available_cores",
     "compare",
     "family_counts",
+    "fit_all_ground",
     "flag_counts",
+    "grounds_of",
     "mean_of",
     "plan_folds",
+    "plan_relatives",
     "run_fold",
+    "run_relatives",
     "run_study",
     "run_tasks",
     "smallest_adjusted",

@@ -30,6 +30,8 @@ _OTHER_UNITS = {
     "coverage95": "1",
     "standard_errors": "unit of the measure",
     "cross": "N",
+    "relatives: nlpd, inner_nlpd": "log N",
+    "relatives: coverage90, below_zero": "1",
     "components: between, within, measurement": "N",
     "components: tau, seconds": "s",
     "components: gain": "log N",
@@ -69,6 +71,7 @@ def to_fits(study: Study) -> dict[str, Any]:
             for name, result in study.terrains.items()
         },
         "cross": {model: study.cross(model) for model in study.options.fit.models},
+        "relatives": {name: of.numbers() for name, of in study.relatives.items()},
         "units": UNITS | _OTHER_UNITS,
         "options": asdict(study.options),
         "notes": list(study.notes),

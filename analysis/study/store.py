@@ -35,6 +35,7 @@ from analysis.study.metrics import Score
 from analysis.study.models import FitOptions, GpModel, TustinModel
 from analysis.study.new_trial import FamilyChoice, NewTrialModel
 from analysis.study.noise_selection import NoiseChoice, TailedNoise
+from analysis.study.relatives import STORED
 from analysis.study.skew import ShapeMap
 from analysis.study.terrain_fit import PooledTustinFit, TerrainTask
 from analysis.study.trial_components import ComponentsTask, TimedRows, TrialComponents
@@ -82,6 +83,7 @@ TYPES = {
         noise.LogLinearNoise,
         trial_noise.TrialNoise,
         trial_noise.TrialRows,
+        *STORED,
         tustin.TustinBounds,
         tustin.TustinFit,
         tustin.TustinForm,

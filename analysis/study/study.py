@@ -25,6 +25,12 @@ from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import Progress, Store, Workers, run_tasks
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
+from analysis.study.relatives import (
+    RelativesOutcome,
+    grounds_of,
+    plan_relatives,
+    run_relatives,
+)
 from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
 from analysis.study.trial_components import (
     ComponentsTask,
@@ -65,6 +71,7 @@ class Study:
         terrains: results by terrain, in the order given.
         notes: what could not be done, and why.
         warnings: what a reader should doubt.
+        relatives: what other terrains tell about one, by its name.
     """
 
     simulated: bool
@@ -72,6 +79,7 @@ class Study:
     terrains: Mapping[str, TerrainResult]
     notes: tuple[str, ...]
     warnings: tuple[str, ...]
+    relatives: Mapping[str, RelativesOutcome] = field(default_factory=dict)
 
     @property
     def kinds(self) -> dict[str, str]:
@@ -120,24 +128,25 @@ def run_study(
         trials: recorded trials by terrain.
         options: every choice.
         simulated: the trials were simulated; marks every product.
-        progress: called with (fits done, fits in all): folds, then whole terrains.
+        progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
 
     Raises:
         SettingsError: there is no trial at all.
     """
-    if not any(trials.values()):
-        raise SettingsError("There is no trial to analyse.", hint="Record some first.")
+    _require_trials(trials)
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
     workers = Workers(options.n_jobs, options.scheduler)
     whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
-    counts = len(tasks), len(whole_tasks), len(apart)
-    first, second, third = _in_turn(progress, counts)
+    akin = plan_relatives(prepared, grounds_of(trials), options.fit)
+    parts = _in_turn(progress, [len(of) for of in (tasks, whole_tasks, apart, akin)])
+    first, second, third, fourth = parts
     folds = run_tasks(run_fold, tasks, workers, first, store)
     wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
     fitted = run_tasks(fit_components, apart, workers, third, store)
+    outcomes = run_tasks(run_relatives, akin, workers, fourth, store)
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
@@ -152,10 +161,14 @@ def run_study(
         )
         for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
     }
-    is_bounded = options.prepare.container_travel is not None
-    warnings = [w for result in results.values() for w in _warnings(result, is_bounded)]
-    warnings = (*_contradictions(trials), *_doubts(prepared.values()), *warnings)
-    return Study(simulated, options, results, tuple(notes), warnings)
+    warnings = (*_contradictions(trials), *_all_warnings(results, options))
+    relatives = {of.terrain: of for of in outcomes if of is not None}
+    return Study(simulated, options, results, tuple(notes), warnings, relatives)
+
+
+def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
+    if not any(trials.values()):
+        raise SettingsError("There is no trial to analyse.", hint="Record some first.")
 
 
 def _prepared(
@@ -229,6 +242,14 @@ def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
 def _doubts(terrains: Iterable[Sequence[PreparedTrial]]) -> list[str]:
     """Return why trials cannot be what they say they are, a line for each reason."""
     return summed_up((t.name, doubts_of(t)) for trials in terrains for t in trials)
+
+
+def _all_warnings(
+    results: Mapping[str, TerrainResult], options: StudyOptions
+) -> list[str]:
+    is_bounded = options.prepare.container_travel is not None
+    doubts = _doubts(result.trials for result in results.values())
+    return [*doubts, *(w for of in results.values() for w in _warnings(of, is_bounded))]
 
 
 def _warnings(result: TerrainResult, has_container: bool) -> list[str]:

@@ -44,6 +44,7 @@ def run(args: argparse.Namespace) -> int:
         board_notes,
         compare_board,
         count_board,
+        enough_lines,
         next_steps,
         parse_where,
     )
@@ -58,11 +59,10 @@ def run(args: argparse.Namespace) -> int:
 
     def steps(board: Sequence[MatrixRow]) -> list[str]:
         kinds = {line.is_simulated for line in board if line.sessions} or {False}
-        lists = (
-            next_steps(args.data, settings.matrix, is_simulated=kind)
-            for kind in sorted(kinds)
-        )
-        return [step for steps in lists for step in steps]
+        every = enough_lines(args.data, settings.matrix, where)
+        for kind in sorted(kinds):
+            every += next_steps(args.data, settings.matrix, is_simulated=kind)
+        return every
 
     def notes(board: Sequence[MatrixRow]) -> list[str]:
         return board_notes(args.data, settings.matrix, where, board)

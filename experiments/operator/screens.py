@@ -119,6 +119,7 @@ class ReadyView:
         left: how long the missing ones will take [s]; None = not known yet.
         reset: what is to be done to the terrain before each trial.
         suggestion: of the next push; empty if there is none.
+        enough: why there are enough trials; empty if there are not.
     """
 
     session: str
@@ -131,6 +132,7 @@ class ReadyView:
     left: float | None
     reset: tuple[str, ...]
     suggestion: str
+    enough: str = ""
 
 
 def ready_lines(view: ReadyView) -> list[str]:
@@ -145,6 +147,8 @@ def ready_lines(view: ReadyView) -> list[str]:
         lines.append("Reset: " + " ".join(f"☐ {step}" for step in view.reset))
     if view.suggestion:
         lines.append(f"Suggested next: {view.suggestion}")
+    if view.enough:
+        lines.append(f"Enough: {view.enough}")
     return lines
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from acquisition import TractionError
 from acquisition.control_loop import GuardVerdict
 from acquisition.ipc import LoopClient
+from analysis.next_push import Aim
 from experiments.messages import FaultContext, fault_text
 from experiments.operator import (
     Console,
@@ -42,6 +43,7 @@ class RunContext:
         last_recorded: the newest trial that no tare has followed yet.
         is_last: no trial begins after this one.
         estimate: expected duration, as of the first kept trial [s].
+        aim: of the push that was suggested last; None where there was none.
     """
 
     console_loop: ConsoleLoop
@@ -60,6 +62,7 @@ class RunContext:
     last_recorded: TrialName | None = None
     is_last: bool = False
     estimate: float | None = None
+    aim: Aim | None = None
 
     @property
     def loop_client(self) -> LoopClient:

@@ -20,7 +20,7 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import LONGEST_TEXT, Event, TrialName, add_remark, clean_text
-from experiments.trial import review_trial
+from experiments.trial import next_push, review_trial
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques
@@ -89,19 +89,23 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
 
 
 def ready_view(context: RunContext) -> ReadyView:
-    """Return what the screen between two trials shows now."""
-    state = context.journal.state
+    """Return what the screen between two trials shows now, and remember its aim."""
+    state, row = context.journal.state, context.rig.row
+    folder = context.metadata.folder
+    push = context.console_loop.run_aside(lambda: next_push(folder, row))
+    context.aim = push.aim
     return ReadyView(
-        session=context.metadata.folder.id,
-        terrain=context.rig.row.name,
+        session=folder.id,
+        terrain=row.name,
         trial=state.next_trial,
         wanted=state.wanted,
         kept=len(state.kept),
         rejected=state.rejected,
         elapsed=context.elapsed,
         left=context.time_left,
-        reset=context.rig.row.reset,
-        suggestion=context.archive.suggestion(),
+        reset=row.reset,
+        suggestion=push.text,
+        enough=push.enough,
     )
 
 

@@ -190,7 +190,7 @@ def _end(
     )
     if outcome.status == "complete":
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
-        review = context.console_loop.run_aside(lambda: review_trial(path))
+        review = context.console_loop.run_aside(lambda: review_trial(path, context.aim))
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
         warnings = [f" {WARNING} {line}" for line in rubbing]
         context.say_page([written, *lines, *warnings])

@@ -31,6 +31,7 @@ from .matrix_board import (
     MatrixRow,
     compare_board,
     count_board,
+    enough_lines,
     next_steps,
     parse_where,
 )
@@ -45,7 +46,12 @@ from .store import (
     list_sessions,
     session_utc_ns,
 )
-from .trial_files import add_remark, write_next_tare
+from .trial_files import (
+    add_remark,
+    kept_pushes,
+    kept_sidecars,
+    write_next_tare,
+)
 from .trial_name import TrialName
 from .unfinished import UnfinishedSession, find_unfinished
 
@@ -75,10 +81,13 @@ __all__ = [
     "compare_trial",
     "count_board",
     "create_session",
+    "enough_lines",
     "find_session",
     "find_unfinished",
     "iso_utc",
     "kept_data_error",
+    "kept_pushes",
+    "kept_sidecars",
     "list_sessions",
     "locked_error",
     "looks_like_trial",

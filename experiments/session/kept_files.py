@@ -1,18 +1,22 @@
 """Kept trials as the journal has them against the files: what is missing or changed."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from acquisition import SessionError, TrialFileError
 from acquisition.trial_file import is_there, list_folder
+from analysis.data import FLAT
+from analysis.next_push import PushRecord, Stopping, stopping_of
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.store import JOURNAL_FILE, SessionFolder, list_sessions
-from experiments.session.trial_files import decision_of, find_sidecar
+from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
 from experiments.session.trial_name import TrialName
-from experiments.settings import MatrixSettings
+from experiments.settings import MatrixSettings, TerrainRow
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -169,6 +173,34 @@ def _changed(size: int, before: object) -> str:
     if type(before) is not int or size == before:
         return "is changed: its checksum is wrong"
     return f"is changed: {size} bytes, {before} were kept"
+
+
+def enough_of(
+    sessions: Sequence[SessionFolder], row: TerrainRow, *, is_simulated: bool
+) -> str:
+    """Return why the kept trials of a terrain are enough for its target, "" if not.
+
+    Args:
+        sessions: oldest first; those of other terrains do not count.
+        row: the terrain.
+        is_simulated: of its simulated trials, not of the live ones.
+    """
+    own = [s for s in sessions if s.terrain == row.name]
+    own = [s for s in own if s.is_simulated is is_simulated]
+    texts = [json.dumps(push.plain()) for s in own for push in kept_pushes(s)]
+    told = _stopping(tuple(texts), row.stones, row.target)
+    if told is None or not told.is_enough:
+        return ""
+    return (
+        f"{row.name}: enough after {told.trials}: {told.text}; {row.trials} are wanted."
+    )
+
+
+@lru_cache(maxsize=64)
+def _stopping(texts: tuple[str, ...], stones: str, target: str) -> Stopping | None:
+    records = [PushRecord.from_plain(json.loads(text)) for text in texts]
+    known = [record for record in records if record is not None]
+    return stopping_of(known, FLAT if stones == "none" else stones, target)
 
 
 def board_notes(

@@ -10,7 +10,12 @@ from pathlib import Path
 from acquisition import SettingsError, TrialFileError
 from experiments.arguments import data_option
 from experiments.session.data_files import read_json, sha256_of
-from experiments.session.kept_files import Deviation, compare_kept, unreadable
+from experiments.session.kept_files import (
+    Deviation,
+    compare_kept,
+    enough_of,
+    unreadable,
+)
 from experiments.session.lock import owner_of
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.session.unfinished import find_unfinished
@@ -177,6 +182,24 @@ def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> lis
     if order:
         steps.append(f"Next terrains, so that none goes with time: {' '.join(order)}")
     return steps
+
+
+def enough_lines(
+    data: Path, matrix: MatrixSettings, where: Mapping[str, str]
+) -> list[str]:
+    """Return the terrains whose kept trials are enough for their target.
+
+    Args:
+        data: the data folder.
+        matrix: the terrains and their targets.
+        where: only these, as in `count_board`.
+    """
+    sessions = [
+        s for s in _readable(list_sessions(data)) if _matches(_of_session(s), where)
+    ]
+    rows = [row for row in matrix.terrains if _matches(_of_row(row), where)]
+    told = [enough_of(sessions, r, is_simulated=k) for r in rows for k in (False, True)]
+    return [text for text in told if text]
 
 
 def _of_session(session: SessionFolder) -> dict[str, str]:

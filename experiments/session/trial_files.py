@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any, cast
 
 from acquisition import TrialFileError
-from acquisition.trial_file import is_there
+from acquisition.trial_file import is_there, list_folder
+from analysis.next_push import PushRecord
 from experiments.session.data_files import (
     move_file,
     read_json,
@@ -129,6 +130,22 @@ def move_trial_files(folder: SessionFolder, decision: Verdict) -> None:
         write_json(target, changed)
     if holds_source:
         remove_file(source)
+
+
+def kept_sidecars(folder: SessionFolder) -> list[dict[str, Any]]:
+    """Return the sidecars of the trials kept so far, in the order of their numbers."""
+    sidecars = [read_json(path) for path in list_folder(folder.trials, "T*.json")]
+    return [sidecar for sidecar in sidecars if sidecar.get("verdict") == KEEP]
+
+
+def kept_pushes(folder: SessionFolder) -> list[PushRecord]:
+    """Return what kept trials tell about the next push.
+
+    None at all where one of them has no such record: a trial of an older version.
+    """
+    records = [PushRecord.from_plain(s.get("push")) for s in kept_sidecars(folder)]
+    known = [record for record in records if record is not None]
+    return known if len(known) == len(records) else []
 
 
 def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> str:

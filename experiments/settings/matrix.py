@@ -13,7 +13,8 @@ _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f
 class TerrainRow(SettingsSection):
     """One row of the matrix.
 
-    `reset`: what a person does to the terrain before every trial.
+    `reset`: what a person does to the terrain before every trial. `target`: what the
+    trials are to tell most about.
     """
 
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]{0,15}$", examples=["S10"])
@@ -29,6 +30,9 @@ class TerrainRow(SettingsSection):
         min_length=1,
         max_length=9,
         examples=[["rake", "level", "foot at the far end"]],
+    )
+    target: Literal["grid", "corner", "break-away"] = Field(
+        default="grid", examples=["corner"]
     )
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
     calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])

@@ -4,10 +4,6 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import TrialFileError, utc_offset_ns
 from acquisition.ipc import last_frames
@@ -18,18 +14,15 @@ from acquisition.trial_file import (
     TrialHeader,
     TrialWriter,
     VerifiedFile,
-    list_folder,
 )
-from analysis.data import CoverageGrid, suggest
 from experiments import provenance
 from experiments.rig import Rig
 from experiments.session import (
-    KEEP,
     SessionFolder,
     TrialName,
     TrialOutcome,
     iso_utc,
-    read_json,
+    kept_sidecars,
     sidecar_of,
     write_json,
 )
@@ -189,10 +182,6 @@ def write_flight(rig: Rig, header: TrialHeader, path: Path, reason: str) -> None
     seal(writer, reason)
 
 
-CELLS = (4, 4)  # speeds, loads of a coverage
-MANY = 1_000_000_000  # samples, more than any trial has
-
-
 @dataclass(frozen=True, slots=True)
 class TrialArchive:
     """The files of one session's trials."""
@@ -241,31 +230,12 @@ class TrialArchive:
         details = sidecar_of(name, verified, outcome)
         if review is not None:
             details |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
+            if review.push is not None:
+                details["push"] = review.push.plain()
         write_json(self.metadata.folder.trials / f"{name.kept}.json", details)
 
     def kept_ratios(self) -> list[float]:
         """Return the quick fits of the trials kept so far, from their sidecars."""
-        ratios = (sidecar.get("ratio") for sidecar in self._kept_sidecars())
+        kept = kept_sidecars(self.metadata.folder)
+        ratios = (sidecar.get("ratio") for sidecar in kept)
         return [ratio for ratio in ratios if isinstance(ratio, float)]
-
-    def suggestion(self) -> str:
-        """Return how the next push should be, so that the kept ones leave no gap."""
-        counts = np.zeros(CELLS, np.int64)
-        for sidecar in self._kept_sidecars():
-            counts += cells_of(sidecar.get("coverage"))
-        return suggest(CoverageGrid(counts))
-
-    def _kept_sidecars(self) -> list[dict[str, Any]]:
-        paths = list_folder(self.metadata.folder.trials, "T*.json")
-        sidecars = [read_json(path) for path in paths]
-        return [sidecar for sidecar in sidecars if sidecar.get("verdict") == KEEP]
-
-
-def cells_of(value: object) -> NDArray[np.int64]:
-    """Return a coverage as it stands in a sidecar, zeros where it is none."""
-    try:
-        counts = np.array(value, np.int64)
-    except (ValueError, TypeError, OverflowError):
-        counts = np.zeros(0, np.int64)
-    is_map = counts.shape == CELLS and bool((counts >= 0).all() & (counts < MANY).all())
-    return counts if is_map else np.zeros(CELLS, np.int64)

@@ -1,4 +1,7 @@
-"""The quality gate: what a trial is worth, while the terrain can still be seen."""
+"""The quality gate: what a trial is worth, while the terrain can still be seen.
+
+And what the next push should be, by what the kept ones know.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,8 +12,10 @@ from numpy.typing import NDArray
 
 from acquisition import Flag
 from analysis.data import (
+    FLAT,
     JOINT7_WARNING,
     MINIMUM_KEPT,
+    CoverageGrid,
     Doubt,
     ForceLag,
     PrepareOptions,
@@ -21,13 +26,19 @@ from analysis.data import (
     load_trial,
     prepare_trial,
     quick_ratio,
+    suggest,
 )
+from analysis.next_push import Aim, PushRecord, advise, push_record
 from experiments.operator import BAD, GOOD, WARNING
+from experiments.session import SessionFolder, kept_pushes, kept_sidecars
+from experiments.settings import TerrainRow
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd
 ODD = 3.0  # standard deviations
 LEAST_SPREAD = 0.05  # of the mean; few trials may agree by chance
+CELLS = (4, 4)  # speeds, loads of a coverage
+MANY = 1_000_000_000  # samples, more than any trial has
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +58,7 @@ class Review:
         counts: samples per speed and load, shape (4, 4), see analysis.data.quality.
         doubts: why velocity and forces cannot be right; empty if they can.
         lag: how late the forces are; None where the trial does not show it.
+        push: what the choice of the next push needs; None with too few samples.
     """
 
     worst_gap: float
@@ -61,6 +73,7 @@ class Review:
     counts: NDArray[np.int64]
     doubts: tuple[Doubt, ...] = ()
     lag: ForceLag | None = None
+    push: PushRecord | None = None
 
     @property
     def known_ratio(self) -> float | None:
@@ -122,8 +135,12 @@ class Review:
         return WARNING if is_odd else GOOD, words
 
 
-def review_trial(path: Path) -> Review:
+def review_trial(path: Path, aim: Aim | None = None) -> Review:
     """Return what the finished file says about the trial.
+
+    Args:
+        path: of the file.
+        aim: what the push was aimed at.
 
     Raises:
         TrialFileError: it cannot be read.
@@ -149,4 +166,57 @@ def review_trial(path: Path) -> Review:
         counts=covered.counts,
         doubts=(*doubts_of(prepared), *doubts_of_record(trial)),
         lag=prepared.lag,
+        push=push_record(prepared, aim),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class NextPush:
+    """What is said about the next push.
+
+    Attributes:
+        text: how it should be, and why; empty where nothing is missing.
+        enough: why there are enough trials; empty where there are not.
+        aim: where it is aimed at; None where nobody is asked for an aim.
+    """
+
+    text: str
+    enough: str = ""
+    aim: Aim | None = None
+
+
+def next_push(folder: SessionFolder, row: TerrainRow) -> NextPush:
+    """Return how the next push of a session should be, and whether there are enough.
+
+    The push that teaches most; the emptiest cell where that is not known.
+
+    Args:
+        folder: of the session.
+        row: its terrain.
+    """
+    kind = FLAT if row.stones == "none" else row.stones
+    advice = advise(kept_pushes(folder), kind, row.target)
+    if advice is None:
+        return NextPush(_emptiest(folder))
+    enough = ""
+    if advice.stopping is not None and advice.stopping.is_enough:
+        enough = f"{advice.stopping.text}; {row.trials} are wanted"
+    return NextPush(advice.text, enough, advice.aim)
+
+
+def _emptiest(folder: SessionFolder) -> str:
+    """Return the cell of speed and load that the kept trials leave emptiest."""
+    counts = np.zeros(CELLS, np.int64)
+    for sidecar in kept_sidecars(folder):
+        counts += cells_of(sidecar.get("coverage"))
+    return suggest(CoverageGrid(counts))
+
+
+def cells_of(value: object) -> NDArray[np.int64]:
+    """Return a coverage as it stands in a sidecar, zeros where it is none."""
+    try:
+        counts = np.array(value, np.int64)
+    except (ValueError, TypeError, OverflowError):
+        counts = np.zeros(0, np.int64)
+    is_map = counts.shape == CELLS and bool((counts >= 0).all() & (counts < MANY).all())
+    return counts if is_map else np.zeros(CELLS, np.int64)

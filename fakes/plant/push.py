@@ -78,12 +78,17 @@ class Pace:
         speed: median over trials [m/s].
         stiffness: of hand and arm, median over trials [N/m].
         strongest: push before the hand holds back [N].
+        press_deg: angle at which the push leans on the ground, mean over trials
+            [degrees].
+        press_spread_deg: its standard deviation over trials [degrees].
         mishaps: what goes wrong on the way.
     """
 
     speed: float = 0.040
     stiffness: float = PUSH_K
     strongest: float = 22.0
+    press_deg: float = 4.0
+    press_spread_deg: float = 6.0
     mishaps: Mishaps = NO_MISHAPS
 
 
@@ -113,7 +118,7 @@ class Push:
         self._rng, self._n, self._dt, self._pace = rng, n, dt, pace
         self._K = pace.stiffness * math.exp(0.15 * n.next())
         self._speed = pace.speed * math.exp(0.22 * n.next())
-        self._beta = math.radians(4.0 + 6.0 * n.next())
+        self._beta = math.radians(pace.press_deg + pace.press_spread_deg * n.next())
         self._wander = OrnsteinUhlenbeck(0.25, 1.2, dt, n).step
         self._effort = OrnsteinUhlenbeck(0.06, 0.4, dt, n).step
         self._tilt = OrnsteinUhlenbeck(math.radians(9.0), 0.7, dt, n).step

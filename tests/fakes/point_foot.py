@@ -39,7 +39,9 @@ STEP = 50e-6  # counts of seven motors together, seen at the foot [m]
 class PointFoot:
     """The state of one trial."""
 
-    def __init__(self, terrain: str, seed: int, trial: int) -> None:
+    def __init__(
+        self, terrain: str, seed: int, trial: int, pace: Pace | None = None
+    ) -> None:
         stones, foot, incline_deg = GROUNDS[terrain]
         random = trial_generators(seed, terrain, trial)
         incline = math.radians(incline_deg)
@@ -56,7 +58,7 @@ class PointFoot:
         self.tare = self._take_tare()
         self.x = self.vx = self.vz = 0.0
         self.z = self.ground.surface(0.0) - self.weight / self.ground.stiffness
-        self.push = Push(Pace(), random.hand, self.view(), DT)
+        self.push = Push(pace or Pace(), random.hand, self.view(), DT)
         self.rows: list[tuple[float, float, float]] = []
 
     def view(self) -> HandView:

@@ -46,6 +46,12 @@ def ready(**changed):
     return ReadyView(**(values | changed))
 
 
+def test_enough_trials_are_said_below_the_suggestion():
+    told = "two more trials would move the grid by 0.4 N, trials differ by 1.2 N"
+    assert f"Enough: {told}" == ready_lines(ready(enough=told))[-1]
+    assert not [line for line in ready_lines(ready()) if line.startswith("Enough")]
+
+
 def test_a_running_trial_shows_time_way_cadence_and_newest_forces():
     top, values, keys = recording_lines(recording(), 80)
     assert top == (

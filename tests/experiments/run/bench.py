@@ -111,7 +111,9 @@ def make_context(data, operator, *, trials=2, **more):
     journal = Journal(folder, loop.rig.clock)
     journal.append(Event.STARTED, terrain="TF", trials=trials)
     journal.append(Event.ACTIVATED)
-    loop.rig.row = SimpleNamespace(name="TF", reset=())
+    loop.rig.row = SimpleNamespace(
+        name="TF", reset=(), stones="none", target="grid", trials=trials
+    )
     loop.rig.frame = SimpleNamespace(travel=0.4)
     return RunContext(
         console_loop=loop,
@@ -121,7 +123,7 @@ def make_context(data, operator, *, trials=2, **more):
         stop=loop.stop,
         metadata=SessionMetadata(folder, "mk", None, {}, ""),
         journal=journal,
-        archive=SimpleNamespace(suggestion=lambda: ""),
+        archive=SimpleNamespace(),
         feedback=SimpleNamespace(),
         opened_ns=loop.rig.clock.now_ns(),
         kept_before=0,

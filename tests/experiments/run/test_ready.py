@@ -7,11 +7,12 @@ import pytest
 
 from acquisition.devices import SafetyMode
 from analysis.data.load import load_trial
-from analysis.data.quality import CoverageGrid, suggest
+from analysis.next_push.advice import advise
+from analysis.next_push.records import PushRecord
 from experiments.operator.prompts import Prompt, PromptState
 from experiments.operator.scripted import ScriptedOperator
 from experiments.session.reducer import replay
-from experiments.trial.files import cells_of
+from experiments.trial.quality import cells_of
 from tests.experiments.program import (
     journal,
     only_session,
@@ -115,15 +116,24 @@ def test_the_last_trial_is_announced(scripted):
 
 
 def test_the_next_push_is_suggested_from_the_kept_trials(recorded):
-    """What one push has left open is what the next one is asked for."""
+    """What one push has left unknown is what the next one is asked for."""
     lines = recorded.done.out.splitlines()
     first = lines.index("Reset: ☐ wipe ☐ foot at the far end")
     (suggested,) = [line for line in lines if line.startswith("Suggested next: ")]
     assert lines.index(suggested) > first + 2  # not before there is a kept trial
-    kept = sidecar(recorded.folder / "trials" / "T01.mcap")["coverage"]
-    left_open = suggest(CoverageGrid(np.array(kept)))
-    assert suggested == f"Suggested next: {left_open}"
-    assert suggested == "Suggested next: slower than 0.05 m/s, pressing harder"
+    kept = sidecar(recorded.folder / "trials" / "T01.mcap")["push"]
+    advice = advise([PushRecord.from_plain(kept)], "flat", "grid")
+    assert suggested == f"Suggested next: {advice.text}"
+
+
+def test_a_trial_keeps_the_aim_that_was_suggested_before_it(recorded):
+    first, second = (
+        sidecar(recorded.folder / "trials" / f"{name}.mcap")["push"]
+        for name in ("T01", "T02")
+    )
+    assert first["aim"] is None  # nothing was known yet
+    advice = advise([PushRecord.from_plain(first)], "flat", "grid")
+    assert second["aim"] == list(advice.aim)
 
 
 def test_the_coverage_of_a_trial_is_in_its_sidecar(recorded):

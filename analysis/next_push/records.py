@@ -1,0 +1,127 @@
+"""What a kept trial leaves for the choice of the next one: a few rows, its slips.
+
+Rows come in runs of neighbours: single rows lie several correlation times apart, where
+the residual along a trial and the noise of a sample look alike.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from analysis.breakaway import find_pushes
+from analysis.data import Array, PreparedTrial
+
+ROWS = 25  # of a trial
+_RUN, _APART = 5, 4  # neighbours together, kept samples from one to the next
+_DIGITS = 4
+_MOST_SLIPS = 200
+_LARGEST = 1e6  # of any number in a record
+
+
+class Aim(NamedTuple):
+    """Where a push is aimed at.
+
+    Attributes:
+        F_n: mean load while the foot moves [N].
+        v_t: mean velocity while it moves [m/s].
+    """
+
+    F_n: float
+    v_t: float
+
+
+@dataclass(frozen=True, slots=True)
+class PushRecord:
+    """One kept trial, as the choice of the next needs it.
+
+    Attributes:
+        F_n: normal force of a few kept samples [N], shape (n,).
+        v_t: their velocity [m/s], shape (n,).
+        F_t: their traction force [N], shape (n,).
+        t: their time [s], shape (n,).
+        slips: normal force at the peaks that ended in a slip [N], shape (s,).
+        mean: of load and velocity over all kept samples.
+        aim: what the push was aimed at; None where nobody asked for anything.
+    """
+
+    F_n: Array
+    v_t: Array
+    F_t: Array
+    t: Array
+    slips: Array
+    mean: Aim
+    aim: Aim | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """Return the record as it stands in a sidecar."""
+        columns = {"F_n": self.F_n, "v_t": self.v_t, "F_t": self.F_t, "t": self.t}
+        return {key: _short(column) for key, column in columns.items()} | {
+            "slips": _short(self.slips),
+            "mean": _short(self.mean),
+            "aim": None if self.aim is None else _short(self.aim),
+        }
+
+    @classmethod
+    def from_plain(cls, value: object) -> "PushRecord | None":
+        """Return a record from a sidecar; None where there is none or it is damaged."""
+        if not isinstance(value, dict):
+            return None
+        fields = cast("Mapping[str, object]", value)
+        columns = [_numbers(fields.get(key)) for key in ("F_n", "v_t", "F_t", "t")]
+        slips, mean = _numbers(fields.get("slips")), _aim(fields.get("mean"))
+        if any(c is None for c in columns) or slips is None or mean is None:
+            return None
+        F_n, v_t, F_t, t = (np.array(column) for column in columns)
+        is_even = F_n.size == v_t.size == F_t.size == t.size > 0
+        if not is_even or F_n.size > ROWS or slips.size > _MOST_SLIPS:
+            return None
+        return cls(F_n, v_t, F_t, t, slips, mean, _aim(fields.get("aim")))
+
+
+def push_record(trial: PreparedTrial, aim: Aim | None = None) -> PushRecord | None:
+    """Return what a trial leaves; None with fewer kept samples than one run.
+
+    Args:
+        trial: the prepared trial.
+        aim: what the push was aimed at.
+    """
+    span = _RUN * _APART
+    if trial.kept < span:
+        return None
+    runs = min(ROWS // _RUN, trial.kept // span)
+    starts = np.linspace(0, trial.kept - span, runs).round().astype(np.intp)
+    rows = (starts[:, None] + _APART * np.arange(_RUN)).ravel()
+    slips = [p.F_n for p in find_pushes(trial) if not p.is_held][:_MOST_SLIPS]
+    mean = Aim(float(trial.F_n.mean()), float(trial.v_t.mean()))
+    columns = (trial.F_n[rows], trial.v_t[rows], trial.F_t[rows])
+    t = trial.smooth.t[trial.indices[rows]]
+    return PushRecord(*columns, t, np.array(slips, float), mean, aim)
+
+
+def _short(values: Sequence[float] | Array) -> list[float]:
+    return [round(float(value), _DIGITS) for value in values]
+
+
+def _numbers(value: object) -> Array | None:
+    """Return a list of finite numbers as an array, None for anything else."""
+    if not isinstance(value, list):
+        return None
+    items = cast("list[object]", value)
+    if not all(isinstance(item, int | float) for item in items):
+        return None
+    try:
+        numbers = np.array(items, dtype=np.float64)
+    except (ValueError, OverflowError):
+        return None
+    is_sound = np.isfinite(numbers).all() and (np.abs(numbers) < _LARGEST).all()
+    return numbers if is_sound else None
+
+
+def _aim(value: object) -> Aim | None:
+    pair = _numbers(value)
+    if pair is None or pair.size != 2 or not math.isfinite(float(pair.sum())):
+        return None
+    return Aim(float(pair[0]), float(pair[1]))
