@@ -9,7 +9,7 @@ from .hierarchy import (
     prior_of,
 )
 from .kernels import Kernel, SquaredExponential
-from .likelihood import Likelihood
+from .likelihood import Likelihood, factorise
 from .noise import ConstantNoise, LogLinearNoise
 from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
 from .search import Start
@@ -31,6 +31,7 @@ __all__ = [
     "Start",
     "TrialNoise",
     "TrialRows",
+    "factorise",
     "fit_gp",
     "in_unit",
     "kernels",

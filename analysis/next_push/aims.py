@@ -26,6 +26,7 @@ _SIGMA = (
     (1.0, -1.0),
     (1.0, 1.0),
 )  # that scatter is taken at
+_FURTHEST = 3.0  # logarithm that rows are moved by
 _SLOWEST, _FASTEST = 0.005, 0.2  # window of the analysis [m/s]
 
 
@@ -46,7 +47,7 @@ class AimFollowing(NamedTuple):
 def following_of(records: Sequence[PushRecord]) -> AimFollowing:
     """Return how an operator meets aims, as far as the trials show it."""
     errors = np.array(
-        [np.log(np.array(r.mean) / np.array(r.aim)) for r in records if r.aim]
+        [r.mean.log - r.aim.log for r in records if r.aim is not None]
     ).reshape(-1, 2)
     count = len(errors)
     bias = errors.sum(axis=0) / (count + _CALM)
@@ -59,13 +60,13 @@ def expected_pushes(
     records: Sequence[PushRecord], aim: Aim, following: AimFollowing
 ) -> list[PushRecord]:
     """Return trials that may come of an aim, equally likely; their forces are void."""
-    centre = np.log(aim) + following.bias
+    centre = aim.log + following.bias
     nearest = sorted(records, key=lambda r: _apart(r, centre))[:_TEMPLATES]
     pushes: list[PushRecord] = []
     for k, sigma in enumerate(_SIGMA):
         of = nearest[k % len(nearest)]
         where = centre + following.scatter * np.array(sigma)
-        load, speed = np.exp(where) / np.maximum(np.array(of.mean), 1e-3)
+        load, speed = np.exp(np.clip(where - of.mean.log, -_FURTHEST, _FURTHEST))
         pushes.append(
             replace(
                 of,
@@ -80,7 +81,7 @@ def expected_pushes(
 
 def _apart(record: PushRecord, centre: Array) -> float:
     """Return how far a trial came out from a place (log load, log velocity)."""
-    far = np.log(np.maximum(np.array(record.mean), 1e-3)) - centre
+    far = record.mean.log - centre
     return float(far @ far)
 
 

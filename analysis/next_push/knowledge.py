@@ -27,6 +27,7 @@ from analysis.gp import (
     SquaredExponential,
     TrialNoise,
     TrialRows,
+    factorise,
     prior_of,
 )
 from analysis.next_push.records import PushRecord
@@ -56,6 +57,7 @@ _PLATE = (
 _SC = {False: 10, True: 11}  # places in the priors of all ground: stones, plates
 _REACH = 4.0  # prior standard deviations that the search goes
 _HOPELESS = 1e25
+_SMALLEST = 1e-12  # variance that rounding may leave [N^2]
 _NOISE = TrialNoise(ConstantNoise(), has_drift=True)
 _KERNEL = SquaredExponential()
 
@@ -95,11 +97,16 @@ class Knowledge:
 
     @classmethod
     def at(cls, records: Sequence[PushRecord], theta: Array) -> "Knowledge":
-        """Return what trials know with given hyperparameters."""
+        """Return what trials know with given hyperparameters.
+
+        Raises:
+            SettingsError: their covariance cannot be factorised.
+        """
         F_t = np.concatenate([r.F_t for r in records])
         offset = float(F_t.mean())
         C = _within(theta, records)
-        half: Array = np.linalg.inv(np.linalg.cholesky(C)).astype(np.float64)
+        factor = factorise(C, np.zeros(len(C)))
+        half = factor.half(np.eye(len(C)))
         alpha = half.T @ (half @ (F_t - offset))
         return cls(records, theta, half, alpha, offset)
 
@@ -119,7 +126,8 @@ class Knowledge:
         cross = self._cross(inputs)
         V = self.half @ cross
         prior = np.exp(2.0 * self.theta[0])
-        return self.offset + self.alpha @ cross, prior - (V * V).sum(axis=0)
+        variance = np.maximum(prior - (V * V).sum(axis=0), _SMALLEST)
+        return self.offset + self.alpha @ cross, variance
 
     def new_trial(self, inputs: Array) -> tuple[Array, Array]:
         """Return mean [N] and variance [N^2] of samples of a new trial."""
@@ -146,7 +154,7 @@ class Knowledge:
             c = _KERNEL.matrix(self.theta[:3], _standard(inputs), _standard(rows))
             c -= V_g.T @ V_b
             after[k] = variance - np.einsum("gb,bg->g", c, np.linalg.solve(S, c.T))
-        return np.maximum(after, 1e-12)
+        return np.maximum(after, _SMALLEST)
 
     def _cross(self, inputs: Array) -> Array:
         rows = _standard(_inputs(self.records))

@@ -19,6 +19,7 @@ _RUN, _APART = 5, 4  # neighbours together, kept samples from one to the next
 _DIGITS = 4
 _MOST_SLIPS = 200
 _LARGEST = 1e6  # of any number in a record
+_LEAST = (0.1, 0.001)  # N, m/s
 
 
 class Aim(NamedTuple):
@@ -31,6 +32,14 @@ class Aim(NamedTuple):
 
     F_n: float
     v_t: float
+
+    @property
+    def log(self) -> Array:
+        """Logarithms of both, of 0.1 N and 1 mm/s at least, shape (2,).
+
+        A short trial may have lifted the foot, or moved it back, in the mean.
+        """
+        return np.log(np.maximum(np.array([self.F_n, self.v_t]), _LEAST))
 
 
 @dataclass(frozen=True, slots=True)

@@ -97,6 +97,32 @@ def test_advice_is_one_line_with_a_number_for_its_reason(target):
     assert sum(letter.isdigit() for letter in text.partition(": ")[2]) >= 2
 
 
+def test_a_trial_that_lifted_the_foot_is_no_reason_to_fail():
+    """Its mean load is the error of the sensor, below zero."""
+    good = [drawn(k, aim=Aim(4.0, 0.04)) for k in range(7)]
+    lifted = drawn(8, load=-0.2, speed=0.0, aim=Aim(4.0, 0.04))
+    for target in ("grid", "corner", "break-away"):
+        advice = advise([*good, lifted], "small", target)
+        assert np.isfinite(advice.gains).all()
+        assert np.isfinite([advice.stopping.change, advice.stopping.spread]).all()
+
+
+def test_a_trial_that_stands_twice_is_no_reason_to_fail():
+    advice = advise([drawn(0)] * 9, "flat", "grid")
+    assert np.isfinite(advice.gains).all()
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e5])
+def test_absurd_numbers_in_a_sidecar_are_no_reason_to_fail(size):
+    one = drawn(0)
+    odd = PushRecord(
+        *(size * one.F_n, size * one.v_t, size * one.F_t, size * one.t),
+        *(size * one.slips, Aim(size, -size), Aim(-size, 0.0)),
+    )
+    advice = advise([one, odd, drawn(2)], "small", "grid")
+    assert advice is None or np.isfinite(advice.gains).all()
+
+
 def test_without_a_record_there_is_no_advice():
     assert advise([], "small", "grid") is None
 
