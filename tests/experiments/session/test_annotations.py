@@ -163,19 +163,27 @@ def test_init_overwrites_nothing(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["matrix.toml"]
 
 
+def line_in(path, setting, key):
+    """Return how a setting is printed that is given where `path` has `key` first."""
+    lines = enumerate(path.read_text().splitlines(), 1)
+    number = next(number for number, line in lines if line.startswith(key))
+    return f"   {setting}   ({path}, line {number})"
+
+
 def test_every_setting_is_printed_with_where_it_comes_from(config):
     lines = traction("check", "--config-only", "--config", config).out.splitlines()
     beside = config.with_name("matrix.toml")
-    assert f'   can.channel = "can0"   ({config})' in lines
-    assert f"   terrains[1].incline_deg = 10.0   ({beside})" in lines
+    assert line_in(config, 'can.channel = "can0"', "channel = ") in lines
+    assert line_in(beside, "terrains[1].incline_deg = 10.0", "incline_deg = 10") in (
+        lines
+    )
     assert "   arm.mech_at_home = none   (default, not in rig.toml)" in lines
     reset = "['rake', 'level', 'foot at the far end']"
     assert f"   terrains[0].reset = {reset}   (default, not in matrix.toml)" in lines
-    assert f"   terrains[6].reset = ['wipe', 'foot at the far end']   ({beside})" in (
-        lines
-    )
+    wiped = "terrains[6].reset = ['wipe', 'foot at the far end']"
+    assert line_in(beside, wiped, "reset = ") in lines
     shipped = traction("check", "--config-only").out
-    assert '   can.channel = "can0"   (shipped default)' in shipped
+    assert '   can.channel = "can0"   (shipped default, line ' in shipped
     assert tomllib.loads(config.read_text())["can"]["channel"] == "can0"
 
 
