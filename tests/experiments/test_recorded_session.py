@@ -82,6 +82,7 @@ def test_a_session_of_version_0_1_is_reported(recorded):
     assert (only_session(data) / "report" / "index.html").stat().st_size > 100_000
 
 
+@pytest.mark.slow
 def test_a_session_of_version_0_1_is_resumed_and_completed(recorded):
     data, config = recorded
     done = traction(

@@ -19,8 +19,14 @@ def config(tmp_path_factory):
     return write_config(tmp_path_factory.mktemp("config"))
 
 
-@pytest.mark.parametrize("friction", [0.02, 1.0])
-@pytest.mark.parametrize("motor", LEADING)
+@pytest.mark.parametrize(
+    ("motor", "friction"),
+    [
+        *((motor, 0.02) for motor in LEADING),
+        (2, 1.0),
+        *(pytest.param(motor, 1.0, marks=pytest.mark.long) for motor in LEADING[1:]),
+    ],
+)
 def test_a_frozen_motor_ends_a_trial_before_the_arm_is_fast(
     config, tmp_path, motor, friction
 ):

@@ -194,7 +194,13 @@ def worst_speed(bench, seconds):
 
 # What surely moves a joint makes one without friction faster than one with it.
 FASTEST = {0.02: 1.75, 0.3: 1.25, 1.0: 1.0}
-FROZEN = [(friction, motor) for friction in FASTEST for motor in range(1, 7)]
+FROZEN = [
+    pytest.param(
+        friction, motor, marks=[] if friction == 1.0 or motor == 2 else pytest.mark.long
+    )
+    for friction in FASTEST
+    for motor in range(1, 7)
+]
 
 
 @pytest.mark.parametrize(("friction", "motor"), FROZEN)
