@@ -194,7 +194,8 @@ class NewTrialFit:
             changing = self._fitted(kernel, LogLinearNoise(), None)
             fitted.append(_Candidate(LOGLINEAR, changing, None))
         if WARPED in self._families:
-            c, bent = self._bent(normal)
+            c = max(_BENDS, key=lambda c: self._warped_likelihood(normal, c))
+            bent = self._fitted(kernel, ConstantNoise(), c)
             fitted.append(_Candidate(WARPED, bent, c))
         return fitted
 
@@ -222,19 +223,12 @@ class NewTrialFit:
             load=(float(load.mean()) / usual, float(load.std()) / usual),
         )
 
-    def _bent(self, normal: GaussianProcess) -> tuple[float, GaussianProcess]:
-        """Return the likeliest warp of F_t and the process of z, by climbs from y's."""
-        before = self._outputs(self._chosen, None).std()
-        warps = [(c, self._outputs(self._chosen, c)) for c in _BENDS]
-        climbed = [refit_gp(normal, z, float(z.std() / before)) for _, z in warps]
-        # the likelihood of y is that of z and its Jacobian
-        of_y = [
-            process.lml + float(log_warp_slope(self._rows.F_t, c).sum())
-            for process, c in zip(climbed, _BENDS, strict=True)
-        ]
-        best = int(np.argmax(of_y))
-        c, z = warps[best]
-        return c, without_idle_inputs(climbed[best], z)
+    def _warped_likelihood(self, normal: GaussianProcess, c: float) -> float:
+        """Return the likelihood of y under a warp: that of z and its Jacobian."""
+        before = self._outputs(self._chosen, None)
+        z = self._outputs(self._chosen, c)
+        lml = refit_gp(normal, z, float(z.std() / before.std())).lml
+        return lml + float(log_warp_slope(self._rows.F_t, c).sum())
 
     def _outputs(self, rows: Indices, c: float | None) -> Array:
         taken = self._training.rows.take(rows)
