@@ -4,7 +4,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lab lab-page lint types contracts sbom clean
+DOCS := $(VENV)/.docs
+WHEEL := build/wheel
+
+.PHONY: demo test docs wheel lab lab-page lint types contracts crate-validator sbom clean
 
 $(STAMP): pyproject.toml constraints.txt
 	@echo "Setting up $(VENV) (a few minutes the first time) ..."
@@ -16,6 +19,14 @@ $(STAMP): pyproject.toml constraints.txt
 test: $(STAMP)  ## set up, then run every test of the default suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+$(DOCS): $(STAMP) docs/constraints.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check \
+	    --constraint constraints.txt --constraint docs/constraints.txt --editable '.[docs]'
+	@touch $@
+
+docs: $(DOCS)  ## the documentation: docs/_build/html/index.html
+	$(BIN)/python -m sphinx -W --keep-going -q docs docs/_build/html
+
 demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
 	rm -rf demo
 	@echo "Two simulated sessions side by side, ten trials each; their logs: demo/*.log"
@@ -26,6 +37,16 @@ demo: $(STAMP)  ## two simulated sessions of ten trials, then the report of both
 	  wait $$second || { cat demo/TF.log; exit 1; }
 	$(BIN)/traction status --data demo
 	$(BIN)/traction report --all --data demo
+
+wheel: $(STAMP)  ## built, installed in an environment of its own, a session run there
+	rm -rf build
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
+	    --wheel-dir $(WHEEL) .
+	$(PYTHON) -m venv $(WHEEL)/venv
+	$(WHEEL)/venv/bin/python -m pip install --quiet --disable-pip-version-check \
+	    --constraint constraints.txt $(WHEEL)/*.whl
+	cd $(WHEEL) && venv/bin/traction --version
+	cd $(WHEEL) && venv/bin/traction run TF --fake --fast --trials 1 > session.log
 
 lab: $(STAMP)  ## the program beside the real kernel's drivers, in an emulated machine
 	$(BIN)/python -m lab
@@ -43,8 +64,16 @@ types: $(STAMP)  ## pyright
 contracts: $(STAMP)  ## who may import whom
 	$(BIN)/lint-imports
 
+crate-validator: .venv-crate/.installed  ## roc-validator, which needs an older rich
+
+.venv-crate/.installed:
+	$(PYTHON) -m venv .venv-crate
+	.venv-crate/bin/python -m pip install --quiet --disable-pip-version-check \
+	    roc-validator==0.13.0
+	@touch $@
+
 sbom: $(STAMP)  ## what is installed, as CycloneDX JSON: sbom.json
 	$(BIN)/python -m tests.sbom > sbom.json
 
 clean:
-	rm -rf $(VENV) demo sbom.json *.egg-info
+	rm -rf $(VENV) .venv-crate demo build sbom.json docs/_build docs/api docs/project *.egg-info

@@ -22,6 +22,7 @@ from .errors import (
     LinkError,
     LinkFullError,
     LinkTimeoutError,
+    MissingLibraryError,
     PreflightError,
     SessionError,
     SettingsError,
@@ -29,7 +30,7 @@ from .errors import (
     TrialFileError,
 )
 from .sample import MOTOR_FRESH_SHIFT, Flag, Record, Sample
-from .schema import TRUTH
+from .schema import FORESIGHT, MOST_TERRAINS, TRUTH
 from .settings import (
     File,
     Mass,
@@ -47,6 +48,8 @@ from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSou
 from .temporary_folders import remove_abandoned, temporary_folder
 
 __all__ = [
+    "FORESIGHT",
+    "MOST_TERRAINS",
     "MOTOR_FRESH_SHIFT",
     "NS_PER_S",
     "PERIOD_NS",
@@ -63,6 +66,7 @@ __all__ = [
     "LinkFullError",
     "LinkTimeoutError",
     "Mass",
+    "MissingLibraryError",
     "Near",
     "Number",
     "PositionJump",

@@ -38,6 +38,21 @@ class SettingsError(TractionError):
     exit_code = 2
 
 
+class MissingLibraryError(SettingsError):
+    """A library that only some functions need is not installed.
+
+    Args:
+        library: its name in the package index.
+        extra: the extra of Traction that installs it.
+    """
+
+    def __init__(self, library: str, extra: str) -> None:
+        super().__init__(
+            f"This needs the library {library}, which is not installed.",
+            hint=f"Install it with: python -m pip install 'traction[{extra}]'",
+        )
+
+
 class PreflightError(TractionError):
     """The rig is not fit to run."""
 

@@ -1,6 +1,7 @@
-from . import figures, findings, gp, report, study, terrains, tustin, validation
+from . import api, figures, findings, gp, report, study, terrains, tustin, validation
 
 __all__ = [
+    "api",
     "figures",
     "findings",
     "gp",

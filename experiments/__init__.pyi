@@ -1,4 +1,5 @@
 from . import (
+    __main__,
     calibrating,
     commands,
     fault_injection,
@@ -14,6 +15,7 @@ from . import (
 )
 
 __all__ = [
+    "__main__",
     "calibrating",
     "commands",
     "fault_injection",

@@ -26,15 +26,17 @@ COMMANDS = {
     "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "show a trial again, or a bus log in words",
-    "export": "trials as CSV tables with units and checksums",
+    "export": "trials as CSV or Parquet tables with units and checksums",
+    "publish": "recordings, tables and results as an RO-Crate to be archived",
     "init": "write rig.toml and matrix.toml to be edited",
-    "verify": "hold kept trials against the checksums of the journal",
+    "verify": "hold kept trials, or a publication, against their checksums",
     "recover": "save what is sound of trials that were not ended",
     "rehearse": "the whole study simulated, held against what it has to show",
     "report": "fit and compare models of recorded sessions, write the report",
     "identify": "which terrain is this? probabilities over time",
-    "fit": "the same for tables that Traction did not record",
+    "fit": "the same for external data, npz or CSV",
 }
+_JOINED = {"publish": "export"}  # commands that share a file with another
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,
@@ -44,6 +46,23 @@ _OF_THE_DISK = {
     errno.EMFILE,
     errno.ENFILE,
 }
+FIRST_STEPS = """\
+Traction measures how a robotic foot grips loose stones. To try it without hardware:
+
+  traction run S0 --fake --trials 1           one simulated trial, you press the keys
+  traction run S0 --fake --fast --trials 3    three more, as fast as the machine can
+  traction status                             what is kept, what comes next
+  traction report --all                       models, comparison and figures on one page
+
+With an arm:
+
+  traction init lab                           rig.toml and matrix.toml, to be edited
+  traction check --config lab/rig.toml        is the rig fit? nothing moves
+
+traction --help lists all commands, traction COMMAND --help shows examples of one.
+Complete names with the tab key, bash or zsh:
+  eval "$(register-python-argcomplete traction)"
+"""
 EXIT_CODES = """\
 exit codes: 0 done, 1 a bug, 2 usage or configuration, 3 preflight failed,
 4 device fault, 5 session left unfinished on purpose, 6 data failed verification,
@@ -81,20 +100,28 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--version", action=_Version, nargs=0, help="version and commit"
     )
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    parser.set_defaults(run=_show_first_steps)
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name, help_text in COMMANDS.items():
-        module = importlib.import_module(f"experiments.commands.{name}")
+        file = _JOINED.get(name, name)
+        module = importlib.import_module(f"experiments.commands.{file}")
+        command = getattr(module, name.upper(), module)
         child = commands.add_parser(
             name,
             help=help_text,
             description=help_text[0].upper() + help_text[1:] + ".",
-            epilog=f"examples:\n{module.EXAMPLES}\n\n{EXIT_CODES}",
+            epilog=f"examples:\n{command.EXAMPLES}\n\n{EXIT_CODES}",
             formatter_class=_Formatter,
         )
         add_global_options(child, is_after_command=True)
-        module.add_arguments(child)
-        child.set_defaults(run=module.run)
+        command.add_arguments(child)
+        child.set_defaults(run=command.run)
     return parser
+
+
+def _show_first_steps(_: argparse.Namespace) -> int:
+    print(FIRST_STEPS.rstrip())  # noqa: T201
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -103,7 +130,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         import argcomplete
 
-        argcomplete.autocomplete(parser)
+        from experiments.completion import NameCompleter
+
+        argcomplete.autocomplete(parser, default_completer=NameCompleter())
     except ImportError:
         pass
     args = parser.parse_args(arguments)

@@ -2,12 +2,28 @@
 
 import math
 import shlex
-from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError
+from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 FRICTION = 0.02  # of the simulated joints, as a share of another arm's
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
+
+
+@dataclass(frozen=True, slots=True)
+class JoinedCommand:
+    """A command that shares its file with another, and is named as a module is.
+
+    Attributes:
+        EXAMPLES: for its help.
+        add_arguments: declares its options.
+        run: runs it and returns the exit code.
+    """
+
+    EXAMPLES: str
+    add_arguments: Callable[[ArgumentParser], None]
+    run: Callable[[Namespace], int]
 
 
 def add_global_options(
@@ -70,6 +86,20 @@ def number_within(least: float, most: float, wanted: str) -> Callable[[str], flo
         return number
 
     return read
+
+
+def add_simulated_arm(parser: ArgumentParser) -> None:
+    """Declare which simulated arm it is."""
+    parser.add_argument(
+        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
+    )
+    parser.add_argument(
+        "--friction",
+        type=float,
+        default=FRICTION,
+        metavar="SHARE",
+        help="of the simulated joints: 1 = as identified on another arm (0.02)",
+    )
 
 
 def add_seed(parser: ArgumentParser) -> None:
@@ -175,10 +205,16 @@ def data_option(data: Path) -> str:
     return "" if str(data) == "data" else f" --data {shlex.quote(str(data))}"
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return "Did you mean NAME?" for the known name that is nearest, or nothing."""
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Return the known name that was probably meant, None where none is near."""
     from difflib import get_close_matches
 
     names = {each.lower(): each for each in known}
     near = get_close_matches(name.lower(), names, n=1, cutoff=0.6)
-    return f"Did you mean {names[near[0]]}?" if near else ""
+    return names[near[0]] if near else None
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return "Did you mean NAME?" for the nearest known name, or nothing."""
+    meant = nearest(name, known)
+    return "" if meant is None else f"Did you mean {meant}?"

@@ -15,7 +15,10 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("acquisition", "wam", "ft_sensor", "experiments", "analysis", "fakes")
+PACKAGES = (
+    *("acquisition", "wam", "ft_sensor", "experiments", "analysis", "fakes"),
+    "traction",
+)
 MOST_COMMANDS, MOST_MODULES = 20, 15
 LONGEST_CHAIN = 9
 MOST_SERVING_ONE = 59

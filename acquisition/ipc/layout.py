@@ -13,14 +13,16 @@ import numpy as np
 from acquisition.devices import WrenchSample
 from acquisition.ipc.rings import LINE, Ring, SharedMemory, Slot, lines
 from acquisition.sample import Record
-from acquisition.schema import CYCLE
+from acquisition.schema import CYCLE, FORESIGHT
 
 CYCLE_SLOTS = 8192  # 16 s at 500 Hz
 WRENCH_SLOTS = 32_768  # 6.5 s of the fastest sensor
 FRAME_SLOTS = 32_768  # 5 s of a bus with 13 frames per cycle
 TIMING_SLOTS = 32_768  # 65 s of cycles
 COMMAND_SLOTS = 256
+FORESIGHT_SLOTS = 2048  # 20 s
 _SLOT_BYTES = 8192
+_MARK_BYTES = 64
 
 WRENCH_DTYPE = np.dtype(
     [
@@ -91,6 +93,9 @@ class SharedLayout:
         wrenches: every sample of the wrist sensor.
         frames: every frame of the bus.
         timings: when what happened in each cycle.
+        foresight: what is foreseen (traction_msgs/Foresight).
+        trial_start: where in `cycles` the running trial begins, as text; empty = none
+            runs that is to be foreseen.
         commands: the console's commands to the loop.
         status: state of the loop, newest value.
         recorder: state of the recorder, newest value.
@@ -105,11 +110,13 @@ class SharedLayout:
         self.status = Slot(self._take(LINE + _SLOT_BYTES))
         self.recorder = Slot(self._take(LINE + _SLOT_BYTES))
         self.health = Slot(self._take(LINE + _SLOT_BYTES))
+        self.trial_start = Slot(self._take(LINE + _MARK_BYTES))
         self.commands = self._ring(COMMAND_DTYPE, COMMAND_SLOTS)
         self.cycles = self._ring(CYCLE.dtype, CYCLE_SLOTS)
         self.wrenches = self._ring(WRENCH_DTYPE, WRENCH_SLOTS)
         self.frames = self._ring(FRAME_DTYPE, FRAME_SLOTS)
         self.timings = self._ring(TIMING_DTYPE, TIMING_SLOTS)
+        self.foresight = self._ring(FORESIGHT.dtype, FORESIGHT_SLOTS)
 
     @classmethod
     def create(cls) -> "SharedLayout":
@@ -131,6 +138,8 @@ class SharedLayout:
 _SIZE = (
     lines(8 * len(ProcessRole))
     + 3 * (LINE + _SLOT_BYTES)
+    + LINE
+    + _MARK_BYTES
     + sum(
         lines(Ring.size_of(dtype, slots))
         for dtype, slots in (
@@ -139,6 +148,7 @@ _SIZE = (
             (WRENCH_DTYPE, WRENCH_SLOTS),
             (FRAME_DTYPE, FRAME_SLOTS),
             (TIMING_DTYPE, TIMING_SLOTS),
+            (FORESIGHT.dtype, FORESIGHT_SLOTS),
         )
     )
 )

@@ -182,6 +182,16 @@ class RingReader:
         """Records that have been written and not read."""
         return self._ring.written - self._position
 
+    @property
+    def position(self) -> int:
+        """Number of the record that is read next, counted since the start."""
+        return self._position
+
+    def seek(self, position: int) -> None:
+        """Read from record number `position` on, or the oldest that there is."""
+        oldest = max(0, self._ring.written - self._ring.slots + 1)
+        self._position = min(max(oldest, position), self._ring.written)
+
     def rewind(self, records: int) -> None:
         """Go back so that the next read begins `records` records earlier."""
         oldest = max(0, self._ring.written - self._ring.slots + 1)

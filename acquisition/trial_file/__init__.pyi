@@ -10,6 +10,7 @@ from .data_files import (
     open_folder,
     read_data,
 )
+from .header import TrialHeader
 from .publishing import make_directories, sync_directory
 from .reader import TrialReader
 from .recover import ROOM, Recovery, recover_file, recovered_path
@@ -17,15 +18,16 @@ from .salvage import recorded_seconds
 from .verify import VerifiedFile, verify_file
 from .writer import (
     FLIGHT_TOPICS,
+    FORESIGHT_TOPICS,
     TRIAL_TOPICS,
     TRUTH_TOPICS,
-    TrialHeader,
     TrialWriter,
     publish,
 )
 
 __all__ = [
     "FLIGHT_TOPICS",
+    "FORESIGHT_TOPICS",
     "ROOM",
     "TRIAL_TOPICS",
     "TRUTH_TOPICS",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
 from acquisition.sample import Record
-from acquisition.schema import CYCLE, EARLIER_CYCLES, TRUTH, Layout
+from acquisition.schema import CYCLE, EARLIER_CYCLES, FORESIGHT, TRUTH, Layout
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
 
@@ -90,6 +90,18 @@ class TrialReader:
     def truth(self) -> TopicRows:
         """Return all records of `/truth` in order (truth files of simulations)."""
         return self._rows("/truth", TRUTH)
+
+    @property
+    def has_foresight(self) -> bool:
+        """Whether something was foreseen while it was recorded."""
+        return "/foresight" in self.topic_counts()
+
+    def foresight(self) -> TopicRows:
+        """Return all records of `/foresight` in order; empty of a trial without it."""
+        if not self.has_foresight:
+            empty = np.zeros(0, FORESIGHT.dtype)
+            return TopicRows(empty, np.zeros(0, np.uint64), np.zeros(0, np.uint32))
+        return self._rows("/foresight", FORESIGHT)
 
     def topic_counts(self) -> dict[str, int]:
         """Return the number of messages per topic, from the statistics."""

@@ -12,8 +12,8 @@ from acquisition.clock import PERIOD_NS
 from acquisition.errors import TrialFileError
 from acquisition.trial_file.chunks import as_trial_file_error
 from acquisition.trial_file.data_files import open_data
+from acquisition.trial_file.header import WriterCounts
 from acquisition.trial_file.reader import TopicRows, TrialReader
-from acquisition.trial_file.writer import WriterCounts
 
 PERIOD_TOLERANCE = 0.02
 REQUIRED_METADATA = ("trial", "clock", "provenance", "channels", "result")

@@ -4,17 +4,16 @@ import contextlib
 import hashlib
 import os
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
-from acquisition.clock import RATE_HZ
 from acquisition.errors import TrialFileError
-from acquisition.sample import CHANNELS, Flag, Record
-from acquisition.schema import CYCLE, TRUTH, schema_text
+from acquisition.sample import CHANNELS, FORESIGHT_CHANNELS, Flag, Record
+from acquisition.schema import CYCLE, FORESIGHT, TRUTH, Layout, schema_text
+from acquisition.trial_file.header import TrialHeader, WriterCounts
 from acquisition.trial_file.publishing import publish_file, sync_directory
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
@@ -31,48 +30,10 @@ TRIAL_TOPICS = {
 }
 TRUTH_TOPIC = "/truth"
 CAN_TOPIC = "/can/raw"
+FORESIGHT_TOPIC = "/foresight"
+FORESIGHT_TOPICS = {FORESIGHT_TOPIC: FORESIGHT.type_name}
 TRUTH_TOPICS = {TRUTH_TOPIC: "traction_msgs/msg/Truth"}
 FLIGHT_TOPICS = {**TRIAL_TOPICS, CAN_TOPIC: "traction_msgs/msg/CanBatch"}
-
-
-@dataclass(frozen=True, slots=True)
-class TrialHeader:
-    """What is known before the first cycle.
-
-    Attributes:
-        trial: metadata `trial` (session, terrain, operator, ...), strings.
-        utc_offset_ns: UTC = monotonic + this, one number for the whole file [ns].
-        offset_uncertainty_ns: half width of the reading that gave it [ns].
-        rate_hz: nominal rate of the loop.
-        provenance: software, machine and device identities, strings.
-        attachments: file name to content, e.g. `config.toml`.
-        robot_description: URDF of the arm.
-        views_every: every how many cycles the 50 Hz views are written, 0 = never.
-        has_frames: the raw frames of the bus are recorded too.
-    """
-
-    trial: Mapping[str, str]
-    utc_offset_ns: int
-    offset_uncertainty_ns: int
-    provenance: Mapping[str, str]
-    attachments: Mapping[str, bytes]
-    robot_description: str
-    rate_hz: int = RATE_HZ
-    views_every: int = 10
-    has_frames: bool = False
-
-
-@dataclass(slots=True)
-class WriterCounts:
-    """What the writer has put into the file so far."""
-
-    cycles: int = 0
-    missed: int = 0
-    late: int = 0
-    lost_in_ring: int = 0
-    first_cycle: int | None = None
-    last_cycle: int | None = None
-    messages: dict[str, int] = field(default_factory=dict[str, int])
 
 
 class TrialWriter:
@@ -153,14 +114,22 @@ class TrialWriter:
 
     def write_truth(self, records: Record) -> None:
         """Append records of traction_msgs/Truth (truth files only)."""
+        self._write_stamped(TRUTH_TOPIC, TRUTH, records)
+
+    def write_foresight(self, records: Record) -> None:
+        """Append records of traction_msgs/Foresight in order; stamps are set here."""
+        self._write_stamped(FORESIGHT_TOPIC, FORESIGHT, records)
+
+    def _write_stamped(self, topic: str, layout: Layout, records: Record) -> None:
+        """Append records with a `host_ns`, whose UTC becomes stamp and log time."""
         records = records.copy()
         log_times = records["host_ns"].astype(np.int64) + self._header.utc_offset_ns
         records["sec"], records["nanosec"] = np.divmod(log_times, NS_PER_S)
-        size = TRUTH.size
+        size = layout.size
         data = records.tobytes()
         with self._guarded():
             for i, log_time in enumerate(log_times.tolist()):
-                self._add(TRUTH_TOPIC, log_time, data[i * size : (i + 1) * size])
+                self._add(topic, log_time, data[i * size : (i + 1) * size])
 
     def write_can(self, frames: Record) -> None:
         """Append raw CAN frames (records of the board's ring) as one batch."""
@@ -222,8 +191,11 @@ class TrialWriter:
             for name, content in header.attachments.items()
         }
         self._writer.add_metadata("provenance", {**header.provenance, **digests})
-        channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in CHANNELS}
+        meanings = (*CHANNELS, *(FORESIGHT_CHANNELS if header.foresight else ()))
+        channels = {c.field: f"{c.unit} in {c.frame}; {c.sign}" for c in meanings}
         self._writer.add_metadata("channels", channels)
+        if header.foresight:
+            self._writer.add_metadata("foresight", dict(header.foresight))
         for name, content in header.attachments.items():
             self._writer.add_attachment(0, 0, name, "text/plain", content)
         self._channels: dict[str, int] = {}

@@ -1,8 +1,18 @@
 from .columns import parse_columns, parse_units
+from .data_package import (
+    DESCRIPTOR,
+    DataPackage,
+    PackagedTable,
+    PackageField,
+    PackageFile,
+    TableOrigin,
+    TableSchema,
+)
 from .events import Slip, find_slips
 from .inertia import WINDOW
 from .lag import ForceLag, force_lag
 from .load import Frame, RecordedTrial, load_trial
+from .parquet_tables import to_parquet
 from .plausibility import LATEST_MS, Doubt, doubts_of, doubts_of_record, summed_up
 from .prepare import (
     MINIMUM_KEPT,
@@ -41,6 +51,7 @@ from .terrain_kinds import (
 
 __all__ = [
     "BIG",
+    "DESCRIPTOR",
     "FLAT",
     "JOINT7_WARNING",
     "LATEST_MS",
@@ -53,16 +64,22 @@ __all__ = [
     "WINDOW",
     "Array",
     "CoverageGrid",
+    "DataPackage",
     "Doubt",
     "ForceLag",
     "Frame",
     "Indices",
+    "PackageField",
+    "PackageFile",
+    "PackagedTable",
     "PrepareOptions",
     "PreparedTrial",
     "RecordedTrial",
     "SampleTable",
     "Slip",
     "Smoothed",
+    "TableOrigin",
+    "TableSchema",
     "TareBracket",
     "TractionSeries",
     "TrainingSet",
@@ -86,4 +103,5 @@ __all__ = [
     "summed_up",
     "terrain_incline",
     "terrain_kind",
+    "to_parquet",
 ]

@@ -113,6 +113,7 @@ class RecordedTrial:
             stones=self.stones,
             incline_deg=float(np.degrees(self.frame.incline)),
             stamped_lag=self.stamped_lag,
+            is_simulated=self.is_simulated,
         )
 
     @property
@@ -172,9 +173,7 @@ class RecordedTrial:
 
 
 def load_trial(path: Path) -> RecordedTrial:
-    """Read a trial file and derive sole, force and traction.
-
-    A recovered file is read like any other; see `RecordedTrial.is_complete`.
+    """Read a trial file, recovered or not, and derive sole, force and traction.
 
     Raises:
         TrialFileError: the file is not a sound trial, or lacks its calibration.

@@ -37,6 +37,7 @@ class TractionSeries:
             stamps [s]; 0 where they have none.
         is_prepared: the rows are samples kept by an earlier preparation: smoothed,
             thinned and windowed.
+        is_simulated: the devices were simulated.
         dropped_rows: number of rows that were not finite.
         repeated_rows: number of rows that were there twice.
 
@@ -55,6 +56,7 @@ class TractionSeries:
     incline_deg: float | None = None
     stamped_lag: float = 0.0
     is_prepared: bool = False
+    is_simulated: bool = False
     dropped_rows: int = field(init=False)
     repeated_rows: int = field(init=False)
 

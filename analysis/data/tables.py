@@ -1,4 +1,4 @@
-"""Tables that other programs wrote, as trials: CSV, or npz with one array per trial.
+"""Tables as trials: CSV, Parquet, npz with one array per trial, data packages.
 
 Every byte is taken as hostile: sizes are checked before anything is unpacked, nothing
 is unpickled, and whatever does not fit becomes one SettingsError that names the file.
@@ -8,13 +8,29 @@ import stat
 import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from acquisition import SettingsError
-from analysis.data.columns import COLUMNS, CsvTable, factor, load_csv, refusal
+from analysis.data.columns import (
+    COLUMNS,
+    PREPARED,
+    CsvTable,
+    factor,
+    load_csv,
+    refusal,
+)
+from analysis.data.data_package import (
+    PackagedTable,
+    TableOrigin,
+    is_package,
+    packaged_table,
+    packaged_tables,
+)
+from analysis.data.parquet_tables import MAGIC, read_parquet
 from analysis.data.series import TractionSeries
 
 DEFAULT_TERRAIN = "table"
@@ -45,9 +61,11 @@ def load_tables(
     """Return the trials in `paths` by terrain, in the order of the files.
 
     Args:
-        paths: CSV files, one trial each, and npz files, any number of trials each.
+        paths: CSV and Parquet files, one trial each; npz files, any number of trials
+            each; folders of `traction export`, of which every whole trial is read.
         columns: name of each column of the analysis in a CSV; by default its own.
-        terrain: terrain of every CSV; by default "table". An npz names its own.
+        terrain: terrain of every CSV; by default that of the data package it lies in,
+            or "table". An npz names its own.
         stones: size of the stones by terrain: "small", "big" or "none"; where it is
             not given, see `analysis.data.terrain_kinds.terrain_kind`.
         units: unit of each column where its header gives none, e.g. {"v_t": "mm/s"};
@@ -58,9 +76,7 @@ def load_tables(
         SettingsError: a file that is missing, too large, or not what it should be.
     """
     columns = {name: name for name in COLUMNS} | dict(columns or {})
-    form = _TableForm(
-        columns, terrain or DEFAULT_TERRAIN, stones or {}, units or {}, rate
-    )
+    form = _TableForm(columns, terrain, stones or {}, units or {}, rate)
     trials: dict[str, list[TractionSeries]] = {}
     for path in paths:
         for series in _load(path, form):
@@ -76,20 +92,20 @@ class _TableForm:
 
     Attributes:
         columns: name of each column of the analysis in a CSV.
-        terrain: terrain of every CSV.
+        terrain: terrain of every CSV; None = as its package says.
         stones: size of the stones by terrain, where it is given.
         units: unit by column, where it is given.
         rate: rows of a CSV per second, where it has no time [Hz].
     """
 
     columns: Mapping[str, str]
-    terrain: str
+    terrain: str | None
     stones: Mapping[str, str]
     units: Mapping[str, str]
     rate: float | None
 
-    def series(self, terrain: str, name: str, table: CsvTable) -> TractionSeries:
-        """Return a table as a trial.
+    def series(self, name: str, table: CsvTable, origin: TableOrigin) -> TractionSeries:
+        """Return a table as a trial of its terrain.
 
         Raises:
             SettingsError: a unit is not known or is stated otherwise, or the rows make
@@ -103,19 +119,39 @@ class _TableForm:
             factors = np.array([factor(*unit) for unit in units])
         except SettingsError as error:
             raise SettingsError(f"{name}: {error.message}", hint=error.hint) from error
+        terrain = self.terrain or origin.terrain or DEFAULT_TERRAIN
         return TractionSeries(
             *(terrain, name, *(table.rows * factors).T),
-            stones=self.stones.get(terrain, ""),
+            stones=self.stones.get(terrain, origin.stones),
+            incline_deg=origin.incline_deg,
+            stamped_lag=origin.force_age,
             is_prepared=table.is_prepared,
+            is_simulated=origin.simulated,
         )
 
 
 def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
+    if is_package(path):
+        return _load_package(path, form)
+    start = _first_bytes(path)
+    if start[:2] == b"PK":
+        if form.rate is not None:
+            raise refusal(path, "has a time of its own", "Leave --rate out.")
+        return _load_npz(path, replace(form, terrain=None))
+    packaged = packaged_table(path)
+    if packaged is None:
+        return [_load_table(path, form, None)]
+    packaged.check()
+    return [_load_table(path, form, packaged.origin)]
+
+
+def _first_bytes(path: Path) -> bytes:
+    """Return how a file begins that may be read; refuse every other one."""
     try:
         status = path.stat()
         size = status.st_size
-        if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode)):
-            raise refusal(path, "it is no regular file", "Give CSV or npz files.")
+        if not stat.S_ISREG(status.st_mode):
+            raise refusal(path, "it is no regular file", "Give tables of trials.")
         with path.open("rb") as file:
             start = file.read(4)
     except OSError as error:
@@ -125,12 +161,60 @@ def _load(path: Path, form: _TableForm) -> list[TractionSeries]:
     if size == 0:
         raise refusal(path, "the file is empty", "Check that it was copied whole.")
     _check_size(path, size)
-    if start[:2] == b"PK":
-        if form.rate is not None:
-            raise refusal(path, "has a time of its own", "Leave --rate out.")
-        return _load_npz(path, form)
-    table = load_csv(path, form.columns, form.rate)
-    return [form.series(form.terrain, path.name, table)]
+    return start
+
+
+def _load_package(path: Path, form: _TableForm) -> list[TractionSeries]:
+    """Return every whole trial of a data package."""
+    tables = [t for t in packaged_tables(path) if t.origin.table == "trial"]
+    if not tables:
+        raise refusal(path, "no trials in it", "Give a folder of traction export.")
+    own = replace(form, terrain=None)  # every trial of a package names its terrain
+    return [_load_packaged(table, own) for table in tables]
+
+
+def _load_packaged(table: PackagedTable, form: _TableForm) -> TractionSeries:
+    _first_bytes(table.path)
+    table.check()
+    return _load_table(table.path, form, table.origin)
+
+
+def _load_table(
+    path: Path, form: _TableForm, origin: TableOrigin | None
+) -> TractionSeries:
+    """Return the trial in a CSV or Parquet file."""
+    with path.open("rb") as file:
+        is_parquet = file.read(4) == MAGIC
+    if is_parquet:
+        read = _load_parquet(path, form)
+        table, origin = read.table, origin or read.origin
+    else:
+        table = load_csv(path, form.columns, form.rate)
+    known = origin or TableOrigin(table="trial")
+    return form.series(known.name if known.session else path.name, table, known)
+
+
+class _ParquetTrial(NamedTuple):
+    """A Parquet table, and what it says of itself."""
+
+    table: CsvTable
+    origin: TableOrigin | None
+
+
+def _load_parquet(path: Path, form: _TableForm) -> _ParquetTrial:
+    if form.rate is not None:
+        raise refusal(path, "has a time of its own", "Leave --rate out.")
+    file = read_parquet(path, [form.columns[name] for name in COLUMNS])
+    missing = [c for c in form.columns.values() if c not in file.columns]
+    if missing:
+        raise refusal(
+            path,
+            f"no column {', '.join(missing)}; it has {', '.join(file.names)[:300]}",
+            "Name them: --columns t=...,v_t=...,F_n=...,F_t=...",
+        )
+    rows = np.column_stack([file.columns[form.columns[name]] for name in COLUMNS])
+    units = {name: file.units[form.columns[name]] for name in COLUMNS}
+    return _ParquetTrial(CsvTable(rows, units, PREPARED in file.names), file.origin)
 
 
 def _check_size(path: Path, size: int) -> None:
@@ -184,4 +268,5 @@ def _from_array(
             _FORM,
         )
     table = CsvTable(np.asarray(array, dtype=np.float64), {})
-    return form.series(key.rpartition("/")[0], f"{path.name}:{key}", table)
+    origin = TableOrigin(table="trial", terrain=key.rpartition("/")[0])
+    return form.series(f"{path.name}:{key}", table, origin)

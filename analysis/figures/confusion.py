@@ -138,7 +138,7 @@ def _spec(level: str, key: str, title: str) -> FigureSpec:
 
 
 FIGURES = (
-    _spec("terrain", "confusion_terrains", "Telling terrains apart: each terrain"),
-    _spec("stones", "confusion_stones", "Telling terrains apart: size of stones"),
-    _spec("surface", "confusion_surface", "Telling terrains apart: flat or rocky"),
+    _spec("terrain", "confusion_terrains", "Terrain classification: each terrain"),
+    _spec("stones", "confusion_stones", "Terrain classification: size of stones"),
+    _spec("surface", "confusion_surface", "Terrain classification: flat or rocky"),
 )

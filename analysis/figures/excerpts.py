@@ -1,11 +1,22 @@
 """Figure 4: force and velocity over time, and how slips are marked in any figure."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from analysis.data import PreparedTrial, find_slips
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import TimeWindow, time_windows
 from analysis.figures.spec import FigureSpec
-from analysis.figures.style import FORCE_LABEL, Axes, Figure, new_figure, plain
+from analysis.figures.style import (
+    FORCE_LABEL,
+    Axes,
+    Figure,
+    mark_simulated,
+    new_figure,
+    plain,
+    styled,
+)
 from analysis.findings import StudyResults
 
 
@@ -18,12 +29,46 @@ def draw_excerpts(results: StudyResults) -> Figure | None:
     axes = figure.subplots(2, len(chosen), sharex=True, sharey="row", squeeze=False)
     for column, window in enumerate(chosen):
         _draw_window(axes[0, column], axes[1, column], window)
-    axes[0, 0].set_ylabel(FORCE_LABEL)
-    axes[1, 0].set_ylabel("velocity $v_t$ [m/s]")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
+        axes[0, column].set_title(
+            f"{plain(window.title)}, trial {window.trial}", loc="left"
+        )
+    _label(figure, axes[0, 0], axes[1, 0])
+    return figure
+
+
+def plot_trial(trial: PreparedTrial, *, is_simulated: bool) -> Figure:
+    """Return F_t and v_t of a whole trial over time, drawn as Fig. 4, slips marked."""
+    smooth = trial.smooth
+    start = float(smooth.t[0])
+    whole = TimeWindow(
+        title=trial.terrain,
+        terrain=trial.terrain,
+        trial=1,
+        t=smooth.t - start,
+        v_t=smooth.v_t,
+        F_t=smooth.F_t,
+        slips=tuple(
+            replace(slip, onset=slip.onset - start, end=slip.end - start)
+            for slip in find_slips(smooth)
+        ),
+    )
+    with styled():
+        figure = new_figure(3.6)
+        above, below = figure.subplots(2, 1, sharex=True)
+        _draw_window(above, below, whole)
+        above.set_title(plain(f"{trial.name} on {trial.terrain}"), loc="left")
+        _label(figure, above, below)
+        if is_simulated:
+            mark_simulated(figure)
+    return figure
+
+
+def _label(figure: Figure, above: Axes, below: Axes) -> None:
+    above.set_ylabel(FORCE_LABEL)
+    below.set_ylabel("velocity $v_t$ [m/s]")
+    handles, labels = above.get_legend_handles_labels()
     if handles:
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
-    return figure
 
 
 def caption_excerpts(results: StudyResults) -> str:
@@ -53,7 +98,6 @@ def _draw_window(above: Axes, below: Axes, window: TimeWindow) -> None:
     below.plot(window.t, window.v_t, color="#D55E00", lw=0.9)
     below.axhline(0.0, color="#808080", lw=0.6)
     below.set_xlabel("time [s]")
-    above.set_title(f"{plain(window.title)}, trial {window.trial}", loc="left")
 
 
 def _describe_window(window: TimeWindow) -> str:

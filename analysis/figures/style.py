@@ -105,9 +105,34 @@ def styled() -> Iterator[None]:
         yield
 
 
+class NotebookFigure(Figure):
+    """A figure that a notebook shows as it is, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        png = io.BytesIO()
+        FigureCanvasAgg(self).print_png(png)
+        return png.getvalue()
+
+
 def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure of so many inches, by default as wide as both columns."""
-    return Figure(figsize=(width, height), layout="constrained")
+    return NotebookFigure(figsize=(width, height), layout="constrained")
+
+
+def mark_simulated(figure: Figure) -> None:
+    """Write SIMULATED across a figure."""
+    figure.text(
+        0.5,
+        0.5,
+        "SIMULATED",
+        ha="center",
+        va="center",
+        rotation=20,
+        fontsize=_MARK * figure.get_figwidth(),
+        color="#808080",
+        alpha=0.25,  # not bold: another font would have to be embedded
+        zorder=100,
+    )
 
 
 def panel_grid(
@@ -148,18 +173,7 @@ def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
 def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
     """Return the finished figure as files, watermarked if simulated."""
     if is_simulated:
-        figure.text(
-            0.5,
-            0.5,
-            "SIMULATED",
-            ha="center",
-            va="center",
-            rotation=20,
-            fontsize=_MARK * figure.get_figwidth(),
-            color="#808080",
-            alpha=0.25,  # not bold: another font would have to be embedded
-            zorder=100,
-        )
+        mark_simulated(figure)
     png, pdf = io.BytesIO(), io.BytesIO()
     with warnings.catch_warnings():
         # a terrain may be named in a script the font does not have

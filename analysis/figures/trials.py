@@ -1,8 +1,10 @@
 """The trials themselves: side by side, from first to last, and force over way."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
-from analysis.data import Array, Smoothed
+from analysis.data import Array, PreparedTrial, Smoothed, kind_title
 from analysis.figures.excerpts import shade_slip
 from analysis.figures.selection import representatives
 from analysis.figures.spec import FigureSpec
@@ -12,9 +14,11 @@ from analysis.figures.style import (
     WIDTH,
     Axes,
     Figure,
+    mark_simulated,
     new_figure,
     panel_grid,
     plain,
+    styled,
     terrain_colours,
 )
 from analysis.findings import MEAN_FORCE, StudyResults, Trend
@@ -27,24 +31,55 @@ _GAP = 0.08  # of a cell between two trials
 
 def draw_trials(results: StudyResults) -> Figure | None:
     """Return small multiples: F_t over the way of every trial, a row per terrain."""
-    terrains = list(results.study.terrains.values())
-    figure = new_figure(0.95 * len(terrains) + 0.7)
-    axes = figure.subplots(len(terrains), 1, sharex=True, sharey=True, squeeze=False)
-    most = min(max(len(result.trials) for result in terrains), _MOST_TRIALS)
-    colours = terrain_colours(results.study.kinds)
-    for ax, result in zip(axes[:, 0], terrains, strict=True):
-        for k, trial in enumerate(result.trials[:most]):
+    terrains = results.study.terrains
+    trials = {name: result.trials for name, result in terrains.items()}
+    titles = {name: result.title for name, result in terrains.items()}
+    return _side_by_side(trials, titles, results.study.kinds)
+
+
+def plot_trials(
+    trials: Mapping[str, Sequence[PreparedTrial]],
+    kinds: Mapping[str, str],
+    *,
+    is_simulated: bool,
+) -> Figure:
+    """Return F_t over the way of every trial side by side, as the report draws it.
+
+    Args:
+        trials: by terrain, at least one.
+        kinds: "small", "big" or "flat" by terrain.
+        is_simulated: marks the figure.
+    """
+    titles = {name: f"{name}: {kind_title(kinds[name])}" for name in trials}
+    with styled():
+        figure = _side_by_side(trials, titles, kinds)
+        if is_simulated:
+            mark_simulated(figure)
+    return figure
+
+
+def _side_by_side(
+    trials: Mapping[str, Sequence[PreparedTrial]],
+    titles: Mapping[str, str],
+    kinds: Mapping[str, str],
+) -> Figure:
+    figure = new_figure(0.95 * len(trials) + 0.7)
+    axes = figure.subplots(len(trials), 1, sharex=True, sharey=True, squeeze=False)
+    most = min(max(map(len, trials.values())), _MOST_TRIALS)
+    colours = terrain_colours(kinds)
+    for ax, (terrain, group) in zip(axes[:, 0], trials.items(), strict=True):
+        for k, trial in enumerate(group[:most]):
             way, force = _thinned(trial.smooth)
             reach = max(float(way.max()), 1e-9)
             ax.plot(
                 k + 0.5 + _GAP + (1.0 - 2.0 * _GAP) * np.clip(way / reach, 0.0, 1.0),
                 force,
                 lw=0.6,
-                color=colours[result.terrain],
+                color=colours[terrain],
             )
-        ax.set_title(plain(result.title), loc="left", pad=2.0)
+        ax.set_title(plain(titles[terrain]), loc="left", pad=2.0)
         ax.grid(visible=False, axis="x")
-    lowest, highest = force_limits(terrains)
+    lowest, highest = force_limits([t for group in trials.values() for t in group])
     axes[0, 0].set_ylim(lowest, highest)
     axes[0, 0].set_xlim(0.5, most + 0.5)
     axes[-1, 0].set_xticks(range(1, most + 1))
@@ -160,13 +195,9 @@ def most_slips(result: TerrainResult) -> int:
     return counts.index(max(counts))
 
 
-def force_limits(terrains: list[TerrainResult]) -> tuple[float, float]:
+def force_limits(trials: Sequence[PreparedTrial]) -> tuple[float, float]:
     """Return limits of F_t [N] that hold all but a few spikes of all trials."""
-    ends = [
-        np.quantile(trial.smooth.F_t, (0.001, 0.999))
-        for result in terrains
-        for trial in result.trials
-    ]
+    ends = [np.quantile(trial.smooth.F_t, (0.001, 0.999)) for trial in trials]
     low, high = min(float(e[0]) for e in ends), max(float(e[1]) for e in ends)
     margin = 0.04 * (high - low) or 1.0
     return low - margin, high + margin

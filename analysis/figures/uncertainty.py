@@ -97,7 +97,7 @@ def draw_noise(results: StudyResults) -> Figure | None:
     )
     for k, summary in enumerate(results.noise):
         chosen = [f"{name} {n}" for name, n in summary.counts.items() if n]
-        numbers = f"{summary.before:.3f} to {summary.after:.3f} log N"
+        numbers = f"{summary.before:.3f} to {summary.after:.3f} nat"
         ax.annotate(
             "\n".join([", ".join(chosen), numbers]),
             (1.0, k),
@@ -109,7 +109,7 @@ def draw_noise(results: StudyResults) -> Figure | None:
         )
     ax.set_ylim(count - 0.5, -0.5)
     ax.set_yticks(range(count), [plain(summary.terrain) for summary in results.noise])
-    ax.set_xlabel("gain in log density by chosen noise [log N]")
+    ax.set_xlabel("gain in log density by chosen noise [nat]")
     ax.grid(visible=False, axis="y")
     return figure
 

@@ -139,8 +139,8 @@ def plain_findings(results: StudyResults) -> dict[str, Any]:
         "rig": [trial.numbers() for trial in results.rig],
         "paper": [_claim(claim) for claim in results.claims],
         "units": {
-            "nlpd_constant": "log N",
-            "nlpd_chosen": "log N",
+            "nlpd_constant": "nat",
+            "nlpd_chosen": "nat",
             "trend means, slope, slope_error, spread": TREND_UNITS,
             "residual quantiles, bias, sd": "N",
             "autocorrelation_samples": "kept samples",
@@ -159,8 +159,8 @@ def findings_rows(results: StudyResults) -> list[CsvRow]:
     rows: list[CsvRow] = []
     for s in results.noise:
         rows += [
-            CsvRow(s.terrain, "gp_se", "", "nlpd", s.before, "log N"),
-            CsvRow(s.terrain, "gp_se_noise", "", "nlpd", s.after, "log N"),
+            CsvRow(s.terrain, "gp_se", "", "nlpd", s.before, "nat"),
+            CsvRow(s.terrain, "gp_se_noise", "", "nlpd", s.after, "nat"),
         ]
     for name, trends in results.trends.items():
         for key, trend in trends.items():

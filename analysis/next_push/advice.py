@@ -60,6 +60,13 @@ def advise(records: Sequence[PushRecord], kind: str, target: str) -> Advice | No
     """
     if not records:
         return None
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):  # the cores are the arm's, and more threads lose time
+        return _advise(records, kind, target)
+
+
+def _advise(records: Sequence[PushRecord], kind: str, target: str) -> Advice | None:
     pushes = expected_by_aim(records)
     try:
         knowledge = Knowledge.of(records, kind)

@@ -95,11 +95,13 @@ def stopping_of(
     """
     if len(records) < _FEWEST:
         return None
-    try:
-        knowledge = Knowledge.of(records, kind)
-    except TractionError:
-        return None
-    return stopping_with(knowledge, target)
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):  # small matrices: more threads lose time
+        try:
+            return stopping_with(Knowledge.of(records, kind), target)
+        except TractionError:
+            return None
 
 
 def stopping_with(knowledge: Knowledge, target: str) -> Stopping:

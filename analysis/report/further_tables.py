@@ -23,7 +23,7 @@ from analysis.study import (
 _SHOWN = ("rmse", "nlpd", "crps", "coverage50", "coverage90", "coverage95", "variance")
 _HEADS = (
     "RMSE [N]",
-    "NLPD [log N]",
+    "NLPD [nat]",
     "CRPS [N]",
     "inside 50% band",
     "90%",
@@ -253,7 +253,7 @@ def slope_cell(trend: Trend) -> str:
     return f"{trend.slope:+.3f} ± {trend.slope_error:.3f}"
 
 
-_MEASURES = (("mae", "N"), ("nlpd", "log N"))
+_MEASURES = (("mae", "N"), ("nlpd", "nat"))
 
 
 def _cells(result: TerrainResult, model: str) -> list[str]:

@@ -65,8 +65,8 @@ def family_table(study: Study) -> ReportTable:
             "family by folds",
             "with a shape on top",
             "rows clipped",
-            "NLPD [log N]",
-            "gain over chosen noise [log N]",
+            "NLPD [nat]",
+            "gain over chosen noise [nat]",
         ),
         rows=rows,
         note="A Gaussian process with an effect of the trial. Normal noise, noise that "
@@ -137,7 +137,7 @@ def relatives_table(study: Study) -> ReportTable:
         header=(
             "terrain",
             "relatives",
-            "NLPD of 3 trials and relatives [log N]",
+            "NLPD of 3 trials and relatives [nat]",
             "of 3 trials alone",
             "of all its other trials",
             "used",

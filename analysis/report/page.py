@@ -5,8 +5,8 @@ The one door to jinja2.
 
 import base64
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,14 +28,19 @@ from analysis.figures import (
     uncertainty,
 )
 from analysis.findings import (
-    RigTrial,
     StudyResults,
     compute_results,
     findings_rows,
     plain_findings,
 )
+from analysis.foresight import ForesightModel
 from analysis.report.further_tables import beyond_tables
-from analysis.report.page_model import PageSection, ReportFigure, ReportTable
+from analysis.report.page_model import (
+    PageSection,
+    ReportContext,
+    ReportFigure,
+    ReportTable,
+)
 from analysis.report.paper_tables import (
     parameters,
     statements,
@@ -46,6 +51,8 @@ from analysis.report.paper_tables import (
 )
 from analysis.report.rig_tables import choices, rig_tables
 from analysis.study import (
+    GP_SE,
+    GP_SE_TRIAL,
     Study,
     available_cores,
     run_tasks,
@@ -54,6 +61,7 @@ from analysis.study import (
     to_plain,
     write_atomic,
 )
+from analysis.terrains import database_of
 
 _FAMILIES = (
     *(excerpts, curves, surfaces, errors, uncertainty),
@@ -151,45 +159,11 @@ _NO_RIG = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class ReportContext:
-    """What a report shows beyond the study itself.
-
-    Attributes:
-        title: heading of the page.
-        subtitle: line below it.
-        is_simulated: the trials were simulated; marks the page.
-        is_foreign: the tables come from elsewhere, not from this rig.
-        generated_utc: when the report was made, as text.
-        tables: further tables, each for its section.
-        warnings: further warnings, shown first.
-        rig: health of the rig by trial.
-        further_numbers: further plain values for fits.json, by name.
-    """
-
-    title: str
-    subtitle: str
-    is_simulated: bool
-    is_foreign: bool
-    generated_utc: str
-    tables: Sequence[ReportTable] = field(default=())
-    warnings: Sequence[str] = field(default=())
-    rig: Sequence[RigTrial] = field(default=())
-    further_numbers: Mapping[str, Any] = field(default_factory=dict)
-
-    @property
-    def kind(self) -> str:
-        """SIMULATED, FOREIGN or LIVE."""
-        if self.is_simulated:
-            return "SIMULATED"
-        return "FOREIGN" if self.is_foreign else "LIVE"
-
-
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     """Write the report of a study and return the path of its page.
 
-    Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, *.pdf;
-    each file is replaced whole, the page last.
+    Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, *.pdf,
+    and terrains.json with foresight; each file is replaced whole, the page last.
 
     Raises:
         SettingsError: the folder cannot be written.
@@ -199,6 +173,9 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
+    if context.foresight is not None:
+        text = _database(study, results, context.generated_utc, context.foresight)
+        write_atomic(out_dir / "terrains.json", text.encode())
     shown = report_figures(results, _processes(study))
     for figure in shown:
         picture = figure.picture
@@ -207,6 +184,21 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())
     return page
+
+
+def _database(
+    study: Study, results: StudyResults, made_utc: str, foresight: ForesightModel
+) -> str:
+    """Return the terrain database of a study, with foresight."""
+    models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in study.options.fit.models)
+    fit = replace(study.options.fit, models=models, draws=0)
+    return database_of(
+        replace(study, options=replace(study.options, fit=fit)),
+        results.identification,
+        made_utc,
+        study.options.n_jobs,
+        foresight=foresight,
+    )
 
 
 def _processes(study: Study) -> int:

@@ -1,9 +1,12 @@
 """What stands on the page of a report: tables and figures, each in its section."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from analysis.figures import Picture, ReportSection
+from analysis.findings import RigTrial
+from analysis.foresight import ForesightModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,3 +64,39 @@ class PageSection:
     sentences: Sequence[str]
     tables: Sequence[ReportTable]
     figures: Sequence[ReportFigure]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportContext:
+    """What a report shows beyond the study itself.
+
+    Attributes:
+        title: heading of the page.
+        subtitle: line below it.
+        is_simulated: the trials were simulated; marks the page.
+        is_foreign: the tables come from elsewhere, not from this rig.
+        generated_utc: when the report was made, as text.
+        tables: further tables, each for its section.
+        warnings: further warnings, shown first.
+        rig: health of the rig by trial.
+        further_numbers: further plain values for fits.json, by name.
+        foresight: for a terrain database beside the report; None = none is written.
+    """
+
+    title: str
+    subtitle: str
+    is_simulated: bool
+    is_foreign: bool
+    generated_utc: str
+    tables: Sequence[ReportTable] = field(default=())
+    warnings: Sequence[str] = field(default=())
+    rig: Sequence[RigTrial] = field(default=())
+    further_numbers: Mapping[str, Any] = field(default_factory=dict)
+    foresight: ForesightModel | None = None
+
+    @property
+    def kind(self) -> str:
+        """SIMULATED, FOREIGN or LIVE."""
+        if self.is_simulated:
+            return "SIMULATED"
+        return "FOREIGN" if self.is_foreign else "LIVE"

@@ -178,7 +178,7 @@ def choices(study: Study, *, is_foreign: bool) -> ReportTable:
         ["across terrains", "the model of fold k tested on trial k, wrapping round"],
         ["recorded rate", _rates(study)],
     ]
-    note = "The tables come from elsewhere." if is_foreign else ""
+    note = "External data: not recorded by this rig." if is_foreign else ""
     return ReportTable("Choices", ("what", "how"), rows, note)
 
 

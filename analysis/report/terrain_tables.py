@@ -84,7 +84,7 @@ def recognition_tables(results: StudyResults) -> list[ReportTable]:
     names = ("each terrain", "size of stones", "flat or rocky")
     return [
         ReportTable(
-            "Telling terrains apart",
+            "Terrain classification",
             (
                 "window",
                 *(f"by density: {name}" for name in names),

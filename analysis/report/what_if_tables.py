@@ -8,7 +8,7 @@ from analysis.report.page_model import ReportTable
 from analysis.report.what_if import StudyVariant
 from analysis.study import TITLES, PairedComparison, Study, compare, mean_of
 
-_MEASURES = (("mae", "N"), ("nlpd", "log N"))
+_MEASURES = (("mae", "N"), ("nlpd", "nat"))
 
 
 def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTable:

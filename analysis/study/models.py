@@ -5,7 +5,7 @@ noise is chosen per fold, and processes whose bands are those of a new trial.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -23,12 +23,7 @@ from analysis.gp import (
 from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
 from analysis.study.new_trial import EFFECTS, LEVEL, NewTrialModel, fit_new_trial
-from analysis.study.noise_selection import (
-    NoiseChoice,
-    NoiseFits,
-    TailedNoise,
-    choose_noise,
-)
+from analysis.study.noise_selection import NoiseChoice, TailedNoise, choose_noise
 from analysis.tustin import TustinBounds, TustinFit, TustinForm, fit_tustin
 
 TUSTIN = "tustin"
@@ -252,12 +247,10 @@ class ModelFitter:
     def gp_with_chosen_noise(self) -> GpModel:
         """Return a Gaussian process whose noise is chosen among the training trials."""
         training, options, subset = self.training, self.options, self.training.subset
-        fits = NoiseFits(
-            self.gp(SquaredExponential()).process,
-            fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise()),
-        )
-        choice = choose_noise(training, fits, options.gp_points, options.seed)
-        process = fits.constant if choice.chosen == "constant" else fits.changing
+        choice = choose_noise(training, options.gp_points, options.seed)
+        if choice.chosen == "constant":
+            return replace(self.gp(SquaredExponential()), choice=choice)
+        process = fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise())
         tails = (
             TailedNoise.of(process, training) if choice.chosen == "student" else None
         )

@@ -1,9 +1,8 @@
 """Which noise a terrain needs: constant, changing with the inputs, or heavy-tailed too.
 
 "student" is Student's t whose scale changes with the inputs like that of "loglinear".
-Chosen among the training trials only, by the log density of trials that were left out:
-the hyperparameters stay, the process is given rows of the others. The simplest wins
-unless another is clearly better.
+Chosen among the training trials only, by the log density of trials that were left out
+of an inner fit; the simplest wins unless another is clearly better.
 """
 
 from typing import Literal, NamedTuple
@@ -11,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from analysis.data import Array, SampleTable, TrainingSet
-from analysis.gp import GaussianProcess
+from analysis.gp import ConstantNoise, GaussianProcess, LogLinearNoise, fit_gp
 from analysis.study.metrics import Prediction, clearly_best, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]
@@ -78,26 +77,7 @@ class NoiseChoice(NamedTuple):
     nlpd: dict[str, float]
 
 
-class NoiseFits(NamedTuple):
-    """One process of the chosen rows under either noise.
-
-    Attributes:
-        constant: with constant noise.
-        changing: with noise that changes with the inputs.
-    """
-
-    constant: GaussianProcess
-    changing: GaussianProcess
-
-    def given(self, training: TrainingSet) -> "NoiseFits":
-        """Return both with their hyperparameters, given the chosen rows of others."""
-        subset = training.subset
-        return NoiseFits(*(fit.given(subset.inputs, subset.F_t) for fit in self))
-
-
-def choose_noise(
-    training: TrainingSet, fits: NoiseFits, points: int, seed: int
-) -> NoiseChoice:
+def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
     """Return the noise that predicts left-out training trials best.
 
     The trials are left out in up to three groups. Another noise than the constant one
@@ -105,18 +85,17 @@ def choose_noise(
 
     Args:
         training: the training trials; the trial a fold is tested on is not among them.
-        fits: of its chosen rows.
-        points: rows that a process is given in their place.
+        points: rows of an inner fit.
         seed: of the choice of those rows.
     """
     groups = min(_GROUPS, len(training.lengths))
     if groups < 2:
         return NoiseChoice("constant", {})
     nlpd = np.concatenate(
-        [_left_out(training, fits, group, (points, seed)) for group in range(groups)]
+        [_left_out(training, group, points, seed) for group in range(groups)]
     )
     averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
-    return NoiseChoice(NAMES[_simplest(nlpd)], averages)
+    return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
@@ -125,19 +104,8 @@ def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
     return Prediction(mean, np.sqrt(variance))
 
 
-def _simplest(nlpd: Array) -> int:
-    """Return the noise that no less simple one is clearly better than."""
-    best = 0
-    for k in range(1, len(NAMES)):
-        best = k if clearly_best(nlpd[:, [best, k]]) else best
-    return best
-
-
-def _left_out(
-    training: TrainingSet, fits: NoiseFits, group: int, draw: tuple[int, int]
-) -> Array:
+def _left_out(training: TrainingSet, group: int, points: int, seed: int) -> Array:
     """Return the NLPD of every trial of a group under every noise, (trials, 3)."""
-    points, seed = draw
     trial = training.trial_of()
     is_inner = trial % _GROUPS != group
     inner_rows = training.rows.take(np.flatnonzero(is_inner))
@@ -146,21 +114,27 @@ def _left_out(
     chosen = rng.choice(inner_rows.count, count, replace=False)
     lengths = tuple(n for k, n in enumerate(training.lengths) if k % _GROUPS != group)
     inner = TrainingSet(inner_rows, lengths, chosen)
-    others = fits.given(inner)
-    tails = TailedNoise.of(others.changing, inner)
+    subset = inner.subset
+    processes = (
+        fit_gp(subset.inputs, subset.F_t, None, ConstantNoise()),
+        fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise()),
+    )
+    tails = TailedNoise.of(processes[1], inner)
     return np.array(
         [
-            _nlpds(training.rows.take(np.flatnonzero(trial == k)), others, tails)
+            _nlpds(training.rows.take(np.flatnonzero(trial == k)), processes, tails)
             for k in range(group, len(training.lengths), _GROUPS)
         ]
     )
 
 
 def _nlpds(
-    rows: SampleTable, fits: NoiseFits, tails: TailedNoise | None
+    rows: SampleTable,
+    processes: tuple[GaussianProcess, GaussianProcess],
+    tails: TailedNoise | None,
 ) -> list[float]:
     """Return the NLPD of one trial under every noise; without tails a normal's."""
-    constant, changing = (predict_normal(process, rows) for process in fits)
+    constant, changing = (predict_normal(process, rows) for process in processes)
     tailed = changing if tails is None else tails.applied_to(changing)
     return [
         -float(np.mean(log_density(rows.F_t, prediction)))

@@ -3,6 +3,7 @@ from .evidence import Exclusion
 from .export import break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .known import KnownTerrain, TerrainDatabase
+from .parts import foresight_in
 from .table import SlipRisk, TractionEstimate, TractionEstimates
 from .verdict import Recognition, WindowEvidence, recognise
 
@@ -20,6 +21,7 @@ __all__ = [
     "WindowEvidence",
     "break_away_of",
     "database_of",
+    "foresight_in",
     "identify_study",
     "load",
     "recognise",

@@ -10,6 +10,7 @@ import numpy as np
 from acquisition import SettingsError, TractionError
 from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_break_away
 from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
+from analysis.foresight import ForesightModel
 from analysis.study import (
     GP_SE,
     GP_SE_TRIAL,
@@ -25,7 +26,12 @@ from analysis.study import (
 from analysis.terrains.database import to_text
 from analysis.terrains.identify import Identification
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
-from analysis.terrains.parts import BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART
+from analysis.terrains.parts import (
+    BREAK_AWAY_PART,
+    FORESIGHT_PART,
+    ROUGHNESS_PART,
+    SURFACES_PART,
+)
 from analysis.terrains.table import Table, rows_of
 
 POINTS = 32  # of each axis
@@ -89,6 +95,7 @@ def database_of(
     made_utc: str,
     workers: Workers | int | None = None,
     store: Store | None = None,
+    foresight: ForesightModel | None = None,
 ) -> str:
     """Return the text of a terrain database of every terrain of a study.
 
@@ -98,6 +105,7 @@ def database_of(
         made_utc: when.
         workers: where the models are fitted.
         store: results of earlier runs.
+        foresight: what was learnt from the same trials.
 
     Raises:
         SettingsError: no terrain has kept samples.
@@ -126,6 +134,8 @@ def database_of(
         if default in fitted and recogniser in fitted
     }
     of_all = _of_all(identification)
+    if foresight is not None:
+        of_all[FORESIGHT_PART] = foresight.to_dict()
     return to_text(TerrainDatabase(known, study.simulated, made_utc, of_all))
 
 

@@ -15,7 +15,7 @@ from acquisition import SettingsError
 from analysis.breakaway import BreakAwayModel, BreakAwayRisk
 from analysis.data import Array
 from analysis.study import Prediction
-from analysis.terrains.parts import Parts, break_away_in
+from analysis.terrains.parts import BREAK_AWAY_PART, Parts, break_away_in
 from analysis.terrains.table import SlipRisk, Table, TractionEstimate, TractionEstimates
 
 
@@ -94,6 +94,11 @@ class KnownTerrain:
             SettingsError: a value is negative or no finite number, or it is not known.
         """
         return self.from_rest.slip_risk(required, F_n)
+
+    @property
+    def has_from_rest(self) -> bool:
+        """Whether it is known what it gives before it slips."""
+        return BREAK_AWAY_PART in self.parts
 
     @property
     def from_rest(self) -> BreakAwayModel:

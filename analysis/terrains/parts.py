@@ -3,6 +3,7 @@
     of a terrain   break_away   its `BreakAwayModel`
                    roughness    {window: least feature `resid` of its own windows}
     of all         surfaces     the `SurfaceClassifier`
+                   foresight    the `ForesightModel`
 
 A part that this program does not know is kept as it is.
 """
@@ -13,9 +14,11 @@ from typing import Any
 
 from acquisition import SettingsError
 from analysis.breakaway import BreakAwayModel
+from analysis.foresight import ForesightModel
 from analysis.terrains.classifier import SurfaceClassifier
 
 BREAK_AWAY_PART, ROUGHNESS_PART, SURFACES_PART = "break_away", "roughness", "surfaces"
+FORESIGHT_PART = "foresight"
 Parts = Mapping[str, Any]
 
 
@@ -65,8 +68,19 @@ def surfaces_in(parts: Parts) -> SurfaceClassifier | None:
     return SurfaceClassifier.from_dict(parts[SURFACES_PART])
 
 
+def foresight_in(parts: Parts) -> ForesightModel | None:
+    """Return what foresight has learnt, None where it has not.
+
+    Databases of earlier versions have none.
+    """
+    if FORESIGHT_PART not in parts:
+        return None
+    return ForesightModel.from_dict(parts[FORESIGHT_PART])
+
+
 _READERS = {
     BREAK_AWAY_PART: lambda parts: break_away_in(parts, ""),
     ROUGHNESS_PART: roughness_in,
     SURFACES_PART: surfaces_in,
+    FORESIGHT_PART: foresight_in,
 }

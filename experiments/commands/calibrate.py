@@ -37,16 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fast", action="store_true", help="stepped time, only with --fake"
     )
-    parser.add_argument(
-        "--friction",
-        type=float,
-        default=FRICTION,
-        metavar="SHARE",
-        help="of the simulated joints: 1 = as identified on another arm (0.02)",
-    )
-    parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
-    )
+    add_simulated_arm(parser)
     parser.add_argument(
         "--operator-script", metavar="auto", help="who answers, only with --fake"
     )
@@ -230,7 +221,9 @@ def _place(what: str, settings: Settings, row: TerrainRow, *, is_fake: bool) -> 
     places = {"gravity": gravity_path, "friction": friction_path}
     place = places.get(what)
     path = place(settings) if place else settings.folder / names[what]
-    return path.with_name(f"{path.stem}.fake{path.suffix}") if is_fake else path
+    if not is_fake or path.stem.endswith(".fake"):
+        return path
+    return path.with_name(f"{path.stem}.fake{path.suffix}")
 
 
 def _check_arguments(args: argparse.Namespace) -> None:

@@ -58,11 +58,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the page and return the exit code."""
+    from acquisition import SettingsError
     from experiments.operator import GOOD, Console
     from experiments.rig import read_law_calibrations
     from experiments.settings import load_settings, origin_lines
 
     console = Console(color=not args.no_color)
+    if args.json and (args.explain or args.config_only or args.bus is not None):
+        raise SettingsError(
+            "--json is for the page, not for --explain, --config-only or --bus.",
+            hint="Leave one of them out.",
+        )
     if args.explain:
         return _explain(args.explain, console)
     settings = load_settings(args.config)

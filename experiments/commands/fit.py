@@ -1,9 +1,17 @@
-"""traction fit: the analysis and the report for tables from elsewhere."""
+"""traction fit: the analysis and the report for external data."""
+
+from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.arguments import add_analysis, add_seed, number_within
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from analysis.data import TractionSeries
 
 EXAMPLES = """\
   traction fit trials.npz --out fit
@@ -13,7 +21,11 @@ EXAMPLES = """\
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `fit`."""
     parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="npz, or CSV per trial"
+        "files",
+        nargs="+",
+        type=Path,
+        metavar="FILE",
+        help="npz, a CSV or Parquet file per trial, or a folder of traction export",
     )
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help="folder of the report"
@@ -64,18 +76,19 @@ def run(args: argparse.Namespace) -> int:
     trials = load_tables(args.files, columns, args.terrain, stones, units, args.rate)
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
+    is_simulated = _is_simulated(trials)
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=REPORTED)
     options = StudyOptions(prepare=choices.prepare, fit=fit)
     with fitting(console) as progress:
-        study = run_study(trials, options, simulated=False, progress=progress)
+        study = run_study(trials, options, is_simulated, progress)
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     context = ReportContext(
         title="Traction of foreign tables",
         subtitle=f"{count} trials from {len(args.files)} files",
-        is_simulated=False,
+        is_simulated=study.simulated,
         is_foreign=True,
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[side_by_side(choice, study, other) for choice, other in others],
@@ -88,3 +101,16 @@ def run(args: argparse.Namespace) -> int:
         console.say(f"▲ {warning}")
     console.say(str(page))
     return 0
+
+
+def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:
+    """Return whether the trials are simulated ones; a mixture is refused."""
+    from acquisition import SettingsError
+
+    kinds = {trial.is_simulated for series in trials.values() for trial in series}
+    if len(kinds) > 1:
+        raise SettingsError(
+            "Simulated and recorded trials are mixed. Reports do not mix.",
+            hint="Give the tables of one kind only.",
+        )
+    return True in kinds

@@ -27,32 +27,58 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="files, patterns such as 'T*.partial', or folders with .partial files",
     )
+    parser.add_argument("--json", action="store_true", help="as JSON")
 
 
 def run(args: argparse.Namespace) -> int:
     """Recover every file and return the exit code."""
+    import json
+
     from acquisition import TrialFileError
     from acquisition.trial_file import recover_file
-    from experiments.operator import Console
+    from experiments.operator import Console, PageRecorder
 
-    console = Console(color=not args.no_color)
+    console = PageRecorder() if args.json else Console(color=not args.no_color)
     sources = find_sources(args.files)
     if not sources:
         console.say(f"No {_PARTIAL} there: nothing to recover.")
-    failed = 0
+    results: list[dict[str, object]] = []
     for source in sources:
         try:
             recovery = recover_file(source)
         except TrialFileError as error:
-            failed += 1
             console.problem(f"✘ {error} The file is untouched.")
+            results.append({"source": str(source), "state": "failed"})
+            results[-1]["reason"] = error.reason
         else:
             _tell(recovery, console)
+            results.append(_plain(recovery))
+    failed = sum(result["state"] == "failed" for result in results)
     if len(sources) > 1:
         console.say(
             f"{len(sources)} files: {len(sources) - failed} done, {failed} not."
         )
+    if args.json:
+        Console(color=False).say(json.dumps(results, indent=1, ensure_ascii=False))
     return _NOTHING_SAVED if failed else 0
+
+
+def _plain(recovery: Recovery) -> dict[str, object]:
+    """Return what became of a file, for a program."""
+    is_whole = recovery.path == recovery.source
+    saved = "saved" if recovery.is_new else "saved before"
+    return {
+        "source": str(recovery.source),
+        "state": "whole" if is_whole else saved,
+        "reason": recovery.reason,
+        "path": str(recovery.path),
+        "cycles": recovery.verified.cycles,
+        "seconds": recovery.verified.duration,
+        "messages": recovery.messages,
+        "bytes_dropped": recovery.bytes_dropped,
+        "seconds_dropped": recovery.seconds_dropped,
+        "missing": missing_text(recovery),
+    }
 
 
 def find_sources(names: list[str]) -> list[Path]:

@@ -17,25 +17,22 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction rehearse --seed 2                all terrains, ten trials each, 43 bands
-  traction rehearse --friction 1            the joints of another arm; not gated"""
+  traction rehearse --twin lab              the arm of lab/rig.toml; not gated"""
 
 _FAILED = 6
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `rehearse`."""
-    parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
-    )
+    add_simulated_arm(parser)
     parser.add_argument(
         "--trials", type=int, default=10, metavar="N", help="of each terrain (10)"
     )
     parser.add_argument(
-        "--friction",
-        type=float,
-        default=FRICTION,
-        metavar="SHARE",
-        help="of the joints: 1 = as identified on another arm (0.02)",
+        "--twin",
+        type=Path,
+        metavar="DIR",
+        help="rehearse on the rig whose rig.toml and calibrations are there",
     )
     parser.add_argument(
         "--jobs", type=int, metavar="N", help="processes at a time (one per core)"
@@ -47,15 +44,18 @@ def run(args: argparse.Namespace) -> int:
     import json
 
     from experiments.operator import Console
+    from experiments.rig import twin_words
     from experiments.session import write_text
     from experiments.settings import load_settings
     from experiments.tools import AcceptancePlan, analyse, as_plain, record_study
 
     _check_arguments(args)
-    settings = load_settings(args.config)
+    config = args.config if args.twin is None else args.twin / "rig.toml"
+    settings = load_settings(config)
+    calibrated = [] if args.twin is None else twin_words(settings)
     rows = settings.matrix.terrains
     plan = AcceptancePlan(
-        config=args.config,
+        config=config,
         terrains=tuple(row.name for row in rows),
         plates=tuple(row.name for row in rows if row.stones == "none"),
         travel=min(row.travel for row in rows),
@@ -63,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         friction=args.friction,
         jobs=args.jobs,
+        is_twin=args.twin is not None,
     )
     console = Console(color=not args.no_color)
     folder = _free_folder(Path(args.data), args.seed)
@@ -70,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
         f"traction rehearse        SIMULATED · {len(rows)} terrains x {plan.trials} "
         f"trials · seed {plan.seed} · {folder}"
     )
+    for line in calibrated:
+        console.say(line)
     record_study(plan, folder, console.say)
     results = analyse(plan, folder)
     write_text(folder / "bands.json", json.dumps(as_plain(plan, results), indent=1))
@@ -96,8 +99,9 @@ def _print(
     console.say(f"{met}. {folder / 'bands.json'}")
     if not failed:
         return 0
-    if plan.friction != FRICTION:
-        console.say(f"Outside: {', '.join(failed)}; not gated at this friction.")
+    if plan.friction != FRICTION or plan.is_twin:
+        of = "for a twin" if plan.is_twin else "at this friction"
+        console.say(f"Outside: {', '.join(failed)}; not gated {of}.")
         return 0
     console.problem(f"Outside their bands: {', '.join(failed)}.")
     return _FAILED
@@ -115,6 +119,11 @@ def _free_folder(data: Path, seed: int) -> Path:
 def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition import SettingsError
 
+    if args.twin is not None and args.config is not None:
+        raise SettingsError(
+            "--twin and --config each name a rig.toml.",
+            hint="Leave --config out: the one in the folder is used.",
+        )
     for name, value, least, most in (
         ("seed", args.seed, 0, 10**9),
         ("trials", args.trials, 1, 99),

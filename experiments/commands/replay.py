@@ -38,6 +38,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a bus log of --can-log, or of candump -L",
     )
+    parser.add_argument(
+        "--foresight",
+        type=Path,
+        metavar="FILE",
+        help="compute what was foreseen anew with this terrain database, and compare",
+    )
     add_allow_missing(parser)
     parser.add_argument("--summary", action="store_true", help="only the sums")
 
@@ -47,6 +53,11 @@ def run(args: argparse.Namespace) -> int:
     from acquisition import SettingsError
 
     is_trial = args.session is not None and args.trial is not None
+    if args.foresight is not None and not is_trial:
+        raise SettingsError(
+            "--foresight needs a session and a trial.",
+            hint="For example: traction replay S012 T04 --foresight FILE",
+        )
     if is_trial == (args.can is not None) or (args.session and not args.trial):
         raise SettingsError(
             "Either a session and a trial are shown, or a bus log.",
@@ -72,8 +83,30 @@ def _show_trial(args: argparse.Namespace) -> int:
     deviations = compare_trial(folder, path)
     if deviations and not args.allow_missing:
         raise kept_data_error(deviations)
+    if args.foresight is not None:
+        return _prove_foresight(path, args.foresight, console)
     play(path, args.speed, SystemClock(), console)
     return 0
+
+
+def _prove_foresight(path: Path, database: Path, console: Console) -> int:
+    """Say whether the record gives what was foreseen; 0 if bit for bit, 1 if not."""
+    from experiments.report import replay_foresight
+    from experiments.rig import read_foresight
+
+    replay = replay_foresight(path, read_foresight(database))
+    console.say(
+        f"{path.stem}: {replay.equal} of {replay.recorded} recorded states equal bit "
+        f"for bit, {replay.computed} computed."
+    )
+    if not replay.is_same_source:
+        console.problem("It was foreseen with other models than those of the file.")
+    if replay.first_other is not None:
+        console.problem(f"The first other state is that of cycle {replay.first_other}.")
+    elif replay.is_same_source and not replay.is_proved:
+        late = replay.computed - replay.recorded
+        console.problem(f"The last {late} states are missing from the record.")
+    return 0 if replay.is_proved else 1
 
 
 def _show_log(args: argparse.Namespace) -> int:

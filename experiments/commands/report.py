@@ -21,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
     )
+    parser.add_argument("--json", action="store_true", help="what was made, as JSON")
     add_allow_missing(parser)
     add_seed(parser)
     add_analysis(parser)
@@ -28,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
-    from experiments.operator import Console
+    from experiments.operator import Console, PageRecorder
     from experiments.report import (
         ReportRequest,
         analysis_choices,
@@ -39,12 +40,40 @@ def run(args: argparse.Namespace) -> int:
     from experiments.settings import load_settings
 
     choices = analysis_choices(args)
-    console = Console(color=not args.no_color)
+    console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
     wanted = ReportRequest(order, args.seed, args.scheduler, choices, missing)
     page = report_sessions(sessions, data, wanted, console)
-    console.say(str(page))
+    if args.json:
+        names = [session.id for session in sessions]
+        Console(color=False).say(_as_json(page, names, missing))
+    else:
+        console.say(f"Open in a browser: {page}")
     return 0
+
+
+def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
+    """Return what a report has made, with the errors of its models, for a program."""
+    import json
+
+    fits = page.parent.parent / "fits.json"
+    numbers = json.loads(fits.read_bytes())
+    terrains = {
+        name: {"trials": of["trials"], "mae": of["mae"]}
+        for name, of in numbers["terrains"].items()
+    }
+    content = {
+        "schema": 1,
+        "sessions": sessions,
+        "simulated": numbers["simulated"],
+        "page": str(page),
+        "fits": str(fits),
+        "terrains": terrains,
+        "missing": missing,
+        "warnings": numbers["warnings"],
+        "notes": numbers["notes"],
+    }
+    return json.dumps(content, indent=1, ensure_ascii=False)

@@ -26,23 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--trials", type=int, metavar="N", help="how many to keep")
     parser.add_argument("--operator", default="", metavar="NAME", help="who pushes")
-    parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
-    )
-    parser.add_argument(
-        "--friction",
-        type=float,
-        default=FRICTION,
-        metavar="SHARE",
-        help="of the simulated joints: 1 = as identified on another arm (0.02)",
-    )
-    parser.add_argument(
-        "--pace",
-        choices=PACES,
-        default=PACES[0],
-        help="how the simulated person pushes (steady)",
-    )
-    add_fault(parser)
+    _add_simulation(parser)
     parser.add_argument(
         "--operator-script",
         metavar="FILE|auto",
@@ -53,8 +37,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--new", action="store_true", help="close what is unfinished first"
     )
     parser.add_argument(
+        "--foresight",
+        type=Path,
+        metavar="FILE",
+        help="terrain database to foresee slips with (that of report --all)",
+    )
+    parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
     )
+
+
+def _add_simulation(parser: argparse.ArgumentParser) -> None:
+    """Declare what is simulated, and how."""
+    add_simulated_arm(parser)
+    parser.add_argument(
+        "--pace",
+        choices=PACES,
+        default=PACES[0],
+        help="how the simulated person pushes (steady)",
+    )
+    parser.add_argument(
+        "--twin",
+        action="store_true",
+        help="simulate the arm, sensor and containers that calibrations of rig.toml "
+        "describe, only with --fake",
+    )
+    add_fault(parser)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -69,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     settings = load_settings(args.config)
     fake: FakeOptions | None = None
     if args.fake:
-        fake = FakeOptions(args.fast, args.seed, args.friction, args.pace)
+        fake = FakeOptions(args.fast, args.seed, args.friction, args.pace, args.twin)
     request = SessionRequest(
         data=args.data,
         settings=settings,
@@ -81,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
         console=Console(color=not args.no_color),
         faults=tuple(args.fault),
         can_log=args.can_log,
+        foresight=args.foresight,
     )
     unfinished = _make_room(request, is_new=args.new)
     if unfinished is not None:
@@ -127,6 +136,7 @@ def _as_reopening(args: argparse.Namespace, request: SessionRequest) -> ResumeRe
         operator=request.operator_name,
         script=args.operator_script,
         can_log=request.can_log,
+        foresight=request.foresight,
         faults=request.faults,
     )
 
@@ -135,9 +145,11 @@ def _check_arguments(args: argparse.Namespace) -> None:
     from acquisition import SettingsError
 
     nothing = "Nothing was started."
-    if not args.fake and (args.fast or args.fault or args.operator_script):
+    simulated = (args.fast, args.twin, args.fault, args.operator_script)
+    if not args.fake and any(simulated):
         raise SettingsError(
-            "--fast, --fault and --operator-script work only with --fake.", hint=nothing
+            "--fast, --twin, --fault and --operator-script work only with --fake.",
+            hint=nothing,
         )
     if args.trials is not None and not 1 <= args.trials <= 99:
         raise SettingsError(

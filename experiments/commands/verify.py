@@ -1,18 +1,34 @@
-"""traction verify: hold kept trials against the checksums of the journal."""
+"""traction verify: hold kept trials, or a publication, against their checksums."""
+
+from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from experiments.operator import Console
 
 EXAMPLES = """\
   traction verify S012                      the kept trials of one session
-  traction verify --all --json              every session, for a program"""
+  traction verify crate --rebuild           a publication; its results computed again"""
 
 _NOT_AS_KEPT = 6  # exit code
+_SHOWN = 10  # differences of a rebuild
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `verify`."""
     parser.add_argument(
-        "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
+        "sessions",
+        nargs="*",
+        metavar="SESSION",
+        help="id, folder name or path; or a folder of traction publish",
+    )
+    parser.add_argument(
+        "--rebuild",
+        action="store_true",
+        help="of a publication: compute its table of results again and compare",
     )
     parser.add_argument("--all", action="store_true", help="every session")
     parser.add_argument("--json", action="store_true", help="as JSON")
@@ -25,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
     from acquisition import SessionError
     from experiments.operator import BAD, GOOD, Console
+    from experiments.report import is_publication
     from experiments.session import compare_kept, find_session, list_sessions
 
     if bool(args.sessions) == args.all:
@@ -32,6 +49,9 @@ def run(args: argparse.Namespace) -> int:
             "Name the sessions to verify, or use --all.",
             hint="For example: traction verify S012",
         )
+    published = [Path(name) for name in args.sessions if is_publication(Path(name))]
+    if published or args.rebuild:
+        return _verify_published(published, args)
     sessions = list_sessions(args.data)
     if not args.all:
         names = dict.fromkeys(args.sessions)
@@ -46,3 +66,47 @@ def run(args: argparse.Namespace) -> int:
     if not deviations:
         console.say(f"{GOOD} {len(sessions)} sessions: every kept trial is as kept.")
     return _NOT_AS_KEPT if deviations else 0
+
+
+def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
+    """Name every changed file of a publication; return the exit code."""
+    import json
+    from dataclasses import asdict
+
+    from acquisition import SessionError
+    from experiments.operator import BAD, GOOD, Console
+    from experiments.report import check_publication
+
+    if len(folders) != 1 or len(args.sessions) != 1:
+        raise SessionError(
+            "Verify one publication at a time, and no session beside it.",
+            hint="For example: traction verify crate --rebuild",
+        )
+    console = Console(color=not args.no_color)
+    changes = check_publication(folders[0])
+    if args.json:
+        console.say(json.dumps([asdict(change) for change in changes], indent=1))
+    for change in [] if args.json else changes:
+        console.problem(f"{BAD} {folders[0]}: {change.text()}.")
+    if changes:
+        return _NOT_AS_KEPT
+    if not args.json:
+        console.say(f"{GOOD} {folders[0]}: every file is as it was published.")
+    return _rebuild(folders[0], console) if args.rebuild else 0
+
+
+def _rebuild(folder: Path, console: Console) -> int:
+    from experiments.operator import BAD, GOOD
+    from experiments.report import TOLERANCE, rebuild
+
+    result = rebuild(folder, console)
+    for text in result.different[:_SHOWN]:
+        console.problem(f"{BAD} {text}.")
+    if result.different:
+        console.problem(f"{len(result.different)} of {result.rows} results differ.")
+        return _NOT_AS_KEPT
+    console.say(
+        f"{GOOD} {result.rows} results computed again: the largest relative difference "
+        f"is {result.worst:.1e} (limit {TOLERANCE:.0e})."
+    )
+    return 0

@@ -10,7 +10,9 @@ from .keys import (
 )
 from .prompts import OperatorInput, Prompt, PromptState
 from .screens import (
+    OTHER_RIG_TEXT,
     EndView,
+    ForesightView,
     ReadyView,
     RecordingView,
     end_lines,
@@ -25,12 +27,14 @@ __all__ = [
     "BAD",
     "GOOD",
     "NOTE_KEYS",
+    "OTHER_RIG_TEXT",
     "REJECT_REASONS",
     "WARNING",
     "Console",
     "EndView",
     "FeedbackSignal",
     "FootKeys",
+    "ForesightView",
     "KeyAction",
     "OperatorFeedback",
     "OperatorInput",

@@ -146,6 +146,9 @@ class PageRecorder(Console):
         """Keep one line of a graded page."""
         self.checks.append({"grade": _GRADES[mark], "name": name, "text": text})
 
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """Keep nothing of a table."""
+
     def say(self, text: str = "") -> None:
         """Print nothing: the page is for a program."""
 

@@ -51,7 +51,7 @@ class OperatorKey:
     Attributes:
         key: as it arrives from the keyboard.
         action: what it does.
-        help: what it does, in the words of README.
+        help: what it does, in the words of docs/sessions.md.
         screen: as the screen shows it; empty = not shown.
         word: of a line in an operator script; empty = none.
         operand: what follows the word.
@@ -66,7 +66,7 @@ class OperatorKey:
 
     @property
     def label(self) -> str:
-        """The key as README shows it."""
+        """The key as docs/sessions.md shows it."""
         label = f"`{'space' if self.key == ' ' else self.key}`"
         reasons = f" and `{min(REJECT_REASONS)}`..`{max(REJECT_REASONS)}`"
         return label + reasons if self.operand is Operand.REASON else label
@@ -74,7 +74,10 @@ class OperatorKey:
 
 _CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
 _QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
-_REASONS = "  ".join(f"{key} {reason}" for key, reason in REJECT_REASONS.items())
+_SHORT = {"1": "off the bed", "3": "frame", "4": "sensor"}  # a line has 80 columns
+_REASONS = "  ".join(
+    f"{key} {_SHORT.get(key, reason)}" for key, reason in REJECT_REASONS.items()
+)
 
 KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
     Prompt.CHOICE: (
@@ -131,10 +134,10 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
     ),
 }
-NOTE_KEYS = "Type the note: Enter ends it, Esc gives it up."
+NOTE_KEYS = "Type the note: Enter ends it, Esc cancels it."
 STOP_KEYS = "Ctrl-C finish safely, twice = stop now"
 
-# Prompts whose keys README explains, with its words for them.
+# Prompts whose keys docs/sessions.md explains, with its words for them.
 _EXPLAINED = {
     Prompt.SUPPORT: "the arm is to be activated",
     Prompt.READY: "between two trials",
@@ -167,7 +170,7 @@ def awaits_reason(prompt: Prompt, key: str) -> bool:
 
 def screen_keys(prompt: Prompt) -> str:
     """Return the keys of `prompt` as the screen shows them."""
-    return "   ".join(entry.screen for entry in KEYS[prompt] if entry.screen)
+    return "  ".join(entry.screen for entry in KEYS[prompt] if entry.screen)
 
 
 def script_keys(prompt: Prompt) -> dict[str, OperatorKey]:
@@ -175,8 +178,8 @@ def script_keys(prompt: Prompt) -> dict[str, OperatorKey]:
     return {entry.word: entry for entry in KEYS.get(prompt, ()) if entry.word}
 
 
-def readme_rows() -> list[str]:
-    """Return the rows of README's table of keys."""
+def key_rows() -> list[str]:
+    """Return the rows of the table of keys in docs/sessions.md."""
     rows: list[str] = []
     for prompt, when in _EXPLAINED.items():
         shown = [entry for entry in KEYS[prompt] if entry.help]

@@ -1,6 +1,6 @@
 """What the live part of the screen shows, as lines of text; pure."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
@@ -13,6 +13,57 @@ from experiments.operator.prompts import Prompt
 _BARS = "▁▂▃▄▅▆▇█"
 _ABSURD = 1e9  # nothing a sensor or an encoder can mean
 _NARROW, _WIDE = 10, 40  # characters of a sparkline
+
+
+@dataclass(frozen=True, slots=True)
+class ForesightView:
+    """What is foreseen in a running trial; NaN = not known.
+
+    Attributes:
+        slip_probability: that a slip begins within 200 ms, of the last seconds.
+        break_away_risk: of a push from rest to this F_t at this F_n.
+        traction: F_t to expect of a sliding foot [N].
+        terrains: probability of every known terrain by name.
+        none: that it is none of them.
+        state: "slipping", "no contact", "other foot or rig" or ""; of the newest state.
+        is_late: the newest state is older than 0.2 s.
+    """
+
+    slip_probability: NDArray[np.float64]
+    break_away_risk: float
+    traction: float
+    terrains: Mapping[str, float]
+    none: float
+    state: str = ""
+    is_late: bool = False
+
+
+OTHER_RIG_TEXT = "other foot or rig"
+_NAMED = 2  # terrains that are named, the likeliest first
+_SHOWN_SHARE = 0.05  # probability below which a terrain is not named
+
+
+def foresight_line(view: ForesightView) -> str:
+    """Return what is foreseen as one line of the screen of a running trial."""
+    if view.is_late:
+        return "foresight: silent"
+    if view.state == OTHER_RIG_TEXT:
+        return "foresight: learnt on another foot or rig, nothing is foreseen"
+    newest = float(view.slip_probability[-1]) if len(view.slip_probability) else np.nan
+    bars = sparkline(np.nan_to_num(view.slip_probability), _NARROW)
+    slip = view.state or f"{newest:.2f}"
+    likeliest = sorted(view.terrains.items(), key=lambda one: -one[1])[:_NAMED]
+    named = [f"{n} {p:.2f}" for n, p in likeliest if p >= _SHOWN_SHARE]
+    if view.none >= _SHOWN_SHARE:
+        named.append(f"none of them {view.none:.2f}")
+    return (
+        f"slip {bars} {slip}   break-away {_number(view.break_away_risk, '.2f')}   "
+        f"expect {_number(view.traction, '.1f')} N   {'  '.join(named) or 'ground ?'}"
+    )
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if np.isfinite(value) else "?"
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +80,7 @@ class RecordingView:
         is_arm_fine: every motor answered in the last cycle.
         is_sensor_fine: the last force sample was fresh and within its range.
         traction: v_t, F_t, F_n of the last seconds [m/s, N, N], shape (n, 3).
+        foresight: what is foreseen; None = nothing is.
     """
 
     trial: str
@@ -40,6 +92,7 @@ class RecordingView:
     is_arm_fine: bool
     is_sensor_fine: bool
     traction: NDArray[np.float64]
+    foresight: ForesightView | None = None
 
 
 def sparkline(values: Sequence[float] | NDArray[np.float64], width: int) -> str:
@@ -78,6 +131,7 @@ def recording_lines(view: RecordingView, width: int) -> list[str]:
         "   ".join(
             f"{name} {sparkline(values, bars)} {text}" for name, values, text in columns
         ),
+        *([] if view.foresight is None else [foresight_line(view.foresight)]),
         f"{screen_keys(Prompt.RECORDING)}    {STOP_KEYS}",
     ]
 

@@ -112,7 +112,7 @@ class TerminalInput:
         return "q" if self._is_end else ""
 
     def line(self, state: PromptState) -> str | None:
-        """Return the line when Enter ends it, "" when Esc gives it up, None before.
+        """Return the line when Enter ends it, "" when Esc cancels it, None before.
 
         Backspace takes a character back. An arrow key, which begins like Esc, does
         nothing.

@@ -1,7 +1,17 @@
 from .choices import AnalysisChoices, analysis_choices, repeat_study
+from .credits import LICENCES, parse_author
 from .export import export_sessions
+from .foresight import (
+    ForesightReplay,
+    StudyForesight,
+    replay_foresight,
+    study_foresight,
+)
 from .playback import play
 from .progress import fitting
+from .publication import PublishRequest, publish_sessions
+from .quantities import KEPT, QUANTITIES
+from .rebuilding import TOLERANCE, check_publication, is_publication, rebuild
 from .sessions import (
     REPORTED,
     ReportRequest,
@@ -11,22 +21,40 @@ from .sessions import (
     require_samples,
     tell_missing,
 )
+from .table_columns import Quantity, TableColumn, columns_of
 from .truth_errors import compare_with_truth, z_scores
 
 __all__ = [
+    "KEPT",
+    "LICENCES",
+    "QUANTITIES",
     "REPORTED",
+    "TOLERANCE",
     "AnalysisChoices",
+    "ForesightReplay",
+    "PublishRequest",
+    "Quantity",
     "ReportRequest",
+    "StudyForesight",
+    "TableColumn",
     "analysis_choices",
+    "check_publication",
     "choose_sessions",
+    "columns_of",
     "compare_with_truth",
     "export_sessions",
     "export_terrains",
     "fitting",
+    "is_publication",
+    "parse_author",
     "play",
+    "publish_sessions",
+    "rebuild",
     "repeat_study",
+    "replay_foresight",
     "report_sessions",
     "require_samples",
+    "study_foresight",
     "tell_missing",
     "z_scores",
 ]

@@ -1,28 +1,37 @@
-"""Trials as tables that any program reads: CSV, a data dictionary, checksums."""
+"""Trials as tables that any program reads: CSV or Parquet, dictionary, data package."""
 
-import csv
-import io
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from acquisition import SessionError, TrialFileError
-from analysis.data import PrepareOptions, RecordedTrial, load_trial, prepare_trial
+from acquisition import SessionError, SystemClock, TrialFileError
+from analysis.data import (
+    DESCRIPTOR,
+    DataPackage,
+    PackageField,
+    PackageFile,
+    PrepareOptions,
+    RecordedTrial,
+    TableOrigin,
+    TableSchema,
+    load_trial,
+    prepare_trial,
+    to_parquet,
+)
 from experiments.operator import WARNING, Console
-from experiments.session import SessionFolder, sha256_of, write_new_text
+from experiments.report.checksums import SUMS, digest_of, write_sums
+from experiments.report.quantities import KEPT, QUANTITIES, kept_rule
+from experiments.report.table_columns import (
+    TableColumn,
+    columns_of,
+    csv_of,
+    csv_of_rows,
+)
+from experiments.session import SessionFolder, iso_utc, write_new
 
-DICTIONARY, INDEX, SUMS = "data_dictionary.csv", "trials.csv", "SHA256SUMS"
-_FORMAT = "%.12g"  # beyond the resolution of every instrument here
-_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # how a formula begins
-_JOINTS = tuple(str(joint) for joint in range(1, 8))
-_AXES = ("x", "y", "z")
-_WRENCH = ("fx", "fy", "fz", "tx", "ty", "tz")
-_OF_TRIAL, _OF_SAMPLES = "T01.csv", "T01.kept.csv"
-_BASE, _TERRAIN = "arm's base", "terrain"
-_Columns = NDArray[np.float64]
+DICTIONARY, INDEX = "data_dictionary.csv", "trials.csv"
+FORMATS = ("csv", "parquet")
+_MEDIA = {"csv": "text/csv", "parquet": "application/vnd.apache.parquet"}
 _METADATA = (
     "operator",
     "started_utc",
@@ -31,211 +40,221 @@ _METADATA = (
     "tread",
     "simulated",
 )
+_DICTIONARY_MEANINGS = {
+    "table": "file, the first trial in the place of all",
+    "column": "its name without the unit",
+    "unit": "of the numbers; empty for words",
+    "frame": "where it is measured",
+    "type": "number, integer, boolean (0 or 1) or string",
+    "resolution": "of the instrument, in the unit",
+    "largest_rounding": "error of a number as it is written, in the unit",
+    "meaning": "what it is",
+}
+_INDEX_MEANINGS = {
+    "table": "file of the trial at the recorded rate",
+    "session": "id of the session",
+    "terrain": "name of the terrain",
+    "operator": "who pushed",
+    "started_utc": "when the recording began, UTC",
+    "incline_deg": "incline of the plane",
+    "stone_size": "of the stones: small, big or none",
+    "tread": "of the foot",
+    "simulated": "true where the devices were simulated",
+    "sha256 of the recording": "SHA-256 of the trial file",
+}
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """One or more columns of a trial's table.
+@dataclass(slots=True)
+class TableWriter:
+    """Writes tables below one folder and remembers them for the data package.
 
     Attributes:
-        names: of the columns.
-        unit: of all of them.
-        frame: where they are measured.
-        meaning: what they are.
-        values: takes them from a trial, shape (n,) or (n, columns).
+        folder: where they go.
+        form: "csv" or "parquet", of the tables of trials.
+        files: what was written.
     """
 
-    names: tuple[str, ...]
-    unit: str
-    frame: str
-    meaning: str
-    values: Callable[[RecordedTrial], NDArray[np.generic]]
+    folder: Path
+    form: str
+    files: list[PackageFile] = field(default_factory=list[PackageFile])
 
-    def headers(self) -> list[str]:
-        """Return the names with their unit, as in the first line of a table."""
-        return [f"{name} [{self.unit}]" for name in self.names]
+    def add(
+        self, name: str, columns: Sequence[TableColumn], origin: TableOrigin, about: str
+    ) -> str:
+        """Write a table of a trial and return its path below the folder."""
+        file = f"{name}.{self.form}"
+        if self.form == "csv":
+            content = csv_of(columns).encode()
+            names = [column.header for column in columns]
+        else:
+            units = {column.name: column.unit for column in columns}
+            content = to_parquet({c.name: c.values for c in columns}, units, origin)
+            names = [column.name for column in columns]
+        fields = [
+            PackageField(name=n, type=c.kind, unit=c.unit, description=c.meaning)
+            for n, c in zip(names, columns, strict=True)
+        ]
+        self._write(file, content, fields, origin, about)
+        return file
 
+    def add_texts(
+        self,
+        file: str,
+        rows: Sequence[Sequence[str]],
+        meanings: Mapping[str, str],
+        about: str,
+    ) -> None:
+        """Write a CSV of words; `meanings` are those of its columns, in order."""
+        content = csv_of_rows([tuple(meanings), *rows]).encode()
+        fields = [
+            PackageField(name=name, type="string", description=text)
+            for name, text in meanings.items()
+        ]
+        kind = "index" if file == INDEX else "dictionary"
+        self._write(file, content, fields, TableOrigin(table=kind), about)
 
-def _cycle(field: str) -> Callable[[RecordedTrial], NDArray[np.generic]]:
-    return lambda trial: trial.cycles[field]
+    def finish(self, title: str, about: str) -> None:
+        """Write `datapackage.json` and the checksums of every file."""
+        package = DataPackage(
+            name="traction-trials",
+            title=title,
+            description=about,
+            created=iso_utc(SystemClock().utc_ns()),
+            resources=tuple(self.files),
+        )
+        write_new(self.folder / DESCRIPTOR, package.text().encode())
+        write_sums(self.folder)
 
-
-def _of_joints(prefix: str) -> tuple[str, ...]:
-    return tuple(prefix + joint for joint in _JOINTS)
-
-
-QUANTITIES = (
-    Quantity(("t",), "s", "host clock", "since the first cycle", lambda x: x.t),
-    Quantity(("cycle",), "1", "loop", "number of the cycle", _cycle("cycle")),
-    Quantity(("flags",), "bits", "loop", "bits 0-2 safety mode", _cycle("flags")),
-    Quantity(_of_joints("q"), "rad", "joints 1..7", "position", _cycle("position")),
-    Quantity(_of_joints("qd"), "rad/s", "joints 1..7", "velocity", _cycle("velocity")),
-    Quantity(
-        _of_joints("tau"), "N m", "joints 1..7", "as sent", _cycle("torque_command")
-    ),
-    Quantity(
-        tuple(f"raw_{name}" for name in _WRENCH),
-        "N or N m",
-        "sensor",
-        "as read, not tared; f forces, t torques",
-        _cycle("wrench_raw"),
-    ),
-    Quantity(
-        tuple(f"sole_{axis}" for axis in _AXES),
-        "m",
-        _BASE,
-        "centre of the sole",
-        lambda x: x.sole,
-    ),
-    Quantity(
-        tuple(f"v_{axis}" for axis in _AXES),
-        "m/s",
-        _BASE,
-        "velocity of the sole; nan beside gaps",
-        lambda x: x.velocity,
-    ),
-    Quantity(
-        tuple(f"F_{axis}" for axis in _AXES),
-        "N",
-        _BASE,
-        "force of the ground on the foot",
-        lambda x: x.force,
-    ),
-    Quantity(
-        ("travelled",),
-        "m",
-        _TERRAIN,
-        "distance of the sole from the far end",
-        lambda x: x.displacement,
-    ),
-    Quantity(
-        ("v_t",),
-        "m/s",
-        _TERRAIN,
-        "slip velocity, > 0 in ordinary slip",
-        lambda x: x.traction[:, 0],
-    ),
-    Quantity(
-        ("F_t",),
-        "N",
-        _TERRAIN,
-        "traction force, > 0 against ordinary slip",
-        lambda x: x.traction[:, 1],
-    ),
-    Quantity(
-        ("F_n",),
-        "N",
-        _TERRAIN,
-        "normal force, > 0 in compression",
-        lambda x: x.traction[:, 2],
-    ),
-)
-# Smoothed, thinned and inside the window of velocities: what models are fitted to.
-SAMPLES = (
-    ("t", "s", "since the first cycle"),
-    ("v_t", "m/s", "slip velocity, smoothed"),
-    ("F_n", "N", "normal force, smoothed"),
-    ("F_t", "N", "traction force, smoothed"),
-    ("kept_row", "1", "row of the trial's table, from 0"),
-)
+    def _write(
+        self,
+        file: str,
+        content: bytes,
+        fields: Sequence[PackageField],
+        origin: TableOrigin,
+        about: str,
+    ) -> None:
+        path = self.folder / file
+        write_new(path, content)
+        suffix = path.suffix.removeprefix(".")
+        entry = PackageFile.model_validate(
+            {
+                "name": file.removesuffix(path.suffix).replace("/", "-").lower(),
+                "path": file,
+                "format": suffix,
+                "mediatype": _MEDIA[suffix],
+                "bytes": len(content),
+                "hash": f"sha256:{digest_of(path)}",
+                "description": about,
+                "schema": TableSchema(fields=tuple(fields)),
+                "traction": origin,
+            }
+        )
+        self.files.append(entry)
 
 
 def export_sessions(
-    sessions: Sequence[SessionFolder], to: Path, console: Console
+    sessions: Sequence[SessionFolder], to: Path, form: str, console: Console
 ) -> None:
     """Write the kept trials of `sessions` below `to`, which must be empty.
 
     Per trial a table at 500 Hz and one of the kept samples; an index of the trials, a
-    data dictionary, and checksums that `sha256sum -c` reads.
+    data dictionary, a Frictionless data package, and checksums that `sha256sum -c`
+    reads. `traction fit` and `traction.load_tables` read the folder.
+
+    Args:
+        sessions: their kept trials are written.
+        to: the folder.
+        form: "csv" or "parquet".
+        console: what is written is named there.
 
     Raises:
         SessionError: `to` holds something, or no session has a kept trial.
         TrialFileError: a trial cannot be read, or a table cannot be written.
+        MissingLibraryError: Parquet is wanted and pyarrow is not installed.
     """
     paths = [(session, path) for session in sessions for path in session.kept_trials()]
     if not paths:
         raise SessionError(f"{', '.join(s.id for s in sessions)}: no kept trials.")
-    _make_empty(to)
+    if form != "csv":
+        to_parquet({}, {})  # refused before anything is written
+    make_empty(to)
+    writer = TableWriter(to, form)
     rows: list[list[str]] = []
     for session, path in paths:
         trial = load_trial(path)
         name = f"{session.path.name}/{path.stem}"
         (to / session.path.name).mkdir(exist_ok=True)
-        write_new_text(to / f"{name}.csv", trial_table(trial))
-        write_new_text(to / f"{name}.kept.csv", samples_table(trial))
-        metadata = trial.metadata["trial"]
-        values = [metadata.get(key, "") for key in _METADATA]
-        rows.append([f"{name}.csv", session.id, trial.terrain, *values])
-        rows[-1].append(sha256_of(path))
+        rows.append(_write_trial(writer, name, session, trial))
         console.say(f"{name}: {len(trial.t)} rows")
-    header = ["table", "session", "terrain", *_METADATA, "sha256 of the recording"]
-    write_new_text(to / INDEX, _csv([header, *rows]))
-    write_new_text(to / DICTIONARY, data_dictionary())
-    _write_sums(to)
-    if sessions[0].is_simulated:
+    writer.add_texts(INDEX, rows, _INDEX_MEANINGS, "The trials.")
+    meanings = dictionary_rows(form)
+    writer.add_texts(DICTIONARY, meanings, _DICTIONARY_MEANINGS, "Every column.")
+    what = f"Kept trials of {', '.join(s.id for s in sessions)}"
+    is_simulated = sessions[0].is_simulated
+    writer.finish(what, "SIMULATED trials." if is_simulated else "Recorded trials.")
+    if is_simulated:
         console.say(f"{WARNING} SIMULATED: trials.csv says so in every row.")
     console.say(f"{len(rows)} trials in {to}. To check: cd {to} && sha256sum -c {SUMS}")
 
 
-def trial_table(trial: RecordedTrial) -> str:
-    """Return every cycle of a trial as CSV, units in the header."""
-    columns = [np.asarray(q.values(trial), dtype=np.float64) for q in QUANTITIES]
-    headers = [header for q in QUANTITIES for header in q.headers()]
-    return _table(headers, np.column_stack(columns))
-
-
-def samples_table(trial: RecordedTrial) -> str:
-    """Return the kept samples of a trial as CSV, units in the header."""
+def _write_trial(
+    writer: TableWriter, name: str, session: SessionFolder, trial: RecordedTrial
+) -> list[str]:
+    """Write both tables of a trial; return its row of the index."""
+    recording = digest_of(trial.path)
+    series = trial.series()
     options = PrepareOptions(container_travel=trial.frame.travel)
-    kept = prepare_trial(trial.series(), options)
-    columns = (
-        *(kept.smooth.t[kept.indices], kept.v_t, kept.F_n, kept.F_t),
-        kept.indices.astype(float),
+    origin = TableOrigin(
+        table="trial",
+        session=session.id,
+        trial=trial.path.stem,
+        terrain=trial.terrain,
+        stones=trial.stones,
+        incline_deg=series.incline_deg,
+        force_age=series.stamped_lag,
+        simulated=trial.is_simulated,
+        recording=recording,
     )
-    headers = [f"{name} [{unit}]" for name, unit, _ in SAMPLES]
-    return _table(headers, np.column_stack(columns))
+    whole = columns_of(QUANTITIES, trial)
+    file = writer.add(name, whole, origin, "A trial at the recorded rate.")
+    kept = columns_of(KEPT, prepare_trial(series, options))
+    rule = f"Samples that models are fitted to: {kept_rule(options)}."
+    of_kept = origin.model_copy(update={"table": "kept"})
+    writer.add(f"{name}.kept", kept, of_kept, rule)
+    metadata = trial.metadata["trial"]
+    values = [metadata.get(key, "") for key in _METADATA]
+    return [file, session.id, trial.terrain, *values, recording]
 
 
-def data_dictionary() -> str:
-    """Return what every column means, as CSV."""
-    rows = [["table", "column", "unit", "frame", "meaning"]]
-    for q in QUANTITIES:
-        rows += [[_OF_TRIAL, name, q.unit, q.frame, q.meaning] for name in q.names]
-    for name, unit, meaning in SAMPLES:
-        rows.append([_OF_SAMPLES, name, unit, _TERRAIN, meaning])
-    return _csv(rows)
+def dictionary_rows(form: str) -> list[list[str]]:
+    """Return what every column of every table means, a row each.
+
+    The resolution is that of the instrument, the largest rounding what was lost when
+    the number was written, both in the unit of the column.
+    """
+    rows: list[list[str]] = []
+    for table, quantities in ((f"T01.{form}", QUANTITIES), (f"T01.kept.{form}", KEPT)):
+        for q in quantities:
+            is_number = q.kind == "number"
+            steps = [f"{q.resolution:g}", f"{0.5 * 10.0**-q.decimals:g}"]
+            about = [q.unit, q.frame, q.kind, *(steps if is_number else ["", ""])]
+            rows += [[table, name, *about, q.meaning] for name in q.names]
+    rule = kept_rule(PrepareOptions())
+    about = ["", "", "rule", "", ""]
+    rows.append([f"T01.kept.{form}", "(which rows)", *about, rule])
+    return rows + [
+        [INDEX, name, "", "", "string", "", "", meaning]
+        for name, meaning in _INDEX_MEANINGS.items()
+    ]
 
 
-def _table(headers: Sequence[str], columns: _Columns) -> str:
-    text = io.StringIO()
-    np.savetxt(
-        text,
-        columns,
-        fmt=_FORMAT,
-        delimiter=",",
-        header=",".join(headers),
-        comments="",
-    )
-    return text.getvalue()
+def make_empty(folder: Path) -> None:
+    """Make a folder that is new or empty.
 
-
-def _csv(rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    plain = [[plain_cell(cell) for cell in row] for row in rows]
-    csv.writer(text, lineterminator="\n").writerows(plain)
-    return text.getvalue()
-
-
-def plain_cell(cell: str) -> str:
-    """Return a text that no spreadsheet takes for a formula; numbers stay."""
-    try:
-        float(cell)
-    except ValueError:
-        return "'" + cell if cell.startswith(_FORMULA) else cell
-    return cell
-
-
-def _make_empty(folder: Path) -> None:
+    Raises:
+        SessionError: it holds something.
+        TrialFileError: it cannot be made.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         is_empty = not any(folder.iterdir())
@@ -246,9 +265,3 @@ def _make_empty(folder: Path) -> None:
             f"{folder} is not empty.",
             hint="Name a new folder; nothing is ever overwritten.",
         )
-
-
-def _write_sums(folder: Path) -> None:
-    files = sorted(path for path in folder.rglob("*.csv"))
-    lines = [f"{sha256_of(path)}  {path.relative_to(folder)}\n" for path in files]
-    write_new_text(folder / SUMS, "".join(lines))

@@ -12,6 +12,7 @@ from analysis.data import (
     summed_up,
 )
 from analysis.findings import summarise_rig
+from analysis.foresight import fit_foresight, watch_all
 from analysis.report import (
     ReportContext,
     plain_choice,
@@ -33,8 +34,9 @@ from analysis.terrains import database_of, identify_study
 from experiments.messages import CATALOGUE
 from experiments.operator import WARNING, Console
 from experiments.report.choices import AnalysisChoices, repeat_study
+from experiments.report.foresight import study_foresight
 from experiments.report.progress import fitting
-from experiments.report.tables import report_tables
+from experiments.report.tables import report_tables, summary_table
 from experiments.report.truth_errors import truth_tables
 from experiments.session import (
     SessionFolder,
@@ -61,6 +63,7 @@ class ReportRequest:
         scheduler: address of a Dask scheduler to fit on; None for this machine.
         choices: of the analysis.
         missing: kept trials that are missing or changed, in words.
+        out: folder of the report; None = that of the session, or `data`/study.
     """
 
     terrains: Sequence[str]
@@ -68,6 +71,7 @@ class ReportRequest:
     scheduler: str | None = None
     choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     missing: Sequence[str] = ()
+    out: Path | None = None
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -242,6 +246,7 @@ def export_terrains(
         identify_study(study),
         iso_utc(SystemClock().utc_ns()),
         store=ResultStore(data / FOLDS),
+        foresight=fit_foresight(watch_all(analysed.trials, study.kinds)),
     )
     write_new_text(out, text)
     console.say(f"{len(study.terrains)} terrains: {out}")
@@ -255,7 +260,8 @@ def report_sessions(
 ) -> Path:
     """Load the kept trials, fit, and write the report; return the page.
 
-    One session is reported into its own folder, several into `data`/study.
+    One session is reported into its own folder, several into `data`/study, all of them
+    into that of `order` where it names one.
 
     Raises:
         SessionError: no session has a kept trial.
@@ -266,8 +272,9 @@ def report_sessions(
     study, trials = analysed.study, analysed.trials
     store = ResultStore(data / FOLDS)
     others = repeat_study(study, trials, order.choices.variants, console, store)
+    foresight = study_foresight(study, trials)
     count = sum(len(group) for group in trials.values())
-    out = sessions[0].path if len(sessions) == 1 else data / "study"
+    own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
         subtitle=f"{count} trials on {', '.join(trials)}",
@@ -277,12 +284,17 @@ def report_sessions(
         tables=[
             *(side_by_side(choice, study, other) for choice, other in others),
             *truth_tables(study, trials),
+            *foresight.tables,
             *report_tables(sessions, trials),
         ],
         further_numbers={
-            "what_if": [plain_choice(c, study, other) for c, other in others]
+            "what_if": [plain_choice(c, study, other) for c, other in others],
+            "foresight": foresight.numbers,
         },
         warnings=[*order.missing, *analysed.problems],
         rig=summarise_rig([trial for group in trials.values() for trial in group]),
+        foresight=foresight.model if len(sessions) > 1 else None,
     )
-    return write_report(study, out, context)
+    page = write_report(study, order.out or own, context)
+    console.table(*summary_table(study))
+    return page

@@ -1,14 +1,32 @@
 """Tables of sessions, checks, settings and provenance in a report."""
 
 from collections.abc import Mapping, Sequence
-from typing import cast
+from dataclasses import asdict
+from typing import Any, cast
+
+import numpy as np
 
 from acquisition.trial_file import list_folder
 from analysis.data import RecordedTrial
 from analysis.figures import ReportSection
+from analysis.foresight import GroundScore, SlipScore
 from analysis.report import ReportTable
+from analysis.study import GP_SE, TUSTIN, Study
 from experiments.session import SessionFolder, read_json
 
+SLID = (25, 50, 100, 200)  # ticks of sliding after which the ground is asked
+_SLIP_HEADER = (
+    *("terrain", "slips", "recall", "lead [ms]", "0.1 s ahead", "needless time"),
+    *("false alarms/min", "false of all", "recall by chance", "calibration error"),
+)
+_SLIP_NOTE = (
+    "Every trial is foreseen by what the other four fifths taught, the alarm's "
+    "threshold included. Recall: slips with a warning in the 0.2 s before v_t rose "
+    "above 0.03 m/s. Lead: from the beginning of that alarm, at most 2 s. Needless "
+    "time: share of at-risk time outside those 0.2 s in warning. By chance: recall of "
+    "the same warnings moved in time. Causal filters are 8 to 14 ms late, which is in "
+    "all numbers."
+)
 _ROW = (
     ("incline_deg", "incline [°]"),
     ("stone_size", "stones"),
@@ -17,6 +35,38 @@ _ROW = (
     ("foot_mass_kg", "foot [kg]"),
     ("gravity_model", "gravity"),
 )
+
+
+def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows of what a study comes to, a row per terrain.
+
+    F_t/F_n: ratio of the means of a trial, mean over the trials and their standard
+    deviation. Errors: mean absolute error of trials left out [N].
+    """
+    shown = (("Tustin", TUSTIN), ("GP", GP_SE))
+    header = ["terrain", "trials", "F_t/F_n"]
+    header += [f"error {title} [N]" for title, _ in shown] + ["of a constant [N]"]
+    rows: list[list[str]] = []
+    for name, result in study.terrains.items():
+        kept = [trial for trial in result.trials if trial.F_n.size]
+        loads = [float(trial.F_n.mean()) for trial in kept]
+        ratios = [
+            float(trial.F_t.mean()) / load
+            for trial, load in zip(kept, loads, strict=True)
+            if load > 0.0
+        ]
+        errors = [result.maes(model) for _, model in shown]
+        numbers = [[mae for mae in of if mae is not None] for of in errors]
+        rows.append(
+            [
+                name,
+                str(len(result.trials)),
+                f"{np.mean(ratios):.2f} ± {np.std(ratios):.2f}" if ratios else "–",
+                *(f"{np.mean(of):.2f}" if of else "–" for of in numbers),
+                f"{result.constant_mae:.2f}" if result.folds else "–",
+            ]
+        )
+    return header, rows
 
 
 def report_tables(
@@ -145,3 +195,98 @@ def _files(sessions: Sequence[SessionFolder]) -> ReportTable:
             digest, size = (str(sidecar.get(key, "?")) for key in ("sha256", "size"))
             rows.append((name, size, digest))
     return ReportTable("Trial files", ("file", "bytes", "SHA-256"), rows)
+
+
+def foresight_tables(
+    slips: Mapping[str, SlipScore],
+    grounds: Mapping[str, Mapping[str, Sequence[float]]],
+    surface: GroundScore | None,
+) -> tuple[ReportTable, ...]:
+    """Return what foresight is worth.
+
+    Args:
+        slips: scores by terrain; empty where there were too few slips.
+        grounds: mean probability of the own terrain and surface after `SLID`.
+        surface: how flat and rocky ground are told apart; None with one of them only.
+    """
+    tables = [_slip_table(slips)] if slips else []
+    if grounds:
+        tables.append(_ground_table(grounds))
+    if surface is not None:
+        tables.append(_surface_table(asdict(surface)))
+    return tuple(tables)
+
+
+def _slip_table(scores: Mapping[str, SlipScore]) -> ReportTable:
+    rows = [
+        (
+            name,
+            str(score.onsets),
+            *(_share(score.recall), _number(1e3 * score.lead, ".0f")),
+            *(_share(score.early) if score.onsets else "-", _share(score.needless)),
+            *(_number(score.per_minute, ".1f"), _share(score.false_share)),
+            *(_share(score.chance), _number(score.calibration, ".3f")),
+        )
+        for name, score in scores.items()
+    ]
+    return ReportTable(
+        "Foresight: slips within 200 ms, on trials not seen",
+        _SLIP_HEADER,
+        rows,
+        note=_SLIP_NOTE,
+        section=ReportSection.BEYOND,
+    )
+
+
+def _ground_table(rows: Mapping[str, Mapping[str, Sequence[float]]]) -> ReportTable:
+    times = [f"{n * 0.01:g} s" for n in SLID]
+    return ReportTable(
+        "Foresight: probability of the right ground over time",
+        (
+            "terrain",
+            *(f"terrain, {time}" for time in times),
+            *(f"flat or rocky, {time}" for time in times),
+            f"none, {times[-1]}",
+        ),
+        [
+            (
+                name,
+                *map(_share, row["terrain"]),
+                *map(_share, row["surface"]),
+                _share(row["none"][-1]),
+            )
+            for name, row in rows.items()
+        ],
+        note="Mean probability, by models of other trials, of the terrain, of its "
+        "surface (given that the terrain is a known one) and of none of them, after "
+        "so much sliding in a trial.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def _surface_table(score: Mapping[str, Any]) -> ReportTable:
+    rows = [
+        ("right after 0.5 s of sliding", _share(score["accuracy"][0])),
+        ("right after 1 s of sliding", _share(score["accuracy"][1])),
+        ("right after 0.5 s, begun anew anywhere", _share(score["anywhere"][0])),
+        ("right after 1 s, begun anew anywhere", _share(score["anywhere"][1])),
+        ("98 % sure and wrong", _number(score["sure_and_wrong"], ".3f")),
+        ("calibration error", _number(score["calibration"], ".3f")),
+        ("95 % after a change of ground, median [s]", _number(score["back"], ".2f")),
+        ("the slowest of them [s]", _number(score["slowest"], ".2f")),
+    ]
+    return ReportTable(
+        "Foresight: flat or rocky, on trials not seen",
+        ("what", "value"),
+        rows,
+        note="A change of ground is a splice of two trials in the middle of sliding.",
+        section=ReportSection.BEYOND,
+    )
+
+
+def _share(value: float) -> str:
+    return _number(value, ".2f")
+
+
+def _number(value: float, form: str) -> str:
+    return format(value, form) if np.isfinite(value) else "-"

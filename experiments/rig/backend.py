@@ -10,8 +10,10 @@ from acquisition import PERIOD_NS, Clock, SafetyMode, WrenchSensor
 from acquisition.control_loop import Grant, Loop
 from acquisition.ipc import LoopClient, SharedLayout
 from acquisition.recording import Recorder, TrialRecording
+from analysis.foresight import RigIdentity
 from experiments.rig.build import LoopConfig, build_loop_server
 from experiments.rig.claim import release
+from experiments.rig.foresight import ForesightSource, ForesightWorker
 from wam.bus import CanLink
 from wam.driver import ArmInfo, WamArm
 
@@ -66,6 +68,18 @@ class RigBackend(Protocol):
 
     def begin(self) -> None:
         """Let the loop run from here on."""
+        ...
+
+    def start_foresight(
+        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
+    ) -> None:
+        """Foresee what trials are about to do, beside the recorder.
+
+        Args:
+            source: what was learnt.
+            rig: foot and rig that are watched.
+            along: x_T in the base frame, three numbers.
+        """
         ...
 
     def grants(self) -> dict[str, list[Grant]]:
@@ -198,6 +212,13 @@ class InProcessBackend:
         loop = Loop(loop_server, self._clock, stats=loop_server.stats)
         self._advance_loop = InlineAdvance(loop, self.recorder)
         self.loop_client.beat()
+
+    def start_foresight(
+        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
+    ) -> None:
+        """Foresee in this thread, whenever the recorder drains."""
+        worker = ForesightWorker(self._shared, source.started(rig), along)
+        self.recorder.foresee = worker.step
 
     def grants(self) -> dict[str, list[Grant]]:
         """Return nothing: this thread asks for nothing."""

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from acquisition import (
     Clock,
     SettingsError,
@@ -26,11 +28,24 @@ from experiments.rig.build import (
     terrain_frame,
     tool_with,
 )
+from experiments.rig.law_calibrations import LawCalibrations
 from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
 from wam.bus import PythonCanDoor
-from wam.model import Tool, tool_metadata, tool_of
+from wam.calibration import (
+    FrictionCalibration,
+    friction_from_toml,
+    gravity_from_toml,
+)
+from wam.model import (
+    ArmConstants,
+    Tool,
+    load_constants,
+    moments_of_links,
+    tool_metadata,
+    weighed_arm,
+)
 
 if TYPE_CHECKING:
     from fakes.serving import PuckServer, SensorLine, SensorServer
@@ -46,6 +61,7 @@ class SimulatedRig:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes.
+        twin: calibrations of the arm whose twin it is; None = an arm of its own.
     """
 
     rig: RigSettings
@@ -53,6 +69,7 @@ class SimulatedRig:
     seed: int
     friction: float
     pace: str
+    twin: LawCalibrations | None = None
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -76,7 +93,36 @@ class SimulatedRig:
             "tool": tool_metadata(build_tool(self.rig, self.row.foot)),
             "friction": self.friction,
             "pace": self.pace,
+            "body": None if self.twin is None else self._body(self.twin),
         }
+
+    def _body(self, twin: LawCalibrations) -> dict[str, Any]:
+        """Return what the arm is by its calibrations, in plain values."""
+        known = None
+        if twin.friction:
+            known = friction_from_toml(twin.friction, self.rig.friction.file)
+        arm = self._weighed(twin.gravity, known)
+        return {
+            "com": [link.com.tolist() for link in arm.links],
+            "motors": None if known is None else known.fit.friction.metadata(),
+        }
+
+    def _weighed(self, text: str, known: FrictionCalibration | None) -> ArmConstants:
+        """Return the arm as calibrated.
+
+        What a calibration of friction takes for an asymmetry depends on the weight that
+        it subtracted: both belong together.
+        """
+        constants, weight = load_constants(), "calibrated"
+        change = np.zeros((7, 3))
+        if known is not None:
+            weight, change = known.gravity, known.fit.moments
+        if weight == "calibrated" and text:
+            stored = gravity_from_toml(text, self.rig.gravity.file)
+            return weighed_arm(constants, stored.mus + change, stored.tool)
+        if weight == "shipped":
+            return weighed_arm(constants, constants.mus + change)
+        return weighed_arm(constants, moments_of_links(constants) + change)
 
 
 def sensor_metadata(section: AnySensor) -> dict[str, Any]:
@@ -97,27 +143,20 @@ def stepped(
     `law`: models and compensation of the control law.
     """
     from fakes import SteppedClock
-    from fakes.plant import PACES, PlantOptions
-    from fakes.serving import scene_of
-    from fakes.world import FakeRig, LocalSimulation
+    from fakes.world import simulated_rig
 
-    clock, fields = SteppedClock(), world.metadata()
+    clock = SteppedClock()
     constants = law.model.constants
-    simulation = FakeRig(
-        scene_of(fields["scene"]),
-        constants,
-        tool_of(fields["tool"]),
-        clock,
-        options=PlantOptions(friction=fields["friction"], seed=world.seed),
-    )
-    clock.attach(simulation)
-    link = build_link(PythonCanDoor(simulation.bus, clock), shared, clock)
+    simulation = simulated_rig(world.metadata(), constants, clock)
+    simulated = simulation.rig
+    clock.attach(simulated)
+    link = build_link(PythonCanDoor(simulated.bus, clock), shared, clock)
     arm = build_arm(settings.rig, constants, link, clock)
 
     def sensor() -> WrenchSensor:
         if settings.rig.ft_sensor.is_on_bus:
             return open_bus_sensor(arm, link, clock)
-        return _opened_sensor(settings.rig, simulation.open_port(), clock)
+        return _opened_sensor(settings.rig, simulated.open_port(), clock)
 
     def parts(opened: WrenchSensor) -> LoopConfig:
         return LoopConfig(
@@ -132,7 +171,7 @@ def stepped(
         )
 
     backend = InProcessBackend(shared, clock, (arm, link), sensor, parts)
-    return clock, backend, LocalSimulation(simulation, PACES[fields["pace"]])
+    return clock, backend, simulation
 
 
 def _opened_sensor(rig: RigSettings, port: SerialPort, clock: Clock) -> SerialSensor:

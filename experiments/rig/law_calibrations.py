@@ -12,6 +12,7 @@ from experiments.settings import (
     Settings,
     check_kind,
     read_calibration,
+    with_calibrations,
 )
 from wam.calibration import (
     GravityCalibration,
@@ -63,10 +64,13 @@ def friction_path(settings: Settings) -> Path:
     return settings.folder / settings.rig.friction.file
 
 
-def read_law_calibrations(settings: Settings) -> LawCalibrations:
+def read_law_calibrations(
+    settings: Settings, *, is_twin: bool = False
+) -> LawCalibrations:
     """Return the texts of the calibrations that rig.toml chooses.
 
-    A calibration of friction that is not chosen tells what the rig can do without it.
+    A calibration of friction that is not chosen tells what the rig can do without it;
+    the twin of a rig weighs what its calibration says, whatever the law weighs.
 
     Raises:
         SettingsError: one cannot be read.
@@ -74,16 +78,24 @@ def read_law_calibrations(settings: Settings) -> LawCalibrations:
     gravity = friction = ""
     if settings.rig.gravity.model == "calibrated":
         gravity = read_calibration(gravity_path(settings), "gravity", _INSTEAD)
+    elif is_twin:
+        gravity = _text_of(gravity_path(settings))
     if settings.rig.friction.model == "calibrated":
         friction = read_calibration(friction_path(settings), "friction", _WITHOUT)
     else:
-        with suppress(OSError, ValueError):
-            friction = read_text(friction_path(settings))
+        friction = _text_of(friction_path(settings))
     return LawCalibrations(gravity, friction)
 
 
+def _text_of(path: Path) -> str:
+    """Return the text of a file that may be there, "" where it cannot be read."""
+    with suppress(OSError, ValueError):
+        return read_text(path)
+    return ""
+
+
 def build_law_model(
-    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool
+    rig: RigSettings, gravity_text: str, foot: str, *, is_simulated: bool | None
 ) -> ArmModel:
     """Return the arm with `foot` on it as the control law weighs it.
 
@@ -113,13 +125,18 @@ def build_law_model(
 
 
 def build_law(
-    rig: RigSettings, calibrations: LawCalibrations, foot: str, *, is_simulated: bool
+    rig: RigSettings,
+    calibrations: LawCalibrations,
+    foot: str,
+    *,
+    is_simulated: bool | None,
 ) -> LawParts:
     """Return models and compensation of the control law with `foot` on the arm.
 
     Raises:
         SettingsError: a calibration is none, was made with another tool or gravity, or
-            with a simulated arm for a real one or conversely.
+            with a simulated arm for a real one or conversely; to the twin of a rig
+            (`is_simulated` is None) both fit.
     """
     return LawParts(
         ArmModel(load_constants(), build_tool(rig, foot)),
@@ -129,7 +146,7 @@ def build_law(
 
 
 def build_compensation(
-    rig: RigSettings, friction_text: str, *, is_simulated: bool
+    rig: RigSettings, friction_text: str, *, is_simulated: bool | None
 ) -> FrictionCompensation | None:
     """Return what takes friction off the hand; None where rig.toml has none.
 
@@ -170,6 +187,35 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
                 f"{limit:.2f} N m.",
                 hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
             )
+
+
+def twin_words(settings: Settings) -> list[str]:
+    """Return what the twin of a rig takes from calibrations, and what from nominal.
+
+    Raises:
+        SettingsError: a calibration is wrong, or there is none: no rig is described.
+    """
+    measured: dict[str, str] = {}
+    rig, known = settings.rig, read_law_calibrations(settings, is_twin=True)
+    if known.gravity:
+        stored = gravity_from_toml(known.gravity, rig.gravity.file)
+        measured["gravity"] = f"{rig.gravity.file} of {stored.measured_utc}"
+    if known.friction:
+        rubbed = friction_from_toml(known.friction, rig.friction.file)
+        measured["friction"] = f"{rig.friction.file} of {rubbed.measured_utc}"
+    for name in with_calibrations(settings, is_simulated=None).calibrations:
+        measured[name] = name.partition(":")[2]
+    if not measured:
+        raise SettingsError(
+            f"{settings.folder} describes no arm of its own: no calibration is there.",
+            hint="Make one with: traction calibrate gravity, friction, sensor or "
+            f"terrain. {NOTHING}",
+        )
+    nominal = [name for name in ("gravity", "friction") if name not in measured]
+    lines = [f"twin of {settings.origin}: {', '.join(measured.values())}"]
+    if nominal:
+        lines.append(f"not calibrated, so nominal: {' and '.join(nominal)}")
+    return lines
 
 
 def law_words(rig: RigSettings, calibrations: LawCalibrations, foot: str) -> str:

@@ -23,11 +23,14 @@ from acquisition.ipc import (
     require_ordered_stores,
 )
 from acquisition.recording import RemoteRecorder
+from analysis.foresight import RigIdentity
 from experiments.rig.arm_lock import ArmLock
+from experiments.rig.foresight import ForesightSource
 from experiments.rig.services import ArmService, SensorService
 from wam.driver import ArmInfo
 
 _CONTROL, _READER = "control", "sensor reader"  # names of processes
+_FORESIGHT = "foresight"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +82,7 @@ class MultiProcessBackend:
         self._children: dict[str, Child] = {}
         self._reported: set[str] = set()
         loop_core, other_core = choose_cores()
+        self._other_core = other_core
         self._jobs = jobs
         self.fake: Child | None = None
         if jobs.fake is not None:
@@ -152,6 +156,19 @@ class MultiProcessBackend:
         if self._sensor is not None:
             grants[_READER] = self._sensor.grants()
         return grants
+
+    def start_foresight(
+        self, source: ForesightSource, rig: RigIdentity, along: Sequence[float]
+    ) -> None:
+        """Foresee in a process of its own; where it dies the session goes on."""
+        settings: dict[str, Any] = {
+            **source.settings(),
+            "rig": rig.to_dict(),
+            "along": list(along),
+            "core": self._other_core,
+        }
+        self._spawn(_FORESIGHT, "experiments.rig.foresight:main", settings)
+        self._reported.add(_FORESIGHT)
 
     @property
     def bus_path(self) -> str:

@@ -8,11 +8,13 @@ from typing import Any
 
 from acquisition import Clock, SimulationControl, SystemClock
 from acquisition.ipc import SharedLayout
+from analysis.foresight import RigIdentity
 from experiments.arguments import FRICTION
 from experiments.rig.arm_lock import ArmLock
 from experiments.rig.backend import RigBackend
 from experiments.rig.build import build_tool, terrain_frame
 from experiments.rig.fake import SimulatedRig, stepped
+from experiments.rig.foresight import ForesightSource
 from experiments.rig.law_calibrations import (
     LawCalibrations,
     build_law,
@@ -34,12 +36,14 @@ class FakeOptions:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
+        is_twin: the arm, its sensor and the containers are what calibrations say.
     """
 
     is_fast: bool
     seed: int
     friction: float = FRICTION
     pace: str = "steady"
+    is_twin: bool = False
 
 
 @dataclass(slots=True)
@@ -55,6 +59,7 @@ class Rig:
         payload: what the sensor carries, not tared.
         tared: the same with the bias of the newest tare.
         tared_ns: when that was taken [ns]; 0 = never.
+        foresight: what is foreseen with while trials are recorded; None = nothing.
         frame: where the container stands.
         row: row of the matrix.
         settings: all settings.
@@ -77,11 +82,32 @@ class Rig:
     simulation: SimulationControl | None
     is_stepped: bool
     tared_ns: int = 0
+    foresight: ForesightSource | None = None
 
     @property
     def is_simulated(self) -> bool:
         """Whether the devices are simulated."""
         return self.simulation is not None
+
+    @property
+    def identity(self) -> RigIdentity:
+        """Foot and rig, as trials state them."""
+        assert self.model.tool is not None
+        return RigIdentity(
+            simulated="true" if self.is_simulated else "false",
+            tread="true" if self.row.foot == "tread" else "false",
+            effective_mass_kg=repr(self.settings.rig.control.virtual_mass),
+            foot_mass_kg=repr(self.model.tool.foot.mass),
+        )
+
+    def watch_with(self, source: ForesightSource) -> None:
+        """Let a process beside the recorder foresee what trials are about to do.
+
+        On stepped time it is done in this thread.
+        """
+        along: list[float] = self.frame.axes()[0].tolist()
+        self.foresight = source
+        self.backend.start_foresight(source, self.identity, along)
 
 
 def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
@@ -92,16 +118,16 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         LinkError: a process cannot open its bus or port.
         PreflightError: another program has the arm.
     """
-    # A simulated world does not know what was calibrated.
+    is_twin = fake is not None and fake.is_twin
+    kind = None if is_twin else fake is not None
+    written, settings = settings, with_calibrations(settings, is_simulated=kind)
+    calibrations = read_law_calibrations(settings, is_twin=is_twin)
     world: SimulatedRig | None = None
     if fake is not None:
-        world = SimulatedRig(settings.rig, row, fake.seed, fake.friction, fake.pace)
-    settings = with_calibrations(settings, is_simulated=world is not None)
+        # A simulated world does not know what was calibrated, unless it is a twin.
+        world = _world(settings if is_twin else written, row.name, fake, calibrations)
     row = settings.row(row.name)
-    calibrations = read_law_calibrations(settings)
-    law = build_law(
-        settings.rig, calibrations, row.foot, is_simulated=world is not None
-    )
+    law = build_law(settings.rig, calibrations, row.foot, is_simulated=kind)
     shared = SharedLayout.create()
     simulation: SimulationControl | None = None
     is_stepped = fake is not None and fake.is_fast
@@ -130,6 +156,19 @@ def build_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> 
         calibrations=calibrations,
         simulation=simulation,
         is_stepped=is_stepped,
+    )
+
+
+def _world(
+    settings: Settings, terrain: str, fake: FakeOptions, calibrations: LawCalibrations
+) -> SimulatedRig:
+    return SimulatedRig(
+        rig=settings.rig,
+        row=settings.row(terrain),
+        seed=fake.seed,
+        friction=fake.friction,
+        pace=fake.pace,
+        twin=calibrations if fake.is_twin else None,
     )
 
 
@@ -167,6 +206,7 @@ def _jobs(
     common: dict[str, Any] = {
         "rig": rig.model_dump(mode="json"),
         "is_simulated": world is not None,
+        "is_twin": world is not None and world["body"] is not None,
     }
     control = {
         **common,

@@ -13,12 +13,13 @@ from experiments.messages import CATALOGUE, FaultContext
 from experiments.operator import (
     WARNING,
     FeedbackSignal,
+    ForesightView,
     Prompt,
     RecordingView,
     live_line,
     recording_lines,
 )
-from experiments.rig import Rig
+from experiments.rig import Rig, foresight_view
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
@@ -27,6 +28,7 @@ from experiments.trial import EndDetector, PaceMonitor, review_trial, trial_head
 from wam.control import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
+FORESEEN = 500  # states in the bar of slip probabilities, 5 s
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 
 
@@ -53,10 +55,19 @@ def recording_screen(
             is_arm_fine=flags & _ALL_MOTORS == _ALL_MOTORS,
             is_sensor_fine=is_sensor_fine,
             traction=np.array(records["traction"]),
+            foresight=_foreseen(rig, int(records["cycle"][-1])),
         )
         return recording_lines(view, width)
 
     return lines
+
+
+def _foreseen(rig: Rig, cycle: int) -> ForesightView | None:
+    """Return what is foreseen at a cycle; None where nothing is."""
+    if rig.foresight is None:
+        return None
+    records = rig.shared.foresight.last(FORESEEN)
+    return foresight_view(records, rig.foresight.model.terrains, cycle)
 
 
 LIVE_SECONDS = 5.0  # between two lines of a running trial

@@ -117,6 +117,7 @@ class ResumeRequest:
         operator: name; empty = the one of the session.
         script: of an operator; None = the keyboard.
         can_log: file that the bus is logged to.
+        foresight: as of `SessionRequest`.
         faults: to be injected into the simulation.
     """
 
@@ -130,6 +131,7 @@ class ResumeRequest:
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
+    foresight: Path | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -260,6 +262,7 @@ def _reopen(
         console=console,
         faults=request.faults,
         can_log=request.can_log,
+        foresight=request.foresight,
     )
     kept = len(journal.state.kept)
     console.say(f"session {folder.id}: {kept} of {journal.state.wanted} kept")
@@ -288,4 +291,4 @@ def _fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
         before = FakeOptions(is_fast=False, seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]
     is_fast = request.is_fast or before.is_fast
-    return FakeOptions(is_fast, before.seed, before.friction, pace)
+    return FakeOptions(is_fast, before.seed, before.friction, pace, before.is_twin)

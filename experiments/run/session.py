@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition import TractionError
 from experiments.arguments import data_option
 from experiments.fault_injection import HostFaults, plan_faults
-from experiments.operator import Console, OperatorInput, keyboard
+from experiments.operator import WARNING, Console, OperatorInput, keyboard
 from experiments.preflight import (
     Preflight,
     check_conditions,
@@ -20,7 +20,15 @@ from experiments.preflight import (
     sensor_conditions,
     write_conditions,
 )
-from experiments.rig import FakeOptions, Rig, SimulatedHand, logging_bus
+from experiments.rig import (
+    STUDY_DATABASE,
+    FakeOptions,
+    ForesightSource,
+    Rig,
+    SimulatedHand,
+    logging_bus,
+    read_foresight,
+)
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
@@ -53,6 +61,8 @@ class SessionRequest:
         console: where everything is printed.
         faults: to be injected into the simulation, as on the command line.
         can_log: file that the bus is logged to.
+        foresight: terrain database to foresee with; None = that of the study's report,
+            where there is one.
     """
 
     data: Path
@@ -65,6 +75,7 @@ class SessionRequest:
     console: Console
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
+    foresight: Path | None = None
 
     @property
     def who(self) -> str:
@@ -97,6 +108,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         SessionError: the conditions are not those of the session.
     """
     console, stop = request.console, StopFlag()
+    source = _foresight_of(request)
     rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
         host_faults = HostFaults(rig)
@@ -104,6 +116,8 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
         console.say(f"traction run {request.row.name}        {kind}")
         differences = _check_conditions(rig_conditions(rig), mode, console)
+        if source is not None:
+            _foresee(source, rig, console)
         page = _check_rig(request, rig, host_faults)
         sensor = sensor_conditions(page.devices)
         differences += _check_conditions(sensor, mode, console)
@@ -123,6 +137,36 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         console.say(f"▲ The fault {text} was planned, and its time never came.")
     _print_next(request, journal, code)
     return code
+
+
+def _foresight_of(request: SessionRequest) -> ForesightSource | None:
+    """Return what the session is foreseen with, None where nothing was learnt yet.
+
+    Raises:
+        SettingsError: the file that was named cannot be used.
+    """
+    if request.foresight is not None:
+        return read_foresight(request.foresight)
+    path = request.data / STUDY_DATABASE
+    if not path.exists():
+        return None
+    try:
+        return read_foresight(path)
+    except TractionError as error:  # it is in the way of nothing
+        request.console.say(f"{WARNING} Nothing is foreseen. {error}")
+        return None
+
+
+def _foresee(source: ForesightSource, rig: Rig, console: Console) -> None:
+    """Begin to foresee; say where it was learnt on another rig."""
+    rig.watch_with(source)
+    console.say(f"foresight: {source.path}, {len(source.model.terrains)} terrains")
+    if not source.model.knows(rig.identity):
+        known = "; ".join(known.text for known in source.model.provenance.rigs)
+        console.say(
+            f"{WARNING} Foresight was learnt on another foot or rig: nothing is "
+            f"foreseen. Here: {rig.identity.text}. Learnt on: {known}."
+        )
 
 
 def _check_rig(request: SessionRequest, rig: Rig, host_faults: HostFaults) -> Preflight:

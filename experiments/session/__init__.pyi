@@ -12,6 +12,7 @@ from .data_files import (
     read_json,
     sha256_of,
     write_json,
+    write_new,
     write_new_text,
     write_text,
 )
@@ -108,6 +109,7 @@ __all__ = [
     "table_lines",
     "trial_path",
     "write_json",
+    "write_new",
     "write_new_text",
     "write_next_tare",
     "write_text",

@@ -59,19 +59,24 @@ def write_text(path: Path, text: str) -> None:
     with writing(path), open_folder(path.parent) as folder:
         with suppress(FileNotFoundError):
             os.unlink(temporary, dir_fd=folder)
-        _write_new(folder, temporary, text)
+        _write_new(folder, temporary, text.encode())
         os.replace(temporary, path.name, src_dir_fd=folder, dst_dir_fd=folder)
         os.fsync(folder)
 
 
 def write_new_text(path: Path, text: str) -> None:
-    """Write `text` into a new file at `path`; never replaces one.
+    """Write `text` into a new file at `path`, as `write_new` does."""
+    write_new(path, text.encode())
+
+
+def write_new(path: Path, content: bytes) -> None:
+    """Write `content` into a new file at `path`; never replaces one.
 
     Raises:
         TrialFileError: it exists, or the disk is full or gone.
     """
     with writing(path), open_folder(path.parent) as folder:
-        _write_new(folder, path.name, text)
+        _write_new(folder, path.name, content)
         os.fsync(folder)
 
 
@@ -149,10 +154,10 @@ def _is_same(target: Path, source: Path) -> bool:
         return False
 
 
-def _write_new(folder: int, name: str, text: str) -> None:
+def _write_new(folder: int, name: str, content: bytes) -> None:
     descriptor = os.open(name, _NEW | os.O_CLOEXEC, 0o644, dir_fd=folder)
     with os.fdopen(descriptor, "wb") as file:
-        file.write(text.encode())
+        file.write(content)
         file.flush()
         os.fsync(file.fileno())
 

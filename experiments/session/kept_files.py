@@ -9,7 +9,6 @@ from typing import Any
 
 from acquisition import SessionError, TrialFileError
 from acquisition.trial_file import is_there, list_folder
-from analysis.data import FLAT
 from analysis.next_push import PushRecord, Stopping, stopping_of
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
@@ -180,6 +179,8 @@ def enough_of(
 ) -> str:
     """Return why the kept trials of a terrain are enough for its target, "" if not.
 
+    Nothing is said, nor computed, where as many are kept as the matrix wants.
+
     Args:
         sessions: oldest first; those of other terrains do not count.
         row: the terrain.
@@ -188,7 +189,9 @@ def enough_of(
     own = [s for s in sessions if s.terrain == row.name]
     own = [s for s in own if s.is_simulated is is_simulated]
     texts = [json.dumps(push.plain()) for s in own for push in kept_pushes(s)]
-    told = _stopping(tuple(texts), row.stones, row.target)
+    if len(texts) >= row.trials:
+        return ""
+    told = _stopping(tuple(texts), row.kind, row.target)
     if told is None or not told.is_enough:
         return ""
     return (
@@ -197,10 +200,10 @@ def enough_of(
 
 
 @lru_cache(maxsize=64)
-def _stopping(texts: tuple[str, ...], stones: str, target: str) -> Stopping | None:
+def _stopping(texts: tuple[str, ...], kind: str, target: str) -> Stopping | None:
     records = [PushRecord.from_plain(json.loads(text)) for text in texts]
     known = [record for record in records if record is not None]
-    return stopping_of(known, FLAT if stones == "none" else stones, target)
+    return stopping_of(known, kind, target)
 
 
 def board_notes(

@@ -180,7 +180,7 @@ def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> lis
     ]
     order = suggest_order(matrix.terrains, [s.terrain for s in sessions])
     if order:
-        steps.append(f"Next terrains, so that none goes with time: {' '.join(order)}")
+        steps.append(f"Suggested order, randomised against drift: {' '.join(order)}")
     return steps
 
 

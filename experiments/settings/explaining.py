@@ -3,14 +3,13 @@
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from experiments.arguments import did_you_mean
+from experiments.arguments import nearest
 
 _MOST = 8  # errors in one message
 _HEADER = re.compile(r"^\s*(\[\[|\[)\s*([\w.\" -]+?)\s*\]")
@@ -72,8 +71,9 @@ def explain(
                 for e in errors
                 if e["type"] == "missing" and e["loc"][:-1] == where[:-1]
             }
-            near = get_close_matches(str(where[-1]), missing, n=1)
-            meant.update(missing[key] for key in near)
+            key = nearest(str(where[-1]), missing)
+            if key is not None:
+                meant.add(missing[key])
         if where not in meant:
             parts.append(_sentence(model, text, each))
     more = [f"and {len(parts) - _MOST} more"] if parts[_MOST:] else []
@@ -93,8 +93,8 @@ def _reason(location: "_Location", error: ErrorDetails) -> str:
         return f"{place} is missing{location.example}"
     if error["type"] == "extra_forbidden":
         option = str(error["loc"][-1])
-        asked = did_you_mean(option, location.siblings).rstrip("?")
-        asked = asked.replace("Did", " - did", 1) + "?" if asked else ""
+        meant = nearest(option, location.siblings)
+        asked = "" if meant is None else f" - did you mean {meant}?"
         return f"{place} {_refusal(location, option)}{asked}"
     if error["type"] == "union_tag_not_found":
         return f"{place}.kind is missing, e.g. {_kinds(location.kinds)}"

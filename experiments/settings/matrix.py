@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from acquisition import File, Near, Number, SettingsSection, Vector3, Whole
+from analysis.data import FLAT
 
 _Angles = tuple[Near, Near, Near, Near, Near, Near, Near]
 _Task = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\x00-\x1f]+$")]
@@ -36,6 +37,11 @@ class TerrainRow(SettingsSection):
     )
     start_q: _Angles = Field(examples=[[0, 0.77, 0, 1.19, 0, 1.19, 0]])
     calibration: File | None = Field(default=None, examples=["terrain_S10.toml"])
+
+    @property
+    def kind(self) -> str:
+        """Kind of terrain: the size of its stones, or "flat" for a plate."""
+        return FLAT if self.stones == "none" else self.stones
 
 
 class MatrixSettings(SettingsSection):

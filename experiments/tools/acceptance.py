@@ -60,6 +60,7 @@ class AcceptancePlan:
         seed: of everything random.
         friction: of the joints, as a share of what was identified on another arm.
         jobs: processes at a time; None = one per core.
+        is_twin: the simulated rig is the one that the calibrations describe.
     """
 
     config: Path | None
@@ -70,6 +71,7 @@ class AcceptancePlan:
     seed: int
     friction: float
     jobs: int | None
+    is_twin: bool = False
 
 
 def record_study(
@@ -154,6 +156,7 @@ def _record(arguments: list[str], place: Path) -> int:
 
 def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
     config = [] if plan.config is None else ["--config", str(plan.config)]
+    config += ["--twin"] if plan.is_twin else []
     return [
         *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
         *("--trials", str(plan.trials), "--seed", str(plan.seed)),

@@ -58,7 +58,7 @@ def collect_metadata(
 
 def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHeader:
     """Return everything that is known about a trial before its first cycle."""
-    row = rig.row
+    row, identity = rig.row, rig.identity.to_dict()
     offset, uncertainty = utc_offset_ns(rig.clock)
     assert rig.model.tool is not None
     trial = {
@@ -68,14 +68,14 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         "terrain": row.name,
         "incline_deg": repr(row.incline_deg),
         "stone_size": row.stones,
-        "tread": "true" if row.foot == "tread" else "false",
-        "effective_mass_kg": repr(rig.settings.rig.control.virtual_mass),
-        "foot_mass_kg": repr(rig.model.tool.foot.mass),
+        "tread": identity["tread"],
+        "effective_mass_kg": identity["effective_mass_kg"],
+        "foot_mass_kg": identity["foot_mass_kg"],
         "gravity_model": rig.settings.rig.gravity.model,
         "friction_compensation": repr(rig.settings.rig.friction.share),
         "operator": details.operator,
         "notes": "",
-        "simulated": "true" if rig.is_simulated else "false",
+        "simulated": identity["simulated"],
         "seed": "" if details.seed is None else str(details.seed),
         "started_utc": iso_utc(rig.clock.utc_ns()),
         "tared_ns": str(rig.tared_ns),
@@ -99,6 +99,9 @@ def trial_header(rig: Rig, details: SessionMetadata, name: TrialName) -> TrialHe
         provenance={**details.provenance, **rig.backend.loop_client.device_metadata()},
         attachments={key: text.encode() for key, text in attachments.items()},
         robot_description=attachments["robot.urdf"],
+        foresight=(
+            {} if rig.foresight is None else rig.foresight.metadata(rig.identity)
+        ),
     )
 
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from acquisition import Flag
 from analysis.data import (
-    FLAT,
     JOINT7_WARNING,
     MINIMUM_KEPT,
     CoverageGrid,
@@ -194,8 +193,7 @@ def next_push(folder: SessionFolder, row: TerrainRow) -> NextPush:
         folder: of the session.
         row: its terrain.
     """
-    kind = FLAT if row.stones == "none" else row.stones
-    advice = advise(kept_pushes(folder), kind, row.target)
+    advice = advise(kept_pushes(folder), row.kind, row.target)
     if advice is None:
         return NextPush(_emptiest(folder))
     enough = ""

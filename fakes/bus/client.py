@@ -80,7 +80,7 @@ class SocketBus(can.BusABC):
             self._socket.close()
             self._is_shutdown = True
             raise can.CanInitializationError(
-                f"nobody serves a bus at {channel} ({error.strerror or error})",
+                f"there is no server at {channel} ({error.strerror or error})",
                 error.errno,
             ) from error
         self._socket.setblocking(False)

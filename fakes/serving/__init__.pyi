@@ -1,6 +1,5 @@
 from .home_arm import HomePose, build_home_server
 from .puck_server import PuckServer, open_can_port
-from .rig_process import scene_of
 from .sensor_server import SensorLine, SensorServer, hanging_load
 
 __all__ = [
@@ -11,5 +10,4 @@ __all__ = [
     "build_home_server",
     "hanging_load",
     "open_can_port",
-    "scene_of",
 ]

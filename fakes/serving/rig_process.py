@@ -4,9 +4,6 @@ import select
 import signal
 import tempfile
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from acquisition import (
     DeviceServer,
@@ -27,14 +24,12 @@ from acquisition.ipc import (
     name_process,
 )
 from fakes.bus import SocketHub
-from fakes.plant import PACES, PlantOptions
 from fakes.pucks import WiredNetwork
-from fakes.sensor import SensorChoice, SerialPty
+from fakes.sensor import SerialPty
 from fakes.truth import Truth, truth_records
-from fakes.world import FakeRig, LocalSimulation, SimulatedScene
+from fakes.world import FakeRig, LocalSimulation, simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock
-from ft_sensor import TerrainFrame
-from wam.model import load_constants, tool_of
+from wam.model import load_constants
 
 PRIORITY = 70
 TRUTH_ROWS = 50  # in one answer; the bus waits meanwhile
@@ -145,25 +140,6 @@ class PlantTruth:
         return truth_records(part, frame)
 
 
-def scene_of(fields: dict[str, Any]) -> SimulatedScene:
-    """Return the scene that was put into plain values."""
-    frame = fields["frame"]
-    return SimulatedScene(
-        terrain=fields["terrain"],
-        stones=fields["stones"],
-        foot=fields["foot"],
-        frame=TerrainFrame(
-            frame["incline"],
-            frame["heading"],
-            tuple(frame["far_end"]),
-            frame["travel"],
-        ),
-        start_q=np.array(fields["start_q"]),
-        seed=fields["seed"],
-        sensor=SensorChoice(**fields["sensor"]),
-    )
-
-
 def main(station: ChildContext) -> None:
     """Serve a simulated rig until the console hangs up."""
     name_process("traction-fake")
@@ -172,12 +148,5 @@ def main(station: ChildContext) -> None:
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:
         settings, clock = station.settings, WorldClock(SystemClock())
-        rig = FakeRig(
-            scene_of(settings["scene"]),
-            load_constants(),
-            tool_of(settings["tool"]),
-            clock,
-            PlantOptions(settings["friction"], seed=settings["scene"]["seed"]),
-        )
-        simulation = LocalSimulation(rig, PACES[settings["pace"]])
+        simulation = simulated_rig(settings, load_constants(), clock)
         RigServer(simulation, clock, folder, station.channel).serve()

@@ -14,13 +14,12 @@ from acquisition import SystemClock
 from experiments.rig.fake import SimulatedRig
 from experiments.settings import load_settings
 from experiments.tools import Lines
-from fakes.plant import PACES
 from fakes.pucks import WiredNetwork
-from fakes.serving import open_can_port, scene_of
-from fakes.world import FakeRig, LocalSimulation
+from fakes.serving import open_can_port
+from fakes.world import simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.guest.far_sensor import FarEnd
-from wam.model import load_constants, tool_of
+from wam.model import load_constants
 
 
 class PushedArm:
@@ -30,22 +29,16 @@ class PushedArm:
         settings = load_settings(options.config)
         row = settings.row(options.row)
         world = SimulatedRig(settings.rig, row, options.seed, 0.02, "steady")
-        fields = world.metadata()
         self._clock = WorldClock(SystemClock())
-        rig = self._rig = FakeRig(
-            scene_of(fields["scene"]),
-            load_constants(),
-            tool_of(fields["tool"]),
-            self._clock,
-        )
-        self._simulation = LocalSimulation(rig, PACES[fields["pace"]])
+        simulation = simulated_rig(world.metadata(), load_constants(), self._clock)
+        self._simulation, rig = simulation, simulation.rig
+        self._rig = rig
         self._wired = WiredNetwork(rig.network, is_far=True)
         interface, _, channel = options.bus.partition(":")
         self._port = open_can_port(interface, channel, settings.rig.can.bitrate)
         self._line: FarEnd | None = None
         if options.line is not None:
             self._line = FarEnd(rig.stream, options.line, self._clock.now_ns())
-        simulation = self._simulation
         self._actions: dict[str, Callable[[], None]] = {
             "lift": simulation.lift,
             "put_down": simulation.put_down,

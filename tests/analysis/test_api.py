@@ -1,4 +1,4 @@
-"""The functions for notebooks, and the example that the README gives of them."""
+"""The functions for notebooks, and the example that docs/functions.md gives of them."""
 
 import re
 from dataclasses import replace
@@ -20,7 +20,7 @@ from analysis.api import (
 )
 from analysis.terrains.export import database_of
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "functions.md"
 SMALL = FitOptions(gp_points=60, models=("tustin", "gp_se"))
 
 
@@ -29,15 +29,17 @@ def kept(slice_trials):
     return [prepare(series) for series in slice_trials["TF"]]
 
 
-def test_the_readmes_example_runs_on_a_table(slice_path, tmp_path, monkeypatch, capsys):
+def test_the_example_of_the_page_runs_on_a_table(
+    slice_path, tmp_path, monkeypatch, capsys
+):
     (block,) = [
         block
-        for block in re.findall(r"```python\n(.*?)```", README.read_text(), re.DOTALL)
+        for block in re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.DOTALL)
         if "analysis.api" in block
     ]
     (tmp_path / "trials.npz").symlink_to(slice_path)
     monkeypatch.chdir(tmp_path)
-    exec(compile(block, str(README), "exec"), {})
+    exec(compile(block, str(PAGE), "exec"), {})
     said = capsys.readouterr().out.splitlines()
     assert "'mu'" in said[0]
     assert [line[0] for line in said[-3:]] == ["1", "2", "3"]

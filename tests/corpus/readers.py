@@ -9,11 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.errors import TrialFileError
+from acquisition.errors import TractionError, TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
 from experiments.operator.scripted import ScriptedOperator
+from experiments.report.checksums import SUMS, changed_files
+from experiments.report.rebuilding import compare_tables
 from experiments.rig.law_calibrations import build_compensation
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
@@ -109,6 +111,29 @@ def _table(name: str) -> Callable[[bytes, Path], None]:
         load_tables([folder / name])
 
     return read
+
+
+PACKAGED = b"t [s],v_t [m/s],F_n [N],F_t [N]\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n"
+
+
+def _package(data: bytes, folder: Path) -> None:
+    """Read `data` as the description of a folder with one sound table."""
+    (folder / "T01.csv").write_bytes(PACKAGED)
+    (folder / "datapackage.json").write_bytes(data)
+    for path in (folder, folder / "T01.csv"):
+        with contextlib.suppress(TractionError):
+            load_tables([path])
+    load_tables([folder])
+
+
+def _sums(data: bytes, folder: Path) -> None:
+    (folder / "T01.csv").write_bytes(PACKAGED)
+    (folder / SUMS).write_bytes(data)
+    changed_files(folder)
+
+
+def _results(data: bytes, _: Path) -> None:
+    compare_tables(data.decode(errors="replace"), RESULTS)
 
 
 def _database(data: bytes, folder: Path) -> None:
@@ -210,6 +235,10 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "database": _database,
     "table": _table("trial.csv"),
     "npz": _table("trials.npz"),
+    "parquet": _table("trial.parquet"),
+    "package": _package,
+    "sums": _sums,
+    "results": _results,
     "script": _script,
     "poses": _poses,
     "presses": _presses,
@@ -225,6 +254,11 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "used-journal": _used("/events.jsonl"),
     "used-mcap": _used("trials/T01.mcap"),
 }
+RESULTS = """\
+terrain,model,fold,quantity,value,unit
+TF,tustin,1,mae,0.5,N
+TF,gp_se,1,nlpd,nan,log N
+"""
 RUNNING = b"""\
 {"event": "session-started", "terrain": "TF", "trials": 2}
 {"event": "activated"}

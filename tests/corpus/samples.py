@@ -1,5 +1,6 @@
 """One sound input of each kind, small: what mutations begin with."""
 
+import hashlib
 import io
 import json
 from functools import cache
@@ -9,6 +10,8 @@ import numpy as np
 
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
+from analysis.data.data_package import TableOrigin
+from analysis.data.parquet_tables import to_parquet
 from analysis.terrains.database import FORMAT, VERSION
 from fakes.plant.friction import draw_friction
 from fakes.sensor.kinds import SERIAL_KINDS, SensorChoice, make_stream
@@ -16,7 +19,7 @@ from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
-from tests.corpus.readers import RUNNING
+from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
 from wam.calibration.friction_file import FrictionCalibration, friction_to_toml
@@ -130,6 +133,31 @@ def _npz() -> bytes:
     return file.getvalue()
 
 
+def _parquet() -> bytes:
+    ramp = np.arange(5.0)
+    columns = {"t": ramp, "v_t": ramp, "F_n": np.ones(5), "F_t": np.ones(5)}
+    origin = TableOrigin(table="trial", session="S001", trial="T01", terrain="TF")
+    return to_parquet(columns, {"v_t": "mm/s"}, origin)
+
+
+def _package() -> bytes:
+    entry = {
+        "name": "t01",
+        "path": "T01.csv",
+        "format": "csv",
+        "mediatype": "text/csv",
+        "bytes": len(PACKAGED),
+        "hash": f"sha256:{hashlib.sha256(PACKAGED).hexdigest()}",
+        "schema": {"fields": [{"name": "t [s]", "type": "number", "unit": "s"}]},
+        "traction": {"table": "trial", "terrain": "TF", "incline_deg": 5.0},
+    }
+    return json.dumps({"name": "p", "resources": [entry]}).encode()
+
+
+def _sums() -> bytes:
+    return f"{hashlib.sha256(PACKAGED).hexdigest()}  T01.csv\n".encode()
+
+
 def _frames() -> bytes:
     words = (
         encode_force((1.0, 2.0, 3.0)),
@@ -179,6 +207,10 @@ def samples() -> dict[str, bytes]:
         "used-journal": session_file("/events.jsonl"),
         "used-mcap": session_file("trials/T01.mcap"),
         "npz": _npz(),
+        "parquet": _parquet(),
+        "package": _package(),
+        "sums": _sums(),
+        "results": RESULTS.encode(),
         "script": _SCRIPT,
         "poses": _POSES,
         "presses": _PRESSES,

@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import pytest
 
-import fakes.world
 from acquisition.clock import Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.ipc.loop_server import LoopServer
 from experiments.rig import build, fake
 from experiments.rig.backend import InProcessBackend
+from fakes.world import plain_world
 from fakes.world.rig import FakeRig
 
 
@@ -63,13 +63,13 @@ def watch_builds(patch: pytest.MonkeyPatch) -> Built:
     """Return what will be built while `patch` lasts."""
     built = Built()
 
-    class SeenRig(fakes.world.FakeRig):
+    class SeenRig(plain_world.FakeRig):
         def __init__(self, scene, constants, tool, clock, *arguments, **named):
             super().__init__(scene, constants, tool, clock, *arguments, **named)
             built.rigs.append(self)
             built.clocks.append(clock)
 
-    patch.setattr(fakes.world, "FakeRig", SeenRig)
+    patch.setattr(plain_world, "FakeRig", SeenRig)
     patch.setattr(
         fake, "InProcessBackend", _seen(fake.InProcessBackend, built.backends)
     )

@@ -1,19 +1,19 @@
 """Simulated arms that differ from the usual one, under the whole program."""
 
-import fakes.world
 from fakes.pucks.options import NetworkOptions
+from fakes.world import plain_world
 
 
 def serve(monkeypatch, options=None, prepare=None):
     """Let every simulated rig have the network `options`, and what `prepare` does."""
 
-    class OtherRig(fakes.world.FakeRig):
+    class OtherRig(plain_world.FakeRig):
         def __init__(self, *arguments, **named):
             super().__init__(*arguments, **{"network": options, **named})
             if prepare is not None:
                 prepare(self.network)
 
-    monkeypatch.setattr(fakes.world, "FakeRig", OtherRig)
+    monkeypatch.setattr(plain_world, "FakeRig", OtherRig)
 
 
 def firmware(motor, safety=None):

@@ -31,11 +31,23 @@ def test_help_of_the_program_names_every_command():
     assert done.out.rstrip().endswith(EXIT_CODES.rstrip())
 
 
-@pytest.mark.parametrize("arguments", [(), ("fly",), ("run",), ("fit", "a.csv")])
+@pytest.mark.parametrize("arguments", [("fly",), ("run",), ("fit", "a.csv")])
 def test_what_is_no_command_is_a_usage_error(arguments):
     done = traction(*arguments)
     assert done.code == 2
     assert "usage: traction" in done.err
+
+
+def test_without_a_command_the_first_steps_are_shown():
+    done = traction()
+    assert done.code == 0
+    shown = [line.split() for line in done.out.splitlines() if "  traction " in line]
+    assert {words[1] for words in shown} <= set(COMMANDS)
+    for words in shown:
+        end = words.index("--all") + 1 if "--all" in words else len(words)
+        options = [word for word in words[2:end] if word.startswith("-")]
+        known = traction(words[1], "--help").out
+        assert all(option in known for option in options)
 
 
 GLOBAL = [

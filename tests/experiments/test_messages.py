@@ -19,16 +19,16 @@ from experiments.messages import (
 )
 from tests.experiments.program import traction
 
-README = Path(__file__).parents[2] / "README.md"
+PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
 HEAD = "| message | what you read | the arm | what to do |"
 
 
-def test_the_table_of_the_readme_is_that_of_the_catalogue():
-    lines = README.read_text().splitlines()
+def test_the_table_of_the_page_is_that_of_the_catalogue():
+    lines = PAGE.read_text().splitlines()
     table = catalogue_table()
     begin = lines.index(HEAD)
     assert lines[begin : begin + len(table)] == table
-    assert not lines[begin + len(table)].startswith("|")
+    assert not any(line.startswith("|") for line in lines[begin + len(table) :])
 
 
 def test_the_whole_catalogue_can_be_explained():

@@ -9,7 +9,6 @@ import pytest
 
 import experiments.run.runner
 import experiments.run.session
-import fakes.world
 from acquisition.clock import PERIOD_NS, Clock
 from acquisition.control_loop.cycle import Cycle
 from acquisition.control_loop.guard import GuardLimits
@@ -20,6 +19,7 @@ from experiments.calibrating import gravity
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run import pose_walk
 from fakes.pucks.bank import PuckBank
+from fakes.world import plain_world
 from fakes.world.rig import FakeRig, LocalSimulation
 from tests.experiments.program import Done, journal, run_short, sidecar, traction
 from tests.faults.phases import MOVING
@@ -212,7 +212,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
     """Let every simulated rig, cycle and torque frame be seen."""
     scenes: list[SimulatedScene] = []
 
-    class Rig(fakes.world.FakeRig):
+    class Rig(plain_world.FakeRig):
         def __init__(self, scene, constants, tool, clock, *arguments, **named):
             super().__init__(scene, constants, tool, clock, *arguments, **named)
             scenes.append(SimulatedScene(self, clock, patch))
@@ -241,7 +241,7 @@ def _watch(patch: pytest.MonkeyPatch) -> list[SimulatedScene]:
         usual_mend(simulation)
 
     patch.setattr(LocalSimulation, "clear_faults", clear_faults)
-    patch.setattr(fakes.world, "FakeRig", Rig)
+    patch.setattr(plain_world, "FakeRig", Rig)
     patch.setattr(Cycle, "__call__", call)
     return scenes
 

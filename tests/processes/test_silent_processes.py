@@ -41,7 +41,7 @@ def holds(seen):
 @pytest.mark.parametrize(
     ("victim", "message"),
     [
-        ("console", "The console did not look after the arm for 0.5 s. ARM: holding."),
+        ("console", "No heartbeat from the console for 0.5 s. ARM: holding."),
         ("recorder", "the recorder was silent for 0.5 s. Is the disk slow? ARM: hold"),
     ],
 )

@@ -6,15 +6,7 @@ from .friction_file import (
     friction_to_toml,
     truth_to_toml,
 )
-from .friction_fit import (
-    FrictionFit,
-    check_friction,
-    fit_friction,
-    joint_asymmetry,
-    joint_breakaway,
-    joint_deviation,
-    speed_curve,
-)
+from .friction_fit import FrictionFit, check_friction, fit_friction
 from .friction_reach import (
     FrictionReach,
     FrictionTorques,
@@ -30,6 +22,12 @@ from .gravity_file import (
     fits_tool,
     gravity_from_toml,
     gravity_to_toml,
+)
+from .joint_friction import (
+    joint_asymmetry,
+    joint_breakaway,
+    joint_deviation,
+    speed_curve,
 )
 from .poses import (
     APPROACH_SPEED,

@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError, parse_toml
-from wam.calibration.friction_fit import (
-    FrictionFit,
+from wam.calibration.friction_fit import FrictionFit
+from wam.calibration.joint_friction import (
     joint_asymmetry,
     joint_breakaway,
     joint_deviation,
 )
 from wam.model import ArmConstants, Array, MotorFriction, friction_of, joint_coulomb
 
+_LARGEST_MOMENT = 10.0  # kg m
 _LARGEST = 1e4  # of any number in the file
 
 
@@ -58,6 +59,8 @@ def friction_to_toml(calibration: FrictionCalibration, constants: ArmConstants) 
         f"{_line('asymmetry_deviation', fit.asymmetry_deviation)}"
         f"{_line('residual', fit.residual)}"
         f"rows = {list(fit.rows)}\n"
+        "# To be added to the first moments whose weight was subtracted [kg m].\n"
+        f"moments = {fit.moments.tolist()}\n"
     )
 
 
@@ -71,8 +74,9 @@ def truth_to_toml(
         load_at: torques at which a calibration states Coulomb friction [N m], (7,).
         constants: of the arm.
     """
-    moved = friction.load * (load_at - friction.load_at)
-    there = replace(friction, coulomb=friction.coulomb + moved, load_at=load_at)
+    coulomb = friction.coulomb + friction.load * (load_at - friction.load_at)
+    presliding = friction.presliding * coulomb / friction.coulomb  # as stiff as it is
+    there = replace(friction, coulomb=coulomb, load_at=load_at, presliding=presliding)
     return (
         "# Friction that the simulated arm really has. SI units.\n"
         "is_simulated = true\n"
@@ -117,7 +121,16 @@ def _fit(motors: dict[str, Any], quality: dict[str, Any]) -> FrictionFit:
         asymmetry_deviation=asymmetry,
         residual=residual,
         rows=tuple(int(count) for count in rows.tolist()),
+        moments=_moments(quality.get("moments")),
     )
+
+
+def _moments(value: object) -> Array:
+    """Return the change of first moments; files of before 0.2 have none."""
+    array = np.zeros((7, 3)) if value is None else np.array(value, dtype=np.float64)
+    if array.shape != (7, 3) or not bool((np.abs(array) < _LARGEST_MOMENT).all()):
+        raise ValueError("moments: expected seven times three numbers below 10 kg m")
+    return array
 
 
 def _joint_lines(constants: ArmConstants, friction: MotorFriction) -> str:

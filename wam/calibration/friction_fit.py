@@ -12,24 +12,22 @@ blocks of 2 s (a sandwich), not from rows taken as independent.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import SettingsError
-from wam.calibration.sliding import SlidingRows
+from wam.calibration.sliding import SlidingRows, check_enough
 from wam.model import (
     ArmConstants,
     Array,
     MotorFriction,
-    joint_coulomb,
     motor_turns,
 )
 
 LARGEST_RESIDUAL = 0.2  # of Coulomb friction, rms on the held-out way
 LEAST_BOUND = 0.7  # of the estimate: its lower bound
-FEWEST = 60  # rows of a motor, in each sense a quarter of them
 _STRIBECK = np.geomspace(0.005, 0.08, 13)  # rad/s of the joint
 _EXCESS = np.linspace(0.0, 0.7, 15)  # s - 1
 _SIGMAS = 1.96
@@ -37,6 +35,8 @@ _LOAD = 0.03  # N m per N m; this and the next two: deviations of priors
 _RIPPLE = 0.1  # of Coulomb friction
 _INERTIA = 0.1  # of the model's
 _PEAK_WEIGHT = 3.0  # of one break-away against one row of sliding
+_FEWEST_LEGS = 3  # on which a motor shows how it gives way
+_ASSUMED_PRESLIDING, _PRESLIDING = 2e-3, (2e-4, 5e-3)  # rad of the joint
 _NOISE = 0.03  # of Coulomb friction: rows are not known better
 _COLUMNS = 7  # F_c, F_a, mu, r_s, r_c, b, inertia; then gravity
 
@@ -51,6 +51,8 @@ class FrictionFit:
         asymmetry_deviation: of its asymmetries [N m], shape (7,).
         residual: rms on the held-out way as shares of Coulomb friction, shape (7,).
         rows: how many rows each motor had, shape (7,).
+        moments: what is to be added to the first moments with which the weight was
+            subtracted [kg m], shape (7, 3).
     """
 
     friction: MotorFriction
@@ -58,6 +60,7 @@ class FrictionFit:
     asymmetry_deviation: Array
     residual: Array
     rows: tuple[int, ...]
+    moments: Array = field(default_factory=lambda: np.zeros((7, 3)))
 
     @property
     def lower_bound(self) -> Array:
@@ -94,13 +97,13 @@ def fit_friction(
         SettingsError: a motor did not slide enough either way.
     """
     for motor, shown in enumerate(rows, 1):
-        _check_enough(motor, shown)
+        check_enough(motor, shown)
     turns = motor_turns(constants)
     fits = [
         _fit_motor(shown, float(scale), gravity_deviation)
         for shown, scale in zip(rows, turns, strict=True)
     ]
-    friction = _friction_of(fits, turns)
+    friction = _friction_of(fits, turns, [shown.compliance for shown in rows])
     residual = _residuals(friction, fits, held_out)
     # What another way does not confirm is no noise: it does not average out.
     doubt = (residual * friction.coulomb)[:, None]
@@ -112,13 +115,46 @@ def fit_friction(
         asymmetry_deviation=deviations[:, 1],
         residual=residual,
         rows=tuple(len(shown) for shown in rows),
+        moments=_moments(rows, fits, gravity_deviation),
     )
 
 
-def _friction_of(fits: Sequence[_MotorFit], turns: Array) -> MotorFriction:
-    """Return the fits in the form of the model; presliding is ASSUMED, 2 mrad."""
+def _moments(
+    rows: Sequence[SlidingRows], fits: Sequence[_MotorFit], gravity_deviation: Array
+) -> Array:
+    """Return the one change of first moments that all motors show, shape (7, 3).
+
+    Each motor was fitted with a change of its own, which belongs to no arm.
+    """
+    normal = np.diag(1.0 / np.maximum(gravity_deviation, 1e-9) ** 2)
+    torques = np.zeros(21)
+    for shown, fit in zip(rows, fits, strict=True):
+        columns = _columns(shown, (fit.stribeck, fit.excess), fit.load_at)
+        rest = shown.friction - columns[:, :_COLUMNS] @ fit.values[:_COLUMNS]
+        weights = _weights(shown, float(np.median(np.abs(shown.friction))))
+        weighted = shown.gravity * weights[:, None]
+        normal += weighted.T @ weighted
+        torques += weighted.T @ (rest * weights)
+    return np.asarray(np.linalg.solve(normal, torques), np.float64).reshape(7, 3)
+
+
+def _friction_of(
+    fits: Sequence[_MotorFit], turns: Array, compliances: Sequence[Array]
+) -> MotorFriction:
+    """Return the fits in the form of the model.
+
+    Presliding is what a motor gives way at the torque that breaks it away; 2 mrad is
+    ASSUMED of motors that showed it too seldom, and the range of that kept.
+    """
     values = np.array([fit.values[:_COLUMNS] for fit in fits])
     coulomb = values[:, 0]
+    broken = coulomb * (1.0 + np.array([fit.excess for fit in fits]))
+    shown = [
+        float(np.median(given)) if len(given) >= _FEWEST_LEGS else np.nan
+        for given in compliances
+    ]
+    seen = np.clip(np.array(shown) * broken / turns, *_PRESLIDING)
+    presliding = np.where(np.isnan(seen), _ASSUMED_PRESLIDING, seen)
     return MotorFriction(
         coulomb=coulomb,
         asymmetry=values[:, 1],
@@ -129,7 +165,7 @@ def _friction_of(fits: Sequence[_MotorFit], turns: Array) -> MotorFriction:
         viscous=np.maximum(values[:, 5], 0.0),
         ripple_sin=values[:, 3] / coulomb,
         ripple_cos=values[:, 4] / coulomb,
-        presliding=2e-3 * turns,
+        presliding=presliding * turns,
     )
 
 
@@ -156,52 +192,6 @@ def check_friction(fit: FrictionFit) -> None:
             f"bound is {shares[least]:.2f} of it (at least {LEAST_BOUND:g}).",
             hint=hint,
         )
-
-
-def joint_deviation(constants: ArmConstants, deviation: Array) -> Array:
-    """Return the standard deviation of each joint's Coulomb torque [N m], (7,)."""
-    return np.sqrt((constants.j2mp**2).T @ deviation**2)
-
-
-def joint_asymmetry(constants: ArmConstants, asymmetry: Array) -> Array:
-    """Return half of forwards less backwards at each joint alone [N m], shape (7,)."""
-    return constants.j2mp.T @ asymmetry
-
-
-def speed_curve(
-    constants: ArmConstants, friction: MotorFriction, joint: int, speeds: Array
-) -> Array:
-    """Return the torque against a joint that turns alone [N m], shape (n,).
-
-    Mean of both ways, at the torque at which `coulomb` holds, without the ripple.
-
-    Args:
-        constants: of the arm.
-        friction: of its motors.
-        joint: 0-6.
-        speeds: of the joint [rad/s], shape (n,), above 0.
-    """
-    shares = np.abs(constants.j2mp[:, joint])
-    motors = speeds[:, None] * shares
-    excess = (friction.breakaway - 1.0) / (1.0 + (motors / friction.stribeck) ** 2)
-    torques = friction.coulomb * (1.0 + excess) + friction.viscous * motors
-    return torques @ shares
-
-
-def joint_breakaway(constants: ArmConstants, friction: MotorFriction) -> Array:
-    """Return the torque that breaks each joint away, mean of both ways [N m], (7,)."""
-    return joint_coulomb(constants, friction.coulomb * friction.breakaway)
-
-
-def _check_enough(motor: int, rows: SlidingRows) -> None:
-    fewer = min(int((rows.sense > 0.0).sum()), int((rows.sense < 0.0).sum()))
-    if len(rows) >= FEWEST and fewer >= FEWEST // 4:
-        return
-    raise SettingsError(
-        f"Motor {motor} slid in {len(rows)} rows, {fewer} of them in the rarer sense "
-        f"(at least {FEWEST} and {FEWEST // 4}).",
-        hint="Does the motor turn as it is sent? Clear more space around the arm.",
-    )
 
 
 def _fit_motor(rows: SlidingRows, turns: float, gravity: Array) -> _MotorFit:
@@ -247,12 +237,17 @@ def _system(
     """Return the weighted columns, the weighted torques and the prior's weights."""
     scale, gravity = known
     A = _columns(rows, pair, load_at)
-    weights = 1.0 / np.hypot(_NOISE * scale, _INERTIA * rows.inertia)
+    weights = _weights(rows, scale)
     weights *= np.where(rows.speed == 0.0, _PEAK_WEIGHT, 1.0)
     ripple = 1.0 / (_RIPPLE * scale) ** 2
     loose = [0.0, 0.0, 1.0 / _LOAD**2, ripple, ripple, 0.0, 1.0 / _INERTIA**2]
     prior = np.concatenate([loose, 1.0 / np.maximum(gravity, 1e-9) ** 2])
     return A * weights[:, None], rows.friction * weights, prior
+
+
+def _weights(rows: SlidingRows, scale: float) -> Array:
+    """Return what rows of sliding count, `scale` [N m] being a motor's friction."""
+    return 1.0 / np.hypot(_NOISE * scale, _INERTIA * rows.inertia)
 
 
 def _columns(rows: SlidingRows, pair: tuple[float, float], load_at: float) -> Array:

@@ -1,13 +1,13 @@
 """From recorded cycles to what resists each motor as it slides and breaks away."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import PERIOD_NS
-from wam.model import ArmModel, Array, motor_turns, regressor
+from acquisition import PERIOD_NS, SettingsError
+from wam.model import ELASTIC, ArmModel, Array, motor_turns, regressor
 
 HALF = 10  # samples on each side of the centre of a line fit: 42 ms in all
 # Joint 7 turns at its own pace and breaks away within 20 ms, which HALF would flatten.
@@ -20,6 +20,8 @@ _SLOWEST = 2e-3  # rad/s of the joint: below it nothing is called sliding
 # rad of the joint from a reversal until the bristle is bent as by steady sliding
 _WINDING = np.array([6e-3] * 4 + [10e-3] * 3)
 _BREAKING = np.array([3e-3] * 4 + [5e-3] * 3)  # rad by which a motor has broken away
+_FEWEST_BENT, _BENT_SPAN = 20, 0.4  # samples, and share of the torque they span
+FEWEST = 60  # rows of a motor, in each sense a quarter of them
 BLOCK = 2.0  # s of neighbouring rows whose residuals may be alike
 
 
@@ -51,6 +53,8 @@ class SlidingRows:
         inertia: torque that accelerates the arm by its model [N m].
         gravity: torque by first moments of 1 kg m, shape (n, 21).
         block: number of the stretch of 2 s; residuals within one may be alike.
+        compliance: how far the motor gave way before it broke away [rad/(N m)], one
+            for each slow leg on which that shows, shape (m,).
     """
 
     angle: Array
@@ -61,6 +65,7 @@ class SlidingRows:
     inertia: Array
     gravity: Array
     block: NDArray[np.int64]
+    compliance: Array = field(default_factory=lambda: np.empty(0))
 
     def __len__(self) -> int:
         return len(self.angle)
@@ -97,6 +102,22 @@ def sliding_rows(
             parts[motor].append(_of_motor(models, motion, motor, leg, first))
         first += 1 + int(len(leg.q) * _PERIOD / BLOCK)
     return [_joined(part) for part in parts]
+
+
+def check_enough(motor: int, rows: SlidingRows) -> None:
+    """Refuse rows in which a motor did not slide enough either way.
+
+    Raises:
+        SettingsError: it did not.
+    """
+    fewer = min(int((rows.sense > 0.0).sum()), int((rows.sense < 0.0).sum()))
+    if len(rows) >= FEWEST and fewer >= FEWEST // 4:
+        return
+    raise SettingsError(
+        f"Motor {motor} slid in {len(rows)} rows, {fewer} of them in the rarer sense "
+        f"(at least {FEWEST} and {FEWEST // 4}).",
+        hint="Does the motor turn as it is sent? Clear more space around the arm.",
+    )
 
 
 def _motion(models: tuple[ArmModel, ArmModel], leg: RecordedLeg) -> _Motion:
@@ -157,6 +178,7 @@ def _of_motor(
     v = speed[rows]
     sense = np.where(v < 0.0, -1.0, 1.0)
     friction = motion.friction[rows, motor]
+    given = np.empty(0)
     if leg.speed <= _SLOW:
         friction_before = motion.friction[:, motor]
         if motor == _QUICK_MOTOR:
@@ -167,6 +189,8 @@ def _of_motor(
             rows = np.append(rows, index)
             v, sense = np.append(v, 0.0), np.append(sense, way)
             friction = np.append(friction, friction_before[index])
+            if motor != _QUICK_MOTOR:
+                given = _compliance(way * angle[:index], way * friction_before[:index])
     to_motors = np.linalg.inv(model.constants.j2mp)[:, motor]
     weighing = [to_motors @ regressor(model.constants, motion.q[i]) for i in rows]
     return SlidingRows(
@@ -178,6 +202,7 @@ def _of_motor(
         inertia=motion.inertia[rows, motor],
         gravity=np.array(weighing).reshape(-1, 21),
         block=first + (rows * _PERIOD / BLOCK).astype(np.int64),
+        compliance=given,
     )
 
 
@@ -220,6 +245,29 @@ def _break_away(
     way = float(np.sign(angle[end] - angle[0]))
     resisting = way * friction[2 * HALF : end]
     return 2 * HALF + int(resisting.argmax()), way
+
+
+def _compliance(angle: Array, friction: Array) -> Array:
+    """Return how far a motor gives way per torque before it breaks away, (0,) or (1,).
+
+    A line through angle over torque where the bristle is elastic: below its plastic
+    share of the largest torque.
+
+    Args:
+        angle: in the sense of the motion, up to the largest torque [rad].
+        friction: in that sense [N m].
+    """
+    begun = 2 * HALF
+    angle, friction = angle[begun:], friction[begun:]
+    if len(friction) < _FEWEST_BENT:
+        return np.empty(0)
+    is_elastic = friction <= ELASTIC * friction[-1]
+    count = int(is_elastic.sum())
+    span = float(np.ptp(friction[is_elastic])) if count else 0.0
+    if count < _FEWEST_BENT or span < _BENT_SPAN * float(friction[-1]):
+        return np.empty(0)
+    slope = np.polyfit(friction[is_elastic], angle[is_elastic], 1)[0]
+    return np.array([slope]) if slope > 0.0 else np.empty(0)
 
 
 def _quick_friction(

@@ -18,13 +18,20 @@ from .friction import (
     motor_turns,
     plastic_share,
 )
-from .gravity import MAX_VIRTUAL_MASS, VirtualMass, compensation, gravity_model
+from .gravity import (
+    MAX_VIRTUAL_MASS,
+    VirtualMass,
+    compensation,
+    gravity_model,
+    weighed_arm,
+)
 from .moments import (
     MomentFit,
     ZeroErrors,
     check_fit,
     check_zeros,
     fit_moments,
+    moments_of_links,
     regressor,
     zero_errors,
 )
@@ -59,6 +66,7 @@ __all__ = [
     "gravity_model",
     "joint_coulomb",
     "load_constants",
+    "moments_of_links",
     "motor_shares",
     "motor_turns",
     "plastic_share",
@@ -68,5 +76,6 @@ __all__ = [
     "tool_metadata",
     "tool_of",
     "urdf",
+    "weighed_arm",
     "zero_errors",
 ]

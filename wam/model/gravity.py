@@ -4,7 +4,11 @@ from dataclasses import replace
 
 from wam.model.arm_model import ArmModel
 from wam.model.constants import ArmConstants, Array
-from wam.model.moments import links_of_moments, moments_of_links
+from wam.model.moments import (
+    links_of_moments,
+    links_weighing,
+    moments_of_links,
+)
 from wam.model.tool import Tool
 
 RAMP = 2.0  # the virtual mass comes and goes within this time [s]
@@ -70,6 +74,26 @@ def gravity_model(
             the shipped ones.
     """
     if fitted is not None:
-        bodies = (fitted.sensor, fitted.foot)
-        mus = mus - (moments_of_links(constants, bodies) - moments_of_links(constants))
+        mus = _without_tool(constants, mus, fitted)
     return ArmModel(replace(constants, links=links_of_moments(constants, mus)), tool)
+
+
+def weighed_arm(
+    constants: ArmConstants, mus: Array, fitted: Tool | None = None
+) -> ArmConstants:
+    """Return an arm that weighs what first moments say, its masses as they were.
+
+    Unlike `gravity_model` it has an inertia, so it can be simulated.
+
+    Args:
+        constants: of the arm by its drawings.
+        mus: first moments [kg m], shape (7, 3), the tool's included.
+        fitted: what hung on the plate when they were fitted; None = nothing.
+    """
+    own = mus if fitted is None else _without_tool(constants, mus, fitted)
+    return replace(constants, links=links_weighing(constants, own))
+
+
+def _without_tool(constants: ArmConstants, mus: Array, tool: Tool) -> Array:
+    bodies = (tool.sensor, tool.foot)
+    return mus - (moments_of_links(constants, bodies) - moments_of_links(constants))

@@ -66,7 +66,7 @@ def link_down_in_every_phase(room: MachineRoom) -> Figures:
         figures[phase] = str(code)
         _bring_up(room)
         session = resume(room, arm)
-    _to_review(session)
+    _to_recording(session)
     session.keep()  # the last tare is asked for
     _take_down(room)
     code = session.program.wait(PATIENCE)

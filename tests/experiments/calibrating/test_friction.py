@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fakes.world
 from acquisition.devices import SafetyMode
 from experiments.operator.prompts import AutoOperator, Prompt
 from fakes.plant.model import PlantOptions
+from fakes.world import plain_world
 from tests.experiments.program import traction
 from tests.friction_calibrations import SEEDS, SHARES, errors_of, verdicts
 from wam.calibration import excitation
@@ -27,7 +27,7 @@ def calibrate(out, *options, press=None, is_quick=True):
     """
     made = []
 
-    class WatchedRig(fakes.world.FakeRig):
+    class WatchedRig(plain_world.FakeRig):
         def __init__(self, scene, constants, tool, clock, options=None, network=None):
             if is_quick:
                 options = replace(options or PlantOptions(), substeps=1)
@@ -35,7 +35,7 @@ def calibrate(out, *options, press=None, is_quick=True):
             made.append(self)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world, "FakeRig", WatchedRig)
+        patch.setattr(plain_world, "FakeRig", WatchedRig)
         if is_quick:
             patch.setattr(excitation, "CENTRES", 2)
         if press is not None:

@@ -7,13 +7,13 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-import fakes.world
 from acquisition.devices import SafetyMode
 from experiments.calibrating import gravity
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run import pose_walk as walk
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
+from fakes.world import plain_world
 from tests.experiments.program import traction, write_config
 from wam.calibration import poses as calibration_poses
 from wam.calibration.gravity_file import gravity_from_toml
@@ -38,7 +38,7 @@ def perturbed(constants):
     return replace(constants, links=links)
 
 
-class HeavierRig(fakes.world.FakeRig):
+class HeavierRig(plain_world.FakeRig):
     """A rig whose arm weighs otherwise than the drawings say."""
 
     made: ClassVar[list["HeavierRig"]] = []
@@ -58,7 +58,7 @@ def calibrate(out, *options, press=None, is_quick=True):
     goes less far and stops for a shorter time than a real one may.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world, "FakeRig", HeavierRig)
+        patch.setattr(plain_world, "FakeRig", HeavierRig)
         if is_quick:
             patch.setattr(walk, "SETTLE", 0.1)
             patch.setattr(gravity, "AVERAGE", 0.1)
@@ -194,19 +194,15 @@ def test_a_missing_calibration_is_named(tmp_path):
         assert "gravity.toml cannot be read" in done.err
 
 
-def test_a_calibration_can_be_made_though_rig_toml_wants_one_already(tmp_path):
-    use = ('model = "cad"', 'model = "calibrated"')
-    config = write_config(tmp_path, rig=use)
-
-    def press(asked, rig):
-        signal.raise_signal(signal.SIGINT)
-
-    done, _ = calibrate(tmp_path / "g.toml", "--config", config, press=press)
-    assert done.code == 130
-
-
-def test_gravity_can_be_weighed_though_rig_toml_compensates_friction(tmp_path):
-    use = ('[friction]\nmodel = "none"', '[friction]\nmodel = "calibrated"')
+@pytest.mark.parametrize(
+    "use",
+    [
+        ('model = "cad"', 'model = "calibrated"'),
+        ('[friction]\nmodel = "none"', '[friction]\nmodel = "calibrated"'),
+    ],
+    ids=["gravity", "friction"],
+)
+def test_gravity_is_weighed_though_rig_toml_wants_a_calibration(tmp_path, use):
     config = write_config(tmp_path, rig=use)
 
     def press(asked, rig):

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import fakes.world
 import fakes.world.rig
 from acquisition.errors import SettingsError
 from acquisition.trial_file.reader import TrialReader
@@ -20,6 +19,7 @@ from fakes.plant.model import PlantOptions
 from fakes.sensor.errors import FORCE_ERRORS as FORCE
 from fakes.sensor.errors import TORQUE_ERRORS as TORQUE
 from fakes.sensor.errors import SensorErrors
+from fakes.world import plain_world
 from ft_sensor.calibration.files import terrain_from_toml, terrain_to_toml
 from ft_sensor.calibration.sensor_file import sensor_from_toml, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
@@ -39,7 +39,7 @@ QUICK = ("--fake", "--fast", "--operator-script", "auto")
 MASS, COM, ANGLE = 0.62, np.array([0.014, -0.006, 0.055]), np.radians(25.0)
 
 
-class OtherRig(fakes.world.FakeRig):
+class OtherRig(plain_world.FakeRig):
     """A rig whose sensor is turned and whose foot weighs otherwise than rig.toml says.
 
     The sensor reads the reaction, too.
@@ -78,7 +78,7 @@ def _drifting(scale, factor):
 
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world, "FakeRig", rig)
+        patch.setattr(plain_world, "FakeRig", rig)
         patch.setattr(fakes.world.rig, "SensorErrors", errors)
         patch.setattr(walk, "SETTLE", 0.2)
         patch.setattr(sensor, "AVERAGE", 0.4)
@@ -184,7 +184,7 @@ def record_with(folder, calibrated, angle=ANGLE, sign=-1.0):
     change = ("sign = 1 ", 'calibration = "ft_sensor.toml"\nsign = 1 ')
     config = write_config(folder, rig=change)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world, "FakeRig", OtherRig)
+        patch.setattr(plain_world, "FakeRig", OtherRig)
         patch.setattr(OtherRig, "is_in_the_air", False)
         patch.setattr(OtherRig, "angle", angle)
         patch.setattr(OtherRig, "sign", sign)
@@ -291,7 +291,7 @@ def test_a_touched_plate_gives_incline_and_heading(tmp_path):
     assert "0.0 mm rms off the plane" in done.out
 
 
-class TiltedRig(fakes.world.FakeRig):
+class TiltedRig(plain_world.FakeRig):
     """A rig whose container is two degrees steeper than the matrix says."""
 
     def __init__(self, scene, *rest, **options):
@@ -301,7 +301,7 @@ class TiltedRig(fakes.world.FakeRig):
 
 def test_a_container_that_is_inclined_otherwise_is_refused(tmp_path):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(fakes.world, "FakeRig", TiltedRig)
+        patch.setattr(plain_world, "FakeRig", TiltedRig)
         done, out = touch(tmp_path, "S10")
         assert done.code == 2
         assert "the matrix says 10.0 (limit 1.0)" in done.err

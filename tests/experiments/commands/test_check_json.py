@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from tests.experiments.program import traction, write_config
 
 FAKE = ("check", "--fake", "--fast", "--loop-test", "0.3", "--json")
@@ -29,3 +31,12 @@ def test_a_refused_rig_is_json_too_and_every_check_that_failed_is_in_it(tmp_path
     assert (page["is_fit"], page["is_simulated"]) == (False, False)
     bad = {check["name"] for check in page["checks"] if check["grade"] == "bad"}
     assert bad >= {"F/T sensor"}
+
+
+@pytest.mark.parametrize(
+    "other", [("--explain", "all"), ("--config-only",), ("--bus", "1")]
+)
+def test_what_is_no_page_is_not_printed_as_one(tmp_path, other):
+    done = traction("check", "--json", *other, "--data", tmp_path)
+    assert (done.code, done.out) == (2, "")
+    assert "--json" in done.err

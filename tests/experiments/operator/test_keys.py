@@ -1,6 +1,7 @@
 """The one table of keys, and everything that follows from it."""
 
 import argparse
+import re
 from pathlib import Path
 
 import pytest
@@ -14,14 +15,14 @@ from experiments.operator.keys import (
     Operand,
     awaits_reason,
     key_action,
-    readme_rows,
+    key_rows,
     screen_keys,
     script_keys,
 )
 from experiments.operator.prompts import AutoOperator, Prompt, PromptState
 from experiments.operator.scripted import ScriptedOperator
 
-README = Path(__file__).parents[3] / "README.md"
+PAGE = Path(__file__).parents[3] / "docs" / "sessions.md"
 SCRIPTED = [
     (prompt, word)
     for prompt in (Prompt.READY, Prompt.REVIEW)
@@ -38,9 +39,9 @@ def script_line(prompt, word):
     return word + {Operand.TEXT: " a b", Operand.REASON: " 3"}.get(operand, "")
 
 
-@pytest.mark.parametrize("row", readme_rows())
-def test_the_table_of_keys_in_the_readme_is_this_one(row):
-    assert row in README.read_text().splitlines()
+@pytest.mark.parametrize("row", key_rows())
+def test_the_table_of_keys_on_the_page_is_this_one(row):
+    assert row in PAGE.read_text().splitlines()
 
 
 @pytest.mark.parametrize(("prompt", "word"), SCRIPTED)
@@ -53,7 +54,7 @@ def test_a_word_of_a_script_presses_its_key_at_its_prompt(tmp_path, prompt, word
 
 
 @pytest.mark.parametrize(("prompt", "word"), SCRIPTED)
-def test_every_word_of_a_script_is_in_help_readme_and_refusal(tmp_path, prompt, word):
+def test_every_word_of_a_script_is_in_help_page_and_refusal(tmp_path, prompt, word):
     parser = argparse.ArgumentParser()
     add_arguments(parser)
     bad = tmp_path / "bad.txt"
@@ -64,7 +65,7 @@ def test_every_word_of_a_script_is_in_help_readme_and_refusal(tmp_path, prompt, 
     assert f"{word}{operand.value}" in " ".join(parser.format_help().split())
     assert f"{word}{operand.value}" in str(refusal.value)
     shown = f"`{word} 1`" if operand is Operand.REASON else f"`{word}{operand.value}`"
-    assert shown in README.read_text()
+    assert shown in PAGE.read_text()
 
 
 @pytest.mark.parametrize("prompt", KEYS)
@@ -103,4 +104,11 @@ def test_a_key_without_meaning_does_nothing():
 
 def test_the_screen_shows_every_reason_of_a_redo():
     shown = screen_keys(Prompt.REVIEW)
-    assert all(f"{key} {why}" in shown for key, why in REJECT_REASONS.items())
+    for key, why in REJECT_REASONS.items():
+        (label,) = re.findall(rf"(?:: |  ){key} ([a-z ]+?)(?=  |$)", shown)
+        assert set(label.split()) <= {*why.split(), "off"}
+
+
+@pytest.mark.parametrize("prompt", KEYS)
+def test_the_keys_of_a_prompt_fit_a_line_of_eighty_columns(prompt):
+    assert len(screen_keys(prompt)) <= 80

@@ -112,7 +112,7 @@ def make_context(data, operator, *, trials=2, **more):
     journal.append(Event.STARTED, terrain="TF", trials=trials)
     journal.append(Event.ACTIVATED)
     loop.rig.row = SimpleNamespace(
-        name="TF", reset=(), stones="none", target="grid", trials=trials
+        name="TF", reset=(), kind="flat", target="grid", trials=trials
     )
     loop.rig.frame = SimpleNamespace(travel=0.4)
     return RunContext(

@@ -102,9 +102,7 @@ def test_the_screen_between_trials_says_what_to_do_and_how_long_it_takes(scripte
     assert heads[-1].startswith("S001 TF · trial 2 of 3 · kept 1 · rejected 1")
     assert clocks[-1].endswith(" · left about 1 min")
     assert "Reset: ☐ wipe ☐ foot at the far end" in lines
-    assert (
-        "[space] record   [n]ote   [v]iew last   [p]ause   [q]uit after this" in lines
-    )
+    assert "[space] record  [n]ote  [v]iew last  [p]ause  [q]uit after this" in lines
 
 
 def test_the_last_trial_is_announced(scripted):
@@ -199,7 +197,7 @@ def test_the_end_compares_the_time_it_took_with_the_estimate(recorded):
 def test_the_end_names_report_and_next_terrains(recorded):
     *_, report, terrains = recorded.done.out.splitlines()
     assert report == f"It writes {recorded.folder / 'report' / 'index.html'}"
-    names = terrains.removeprefix("Next terrains, so that none goes with time: ")
+    names = terrains.removeprefix("Suggested order, randomised against drift: ")
     assert sorted(names.split()) == ["B0", "B10", "B15", "S0", "S10", "S15", "Tf"]
 
 

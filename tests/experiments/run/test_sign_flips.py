@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import analysis.data.load
-import fakes.world
 import ft_sensor.payload
 from analysis.data.load import load_trial
 from experiments.report.truth_errors import compare_with_truth
+from fakes.world import plain_world
 from ft_sensor.payload import Payload
 from tests.experiments.program import only_session, run_short, write_config
 from wam.driver.transmission import Transmission
@@ -25,7 +25,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 LARGEST_V, LARGEST_F = 1.5e-3, 1.0
 
 
-class ReadingRig(fakes.world.FakeRig):
+class ReadingRig(plain_world.FakeRig):
     """A rig whose sensor is mounted in another way than rig.toml says."""
 
     changes: ClassVar[dict] = {}
@@ -35,7 +35,7 @@ class ReadingRig(fakes.world.FakeRig):
         super().__init__(scene, constants, tool, clock, options, network)
 
 
-class TurnedRig(fakes.world.FakeRig):
+class TurnedRig(plain_world.FakeRig):
     """A rig whose container lies 30 degrees beside where the matrix says."""
 
     def __init__(self, scene, *rest, **options):
@@ -46,13 +46,13 @@ class TurnedRig(fakes.world.FakeRig):
 def sensor(**changes):
     def apply(patch):
         patch.setattr(ReadingRig, "changes", changes)
-        patch.setattr(fakes.world, "FakeRig", ReadingRig)
+        patch.setattr(plain_world, "FakeRig", ReadingRig)
 
     return apply
 
 
 def container_turned(patch):
-    patch.setattr(fakes.world, "FakeRig", TurnedRig)
+    patch.setattr(plain_world, "FakeRig", TurnedRig)
 
 
 def joint_reversed(joint):

@@ -1,6 +1,5 @@
 """Notes, verdicts, tables and pictures of a session that is over."""
 
-import csv
 import json
 import shutil
 import tomllib
@@ -8,11 +7,9 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from acquisition.clock import SystemClock
-from acquisition.trial_file.reader import TrialReader
 from analysis.data.load import load_trial
 from experiments.session.annotations import parse_trial
 from experiments.session.matrix_board import confounding, suggest_order
@@ -185,72 +182,6 @@ def test_every_setting_is_printed_with_where_it_comes_from(config):
     shipped = traction("check", "--config-only").out
     assert '   can.channel = "can0"   (shipped default, line ' in shipped
     assert tomllib.loads(config.read_text())["can"]["channel"] == "can0"
-
-
-# --- export ---------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def exported(recorded, tmp_path_factory):
-    to = tmp_path_factory.mktemp("tables") / "new"
-    done = traction("export", "S001", "--to", to, "--data", recorded.data)
-    assert (done.code, done.err) == (0, "")
-    return to
-
-
-def table(path):
-    header, *_ = path.read_text().splitlines()
-    return header.split(","), np.loadtxt(path, delimiter=",", skiprows=1)
-
-
-def test_a_table_holds_every_cycle_with_units(exported, recorded, first_trial):
-    header, rows = table(exported / recorded.folder.name / "T01.csv")
-    trial = load_trial(first_trial)
-    assert len(rows) == len(trial.t)
-    assert {"t [s]", "q1 [rad]", "v_t [m/s]", "F_n [N]"} <= set(header)
-    # twelve digits were written
-    columns = {name: rows[:, i] for i, name in enumerate(header)}
-    assert columns["F_n [N]"] == pytest.approx(trial.traction[:, 2], rel=1e-11)
-    q7 = TrialReader(first_trial).cycles().data["position"][:, 6]
-    assert columns["q7 [rad]"] == pytest.approx(q7, rel=1e-11)
-
-
-def test_the_kept_samples_are_those_inside_the_window(exported, recorded):
-    header, rows = table(exported / recorded.folder.name / "T01.kept.csv")
-    assert header == ["t [s]", "v_t [m/s]", "F_n [N]", "F_t [N]", "kept_row [1]"]
-    v_t = rows[:, 1]
-    assert 0.005 <= v_t.min() <= v_t.max() <= 0.2
-
-
-def test_every_column_is_in_the_dictionary(exported, recorded):
-    with (exported / "data_dictionary.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    for name in ("T01.csv", "T01.kept.csv"):
-        told = [f"{r['column']} [{r['unit']}]" for r in rows if r["table"] == name]
-        assert told == table(exported / recorded.folder.name / name)[0]
-    assert all(row["meaning"] for row in rows)
-
-
-def test_checksums_of_all_tables_are_right(exported, recorded):
-    lines = (exported / "SHA256SUMS").read_text().splitlines()
-    told = dict(reversed(line.split("  ")) for line in lines)
-    assert set(told) == {
-        str(path.relative_to(exported)) for path in exported.rglob("*.csv")
-    }
-    assert all(digest(exported / name) == value for name, value in told.items())
-
-
-def test_simulated_trials_say_so_in_the_index(exported, first_trial):
-    with (exported / "trials.csv").open() as file:
-        first, second = csv.DictReader(file)
-    assert first["simulated"] == second["simulated"] == "true"
-    assert first["sha256 of the recording"] == digest(first_trial)
-
-
-def test_an_export_overwrites_nothing(recorded, exported):
-    done = traction("export", "S001", "--to", exported, "--data", recorded.data)
-    assert done.code == 2
-    assert "is not empty" in done.err
 
 
 # --- replay ---------------------------------------------------------------------------

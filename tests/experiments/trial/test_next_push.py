@@ -76,13 +76,23 @@ def test_rejected_trials_teach_nothing(folder, row):
 
 
 def test_enough_is_said_with_what_the_matrix_wants(folder, row):
+    row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(12))
-    assert next_push(folder, row).enough.endswith(f"; {row.trials} are wanted")
+    assert next_push(folder, row).enough.endswith("; 20 are wanted")
     board = enough_of([folder], row, is_simulated=False)
     assert board.startswith("S0: enough after 12: two more trials would move the grid")
+    assert board.endswith("; 20 are wanted.")
+
+
+def test_nothing_is_said_of_a_terrain_that_is_complete(folder, row):
+    keep(folder, everywhere(12))
+    assert enough_of([folder], row, is_simulated=False) == ""
+    more = row.model_copy(update={"trials": 13})
+    assert enough_of([folder], more, is_simulated=False) != ""
 
 
 def test_six_trials_are_not_enough_and_simulated_ones_do_not_count(folder, row):
+    row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(6))
     assert next_push(folder, row).enough == ""
     assert enough_of([folder], row, is_simulated=False) == ""

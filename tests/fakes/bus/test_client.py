@@ -204,7 +204,7 @@ def test_a_bus_has_a_descriptor_until_it_is_shut_down(join):
 
 
 def test_where_nobody_serves_no_bus_can_be_opened(path):
-    with pytest.raises(can.CanInitializationError, match="nobody serves"):
+    with pytest.raises(can.CanInitializationError, match="no server at"):
         SocketBus(str(path))
 
 

@@ -1,0 +1,48 @@
+"""What a trial file is made with, and what the writer counts."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from acquisition.clock import RATE_HZ
+
+
+@dataclass(frozen=True, slots=True)
+class TrialHeader:
+    """What is known before the first cycle.
+
+    Attributes:
+        trial: metadata `trial` (session, terrain, operator, ...), strings.
+        utc_offset_ns: UTC = monotonic + this, one number for the whole file [ns].
+        offset_uncertainty_ns: half width of the reading that gave it [ns].
+        rate_hz: nominal rate of the loop.
+        provenance: software, machine and device identities, strings.
+        attachments: file name to content, e.g. `config.toml`.
+        robot_description: URDF of the arm.
+        views_every: every how many cycles the 50 Hz views are written, 0 = never.
+        has_frames: the raw frames of the bus are recorded too.
+        foresight: what it foresees with, strings; empty where nothing is foreseen.
+    """
+
+    trial: Mapping[str, str]
+    utc_offset_ns: int
+    offset_uncertainty_ns: int
+    provenance: Mapping[str, str]
+    attachments: Mapping[str, bytes]
+    robot_description: str
+    rate_hz: int = RATE_HZ
+    views_every: int = 10
+    has_frames: bool = False
+    foresight: Mapping[str, str] = field(default_factory=dict[str, str])
+
+
+@dataclass(slots=True)
+class WriterCounts:
+    """What the writer has put into the file so far."""
+
+    cycles: int = 0
+    missed: int = 0
+    late: int = 0
+    lost_in_ring: int = 0
+    first_cycle: int | None = None
+    last_cycle: int | None = None
+    messages: dict[str, int] = field(default_factory=dict[str, int])

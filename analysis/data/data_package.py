@@ -1,0 +1,270 @@
+"""Frictionless data packages: `datapackage.json` beside tables, written and read.
+
+A package names every file with its size and SHA-256, every column with its unit and
+meaning, and of every trial the terrain. A file that is not as it was written is never
+read. The form is Data Package 1.0 of https://specs.frictionlessdata.io; `unit` and
+`traction` are properties of our own, which other programs keep and ignore.
+"""
+
+import hashlib
+import os
+import stat
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from acquisition import SettingsError
+
+DESCRIPTOR = "datapackage.json"
+_LARGEST = 16_000_000  # bytes of a descriptor; a study of 80 trials has 2 million
+_MOST = 5000  # files
+_ABSENT = ("", "NaN")  # cells without a value
+_NO_LINKS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+_CHANGED = "Copy the file again, or read it alone, outside of its package."
+
+
+class TableOrigin(BaseModel):
+    """What is known of a table beyond its numbers.
+
+    Attributes:
+        table: "trial" at the recorded rate, "kept" for the samples that models are
+            fitted to, "index" or "dictionary".
+        session: id of the session.
+        trial: number of the trial, e.g. "T04".
+        terrain: name of the terrain.
+        stones: size of the stones; empty where it is not known.
+        incline_deg: of the plane [degrees].
+        force_age: how much older than the joints the forces are [s].
+        simulated: the devices were simulated.
+        recording: SHA-256 of the recorded trial.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    table: Literal["trial", "kept", "index", "dictionary"]
+    session: str = Field(default="", max_length=60)
+    trial: str = Field(default="", max_length=60)
+    terrain: str = ""
+    stones: str = Field(default="", max_length=60)
+    incline_deg: float | None = Field(default=None, ge=-90, le=90)
+    force_age: float = Field(default=0.0, ge=-1, le=1)
+    simulated: bool = False
+    recording: str = Field(default="", max_length=64)
+
+    @property
+    def name(self) -> str:
+        """Session and trial, e.g. S012/T04."""
+        return f"{self.session or '?'}/{self.trial or '?'}"
+
+
+class PackageField(BaseModel):
+    """One column of a table.
+
+    Attributes:
+        name: as in the header of the file.
+        type: "number", "integer", "boolean" or "string".
+        unit: "" for words.
+        description: what it is.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    name: str
+    type: str
+    unit: str = ""
+    description: str = ""
+
+
+class TableSchema(BaseModel):
+    """The columns of a table.
+
+    Attributes:
+        fields: in the order of the file.
+        missingValues: cells that hold no value.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    fields: tuple[PackageField, ...]
+    missingValues: tuple[str, ...] = _ABSENT
+
+
+class PackageFile(BaseModel):
+    """One file of a package.
+
+    Attributes:
+        name: in lower case, of this file alone.
+        profile: of the Frictionless standard.
+        path: below the folder of the package.
+        format: "csv" or "parquet".
+        mediatype: the same as a media type.
+        encoding: of the text.
+        bytes: size of the file.
+        hash: "sha256:" and the digest of the file.
+        description: what the rows are.
+        table: its columns.
+        traction: what is known of it beyond that.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore", populate_by_name=True)
+
+    name: str
+    profile: str = "tabular-data-resource"
+    path: str = Field(max_length=1000)
+    format: Literal["csv", "parquet"]
+    mediatype: str
+    encoding: str = "utf-8"
+    bytes: int = Field(ge=0)
+    hash: str = Field(pattern=r"^sha256:[0-9a-f]{64}$")
+    description: str = ""
+    table: TableSchema = Field(alias="schema")
+    traction: TableOrigin | None = None
+
+
+class DataPackage(BaseModel):
+    """The content of `datapackage.json`.
+
+    Attributes:
+        name: in lower case.
+        title: for people.
+        description: where the tables come from.
+        created: UTC, as text.
+        profile: of the Frictionless standard.
+        resources: the files.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    name: str
+    title: str = ""
+    description: str = ""
+    created: str = ""
+    profile: str = "tabular-data-package"
+    resources: tuple[PackageFile, ...] = Field(max_length=_MOST)
+
+    def text(self) -> str:
+        """Return it as JSON."""
+        return self.model_dump_json(by_alias=True, exclude_none=True, indent=1) + "\n"
+
+
+@dataclass(frozen=True, slots=True)
+class PackagedTable:
+    """A table of a package, on the disk.
+
+    Attributes:
+        path: the file.
+        entry: what the package says of it.
+    """
+
+    path: Path
+    entry: PackageFile
+
+    @property
+    def origin(self) -> TableOrigin:
+        """What is known of it; a trial of no name where the package tells nothing."""
+        return self.entry.traction or TableOrigin(table="trial")
+
+    def check(self) -> None:
+        """Compare the file with its package.
+
+        Raises:
+            SettingsError: it is missing, no regular file, or not as it was written.
+        """
+        try:
+            descriptor = os.open(self.path, _NO_LINKS)
+            with os.fdopen(descriptor, "rb") as file:
+                status = os.fstat(descriptor)
+                if not stat.S_ISREG(status.st_mode):
+                    raise SettingsError(f"{self.path}: it is no regular file.")
+                if status.st_size != self.entry.bytes:
+                    raise self._changed(f"{status.st_size} bytes", self.entry.bytes)
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except OSError as error:
+            raise SettingsError(
+                f"{self.path}: cannot be read ({error.strerror}).",
+                hint=f"{DESCRIPTOR} names it. Was the folder copied whole?",
+            ) from error
+        if f"sha256:{digest}" != self.entry.hash:
+            raise self._changed(f"SHA-256 {digest[:12]}...", self.entry.hash[7:19])
+
+    def _changed(self, now: str, before: object) -> SettingsError:
+        text = f"{self.path}: is changed: {now}, {DESCRIPTOR} states {before}."
+        return SettingsError(text, hint=_CHANGED)
+
+
+def is_package(path: Path) -> bool:
+    """Return whether `path` is a folder, or the descriptor of a package."""
+    return path.is_dir() or path.name == DESCRIPTOR
+
+
+def packaged_tables(path: Path) -> Iterator[PackagedTable]:
+    """Give every table of a package; the files themselves are not opened.
+
+    Args:
+        path: `datapackage.json`, or the folder that holds it.
+
+    Raises:
+        SettingsError: there is no package, it is none, or it leads out of its folder.
+    """
+    descriptor = path / DESCRIPTOR if path.is_dir() else path
+    for entry in _read(descriptor).resources:
+        relative = PurePosixPath(entry.path)
+        if relative.is_absolute() or ".." in relative.parts or "\\" in entry.path:
+            raise SettingsError(
+                f"{descriptor}: {entry.path[:60]!r} leads out of the folder.",
+                hint="Nothing was read.",
+            )
+        file = descriptor.parent / relative
+        _check_folders(descriptor.parent, file)
+        yield PackagedTable(file, entry)
+
+
+def packaged_table(path: Path) -> PackagedTable | None:
+    """Return what a package beside a file, or one folder above it, says of the file.
+
+    Raises:
+        SettingsError: there is a package that cannot be read.
+    """
+    for folder in (path.parent, path.parent.parent):
+        if (folder / DESCRIPTOR).is_file():
+            for table in packaged_tables(folder):
+                if table.path == path:
+                    return table
+    return None
+
+
+def _check_folders(top: Path, file: Path) -> None:
+    for folder in file.parents:
+        if folder == top:
+            return
+        if folder.is_symlink():
+            raise SettingsError(
+                f"{folder} is a symbolic link.", hint="A package is not read over one."
+            )
+
+
+def _read(path: Path) -> DataPackage:
+    try:
+        descriptor = os.open(path, _NO_LINKS)
+        with os.fdopen(descriptor, "rb") as file:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise SettingsError(f"{path}: it is no regular file.")
+            text = file.read(_LARGEST + 1)
+        if len(text) > _LARGEST:
+            raise SettingsError(f"{path}: it is larger than {_LARGEST / 1e6:.0f} MB.")
+        return DataPackage.model_validate_json(text)
+    except OSError as error:
+        raise SettingsError(
+            f"{path}: cannot be read ({error.strerror}).",
+            hint="Give tables, or a folder of traction export.",
+        ) from error
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise SettingsError(
+            f"{path}: it is no data package of tables ({place}: {first['msg']}).",
+            hint="Make it with: traction export SESSION --to DIR.",
+        ) from error

@@ -1,0 +1,62 @@
+from .engine import EVERY, FootSample, Foresight, ForesightFlag, ForesightState
+from .ground import GroundLaw, GroundModel, GroundRecogniser
+from .held_out import ForesightRun, folds_of, foresee, hold_out
+from .logistic import RidgeLogistic, all_pairs, fit_logistic
+from .model import ForesightModel, Provenance, RigIdentity, SlipModel
+from .scores import (
+    GroundScore,
+    SlipScore,
+    score_ground,
+    score_slips,
+)
+from .signals import FEATURES, LAGS, Signals
+from .training import fit_foresight, fit_ground
+from .watching import (
+    FLAT_SURFACE,
+    ROCKY_SURFACE,
+    WatchedTrial,
+    foot_samples,
+    watch,
+    watch_all,
+    watch_series,
+    way_along,
+)
+
+__all__ = [
+    "EVERY",
+    "FEATURES",
+    "FLAT_SURFACE",
+    "LAGS",
+    "ROCKY_SURFACE",
+    "FootSample",
+    "Foresight",
+    "ForesightFlag",
+    "ForesightModel",
+    "ForesightRun",
+    "ForesightState",
+    "GroundLaw",
+    "GroundModel",
+    "GroundRecogniser",
+    "GroundScore",
+    "Provenance",
+    "RidgeLogistic",
+    "RigIdentity",
+    "Signals",
+    "SlipModel",
+    "SlipScore",
+    "WatchedTrial",
+    "all_pairs",
+    "fit_foresight",
+    "fit_ground",
+    "fit_logistic",
+    "folds_of",
+    "foot_samples",
+    "foresee",
+    "hold_out",
+    "score_ground",
+    "score_slips",
+    "watch",
+    "watch_all",
+    "watch_series",
+    "way_along",
+]

@@ -1,0 +1,116 @@
+"""Trials as foreseen by what other trials taught."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.breakaway import BreakAwayModel
+from analysis.data import Array
+from analysis.foresight.engine import Foresight, ForesightState
+from analysis.foresight.model import ForesightModel
+from analysis.foresight.training import FOLDS, fit_foresight
+from analysis.foresight.watching import WatchedTrial
+
+_BINS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class ForesightRun:
+    """A trial, and what was foreseen in it.
+
+    Attributes:
+        trial: as it was watched.
+        states: every 10 ms.
+        threshold: of the alarms.
+        terrains: names of the known terrains.
+        surfaces: of each of them.
+    """
+
+    trial: WatchedTrial
+    states: tuple[ForesightState, ...]
+    threshold: float
+    terrains: tuple[str, ...]
+    surfaces: tuple[str, ...]
+
+
+def hold_out(
+    trials: Sequence[WatchedTrial],
+    break_away: Mapping[str, BreakAwayModel],
+    progress: Callable[[], object] = lambda: None,
+) -> list[ForesightRun]:
+    """Return every trial as foreseen by what was learnt from the other folds.
+
+    Trials of one fold are every fifth of their terrain.
+    """
+    runs: list[ForesightRun] = []
+    for tested, rest in folds_of(trials):
+        model = fit_foresight(rest)
+        progress()
+        if model is not None:
+            runs += foresee(model, tested, break_away)
+    return runs
+
+
+def folds_of(
+    trials: Sequence[WatchedTrial],
+) -> list[tuple[list[WatchedTrial], list[WatchedTrial]]]:
+    """Return (tested, all others) of every fold that has a trial."""
+    numbered = _numbered(trials)
+    parts = [
+        (
+            [trial for number, trial in numbered if number % FOLDS == fold],
+            [trial for number, trial in numbered if number % FOLDS != fold],
+        )
+        for fold in range(FOLDS)
+    ]
+    return [(tested, rest) for tested, rest in parts if tested and rest]
+
+
+def _numbered(trials: Sequence[WatchedTrial]) -> list[tuple[int, WatchedTrial]]:
+    counts: dict[str, int] = {}
+    numbered: list[tuple[int, WatchedTrial]] = []
+    for trial in trials:
+        number = counts.get(trial.terrain, 0)
+        counts[trial.terrain] = number + 1
+        numbered.append((number, trial))
+    return numbered
+
+
+def foresee(
+    model: ForesightModel,
+    trials: Iterable[WatchedTrial],
+    break_away: Mapping[str, BreakAwayModel],
+) -> list[ForesightRun]:
+    """Return trials as foreseen by a model, sample by sample."""
+    threshold = model.slip.threshold if model.slip is not None else 1.0
+    surfaces = tuple(law.surface for law in model.ground.laws)
+    runs: list[ForesightRun] = []
+    for trial in trials:
+        foresight = Foresight(model, break_away, trial.rig)
+        states = [foresight.push(sample) for sample in trial.samples]
+        seen = tuple(state for state in states if state is not None)
+        runs.append(ForesightRun(trial, seen, threshold, model.terrains, surfaces))
+    return runs
+
+
+def calibration_error(
+    p: Array, truth: np.ndarray, weight: Array | None = None
+) -> float:
+    """Return the mean difference of probability and share over ten bins.
+
+    Args:
+        p: probabilities, shape (n,).
+        truth: what happened, shape (n,).
+        weight: of every row; None = alike, and the bins hold equal numbers of rows.
+    """
+    if not p.size:
+        return float("nan")
+    if weight is None:
+        order = np.argsort(p, kind="stable")
+        parts = np.array_split(order, _BINS)
+        off = [abs(float((p[rows] - truth[rows]).sum())) for rows in parts]
+        return sum(off) / p.size
+    place = np.minimum((p * _BINS).astype(int), _BINS - 1)
+    total = np.bincount(place, weight * (p - truth), _BINS)
+    return float(np.abs(total).sum() / weight.sum())

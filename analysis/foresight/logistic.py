@@ -1,0 +1,198 @@
+"""Ridge logistic regression on standardised features and products of pairs of them.
+
+    p = 1 / (1 + exp(-(w0 + w'z + sum over pairs of w_ij z_i z_j)))
+
+The fit is Newton's method on the log loss plus a ridge, a step halved until nothing is
+lost. `probability` of one row is plain floats in a fixed order: the same bits wherever
+it runs.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp
+from typing import Any
+
+import numpy as np
+
+from analysis.data import Array
+
+_REACH = 5.0  # standard deviations beyond which a feature says no more
+_LARGEST_LOGIT = 30.0
+_STEPS, _HALVINGS = 25, 14
+_CONVERGED = 1e-4
+_SMALL = 1e-9
+_LARGEST_NUMBER = 1e9  # of a stored number
+_MOST_FEATURES, _MOST_PAIRS = 64, 600
+
+Pairs = tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RidgeLogistic:
+    """A fitted regression.
+
+    Attributes:
+        mean: of the features, shape (n,).
+        scale: their standard deviations, shape (n,).
+        pairs: features that are multiplied, (i, i) is a square; shape (k, 2).
+        weights: bias, features, pairs; shape (1 + n + k,).
+    """
+
+    mean: tuple[float, ...]
+    scale: tuple[float, ...]
+    pairs: Pairs
+    weights: tuple[float, ...]
+
+    def probability(self, features: Sequence[float]) -> float:
+        """Return the probability of one row of features, shape (n,)."""
+        weights = self.weights
+        z: list[float] = []
+        logit, at = weights[0], 1
+        for value, mean, scale in zip(features, self.mean, self.scale, strict=True):
+            step = (value - mean) / scale
+            step = _REACH if step > _REACH else -_REACH if step < -_REACH else step
+            z.append(step)
+            logit += weights[at] * step
+            at += 1
+        for i, j in self.pairs:
+            logit += weights[at] * z[i] * z[j]
+            at += 1
+        if logit > _LARGEST_LOGIT:
+            logit = _LARGEST_LOGIT
+        elif logit < -_LARGEST_LOGIT:
+            logit = -_LARGEST_LOGIT
+        return 1.0 / (1.0 + exp(-logit))
+
+    def probabilities(self, features: Array) -> Array:
+        """Return those of many rows, shape (m,); equal but for the last digits.
+
+        Args:
+            features: shape (m, n).
+        """
+        design = _design(
+            features, np.array(self.mean), np.array(self.scale), self.pairs
+        )
+        return _logistic(design @ np.array(self.weights))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the regression as plain values; floats keep all their digits."""
+        return {
+            "mean": list(self.mean),
+            "scale": list(self.scale),
+            "pairs": [list(pair) for pair in self.pairs],
+            "weights": list(self.weights),
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any], count: int) -> "RidgeLogistic":
+        """Return the regression of plain values.
+
+        Args:
+            content: as of `to_dict`.
+            count: number of features that it has to be for.
+
+        Raises:
+            ValueError: a number or the count of them is not what it should be.
+            TypeError: one is of another type.
+            KeyError: some are missing.
+        """
+        pairs = tuple((int(i), int(j)) for i, j in content["pairs"])
+        if len(pairs) > _MOST_PAIRS or count > _MOST_FEATURES:
+            raise ValueError("a regression has too many terms")
+        if any(not 0 <= k < count for pair in pairs for k in pair):
+            raise ValueError("a regression multiplies features that there are not")
+        sizes = {"mean": count, "scale": count, "weights": 1 + count + len(pairs)}
+        rows = {name: tuple(map(float, content[name])) for name in sizes}
+        for name, size in sizes.items():
+            is_usual = all(-_LARGEST_NUMBER <= v <= _LARGEST_NUMBER for v in rows[name])
+            if len(rows[name]) != size or not is_usual:
+                raise ValueError(f"{name} of a regression is not {size} numbers")
+        if min(rows["scale"], default=1.0) < 1.0 / _LARGEST_NUMBER:
+            raise ValueError("a scale of a regression is not positive")
+        return cls(rows["mean"], rows["scale"], pairs, rows["weights"])
+
+
+def fit_logistic(
+    features: Array, truth: np.ndarray, weight: Array, pairs: Pairs, ridge: float = 1.0
+) -> RidgeLogistic:
+    """Return the regression of rows; both answers have to occur.
+
+    Args:
+        features: shape (m, n).
+        truth: whether the row is positive, shape (m,).
+        weight: what a row counts, shape (m,).
+        pairs: features that are multiplied.
+        ridge: penalty of every weight but the bias.
+
+    Raises:
+        ValueError: only one answer occurs.
+    """
+    if not 0 < int(truth.sum()) < truth.size:
+        raise ValueError("only one answer occurs")
+    mean, scale = features.mean(axis=0), features.std(axis=0) + _SMALL
+    design = _design(features, mean, scale, pairs)
+    penalty = np.full(design.shape[1], ridge)
+    penalty[0] = _SMALL
+    loss = _Loss(design, truth.astype(np.bool_), weight, penalty)
+    w = np.zeros(design.shape[1])
+    share = float(weight @ truth) / float(weight.sum())
+    w[0] = np.log(share / (1.0 - share))
+    for _ in range(_STEPS):
+        after = loss.improved(w)
+        is_done = float(np.abs(after - w).max()) < _CONVERGED
+        w = after
+        if is_done:
+            break
+    columns = (mean, scale, w)
+    plain_mean, plain_scale, plain_w = (tuple(c.tolist()) for c in columns)
+    return RidgeLogistic(plain_mean, plain_scale, pairs, plain_w)
+
+
+def all_pairs(chosen: Sequence[int]) -> Pairs:
+    """Return every pair of the chosen features, squares included."""
+    return tuple((i, j) for at, i in enumerate(chosen) for j in chosen[at:])
+
+
+def _logistic(logit: Array) -> Array:
+    return 1.0 / (1.0 + np.exp(-np.clip(logit, -_LARGEST_LOGIT, _LARGEST_LOGIT)))
+
+
+def _design(features: Array, mean: Array, scale: Array, pairs: Pairs) -> Array:
+    z = np.clip((features - mean) / scale, -_REACH, _REACH)
+    products = [z[:, i] * z[:, j] for i, j in pairs]
+    return np.column_stack([np.ones(len(z)), z, *products])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Loss:
+    """Weighted log loss with a ridge.
+
+    Attributes:
+        design: shape (m, k).
+        truth: shape (m,).
+        weight: shape (m,).
+        penalty: shape (k,).
+    """
+
+    design: Array
+    truth: np.ndarray
+    weight: Array
+    penalty: Array
+
+    def value(self, w: Array) -> float:
+        logit = self.design @ w
+        lost = np.logaddexp(0.0, np.where(self.truth, -logit, logit))
+        return float(self.weight @ lost + 0.5 * self.penalty @ w**2)
+
+    def improved(self, w: Array) -> Array:
+        """Return the weights after a Newton step, halved until nothing is lost."""
+        p = _logistic(self.design @ w)
+        gradient = self.design.T @ (self.weight * (p - self.truth)) + self.penalty * w
+        bend = (self.design.T * (self.weight * p * (1.0 - p))) @ self.design
+        step = np.linalg.solve(bend + np.diag(self.penalty), gradient)
+        before = self.value(w)
+        for halvings in range(_HALVINGS):
+            after = w - 0.5**halvings * step
+            if self.value(after) <= before:
+                return after
+        return w

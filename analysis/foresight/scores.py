@@ -1,0 +1,300 @@
+"""What foresight is worth on trials that its models have not seen.
+
+Three measures of needless warning always stand together: the share of at-risk time
+outside the 0.2 s before slips (a controller), alarms a minute (an operator), and the
+recall that the same alarms have when they are shifted in time (chance).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.data import Array
+from analysis.foresight.engine import EVERY, ForesightFlag
+from analysis.foresight.ground import GroundModel, GroundRecogniser
+from analysis.foresight.held_out import ForesightRun, calibration_error
+from analysis.foresight.watching import (
+    FLAT_SURFACE,
+    HORIZON,
+    ROCKY_SURFACE,
+    WatchedTrial,
+)
+
+LONGEST_LEAD = 2.0  # s; an alarm that never ends has no lead
+EARLY = 0.1  # s before an onset at which a warning still helps
+SURE = 0.98
+RIGHT = 0.95  # probability of the right surface after a change of ground
+SHIFTS = 20  # of the alarms, equal parts of a trial
+MOMENTS = (50, 100)  # sliding ticks after which a surface is asked: 0.5 and 1 s
+_RUN = 10  # ticks of continuous sliding from which is counted
+_BEFORE, _AFTER = 200, 300  # ticks of sliding around a change of ground
+
+
+@dataclass(frozen=True, slots=True)
+class SlipScore:
+    """How slips were foreseen.
+
+    Attributes:
+        onsets: number of slips.
+        recall: share with a warning in the 0.2 s before.
+        lead: median from the beginning of the alarm to the onset [s], at most 2 s.
+        early: share of all slips with an alarm 0.1 s before or more.
+        needless: share of at-risk time outside the 0.2 s before slips in warning.
+        per_minute: false alarms a minute.
+        false_share: share of the alarms that were false.
+        chance: recall of the same warnings shifted in time.
+        calibration: mean difference of probability and share, ten bins of equal size.
+        seconds: recorded.
+    """
+
+    onsets: int
+    recall: float
+    lead: float
+    early: float
+    needless: float
+    per_minute: float
+    false_share: float
+    chance: float
+    calibration: float
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class GroundScore:
+    """How flat and rocky ground were told apart.
+
+    Attributes:
+        trials: number of trials that slid long enough.
+        accuracy: after the `MOMENTS` of sliding, from the beginning of every trial.
+        anywhere: the same of every second of sliding, what was before forgotten.
+        sure_and_wrong: share of all answers of `anywhere` with 98 % or more, and wrong.
+        calibration: of `anywhere`, ten bins, both surfaces weighing alike.
+        back: median of the time to 95 % on the right surface after a change of ground
+            [s of sliding]; infinite where it never came.
+        slowest: the longest of them [s of sliding].
+    """
+
+    trials: int
+    accuracy: tuple[float, ...]
+    anywhere: tuple[float, ...]
+    sure_and_wrong: float
+    calibration: float
+    back: float
+    slowest: float
+
+
+class _Ticks(NamedTuple):
+    """Warnings and truth of one trial, row by row of its ticks."""
+
+    p: Array
+    t: Array
+    warned: np.ndarray
+    at_risk: np.ndarray
+    before: np.ndarray
+    alarms: list[tuple[float, float]]
+    onsets: list[float]
+
+
+def _ticks_of(run: ForesightRun) -> _Ticks:
+    trial = run.trial
+    by_tick = dict(zip(trial.tick.tolist(), range(trial.tick.size), strict=True))
+    p = np.full(trial.tick.size, np.nan)
+    is_alarm = np.zeros(trial.tick.size, dtype=np.bool_)
+    for state in run.states:
+        row = by_tick.get(state.cycle // EVERY)
+        if row is not None:
+            p[row] = state.slip_probability
+            is_alarm[row] = bool(state.flags & ForesightFlag.ALARM)
+    known = np.isfinite(p)
+    first = float(trial.t[0]) + HORIZON if trial.t.size else 0.0
+    return _Ticks(
+        p=p,
+        t=trial.t,
+        warned=known & (np.nan_to_num(p) >= run.threshold),
+        at_risk=trial.is_at_risk & known,
+        before=trial.is_before_slip,
+        alarms=_stretches(trial.t, is_alarm),
+        onsets=[onset for onset in trial.onsets.tolist() if onset >= first],
+    )
+
+
+def _stretches(t: Array, is_on: np.ndarray) -> list[tuple[float, float]]:
+    """Return (first, last) time of every run of True [s]."""
+    edges = np.diff(np.concatenate([[0], is_on.astype(np.int8), [0]]))
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [(float(t[a]), float(t[b - 1])) for a, b in zip(starts, stops, strict=True)]
+
+
+def score_slips(runs: Sequence[ForesightRun]) -> SlipScore:
+    """Return how slips were foreseen in trials together."""
+    ticks = [_ticks_of(run) for run in runs]
+    ticks = [one for one in ticks if one.t.size]
+    leads = [lead for one in ticks for lead in _leads(one)]
+    onsets = sum(len(one.onsets) for one in ticks)
+    calm = np.concatenate([one.warned[one.at_risk & ~one.before] for one in ticks])
+    alarms, needless = _counted(ticks)
+    seconds = float(sum(one.t[-1] - one.t[0] for one in ticks))
+    hit = [lead for lead in leads if lead is not None]
+    return SlipScore(
+        onsets=onsets,
+        recall=len(hit) / onsets if onsets else float("nan"),
+        lead=float(np.median(hit)) if hit else float("nan"),
+        early=sum(lead >= EARLY for lead in hit) / max(onsets, 1),
+        needless=float(calm.mean()) if calm.size else float("nan"),
+        per_minute=60.0 * needless / seconds if seconds else float("nan"),
+        false_share=needless / alarms if alarms else 0.0,
+        chance=_chance(ticks, onsets),
+        calibration=calibration_error(
+            np.concatenate([one.p[one.at_risk] for one in ticks]),
+            np.concatenate([one.before[one.at_risk] for one in ticks]),
+        ),
+        seconds=seconds,
+    )
+
+
+def _leads(ticks: _Ticks) -> list[float | None]:
+    """Return how early every onset was warned of [s]; None = not at all."""
+    leads: list[float | None] = []
+    for onset in ticks.onsets:
+        last = (ticks.t < onset) & (ticks.t >= onset - HORIZON) & ticks.at_risk
+        if not bool((ticks.warned & last).any()):
+            leads.append(None)
+            continue
+        begun = [a for a, b in ticks.alarms if a < onset and b >= onset - HORIZON]
+        leads.append(min(onset - min(begun), LONGEST_LEAD))
+    return leads
+
+
+def _counted(ticks: Sequence[_Ticks]) -> tuple[int, int]:
+    """Return (number of alarms, of those that no onset followed within 0.2 s)."""
+    alarms = needless = 0
+    for one in ticks:
+        rows = np.searchsorted(one.t, [start for start, _ in one.alarms])
+        for row, (start, end) in zip(rows, one.alarms, strict=True):
+            if not one.at_risk[row]:
+                continue  # late, the slip has begun
+            alarms += 1
+            needless += not any(start <= o <= end + HORIZON for o in one.onsets)
+    return alarms, needless
+
+
+def _chance(ticks: Sequence[_Ticks], onsets: int) -> float:
+    """Return the recall of the same warnings, moved round within their trial."""
+    hits = 0
+    for one in ticks:
+        for part in range(1, SHIFTS):
+            moved = np.roll(one.warned, part * one.t.size // SHIFTS)
+            for onset in one.onsets:
+                last = (one.t < onset) & (one.t >= onset - HORIZON) & one.at_risk
+                hits += bool((moved & last).any())
+    return hits / (onsets * (SHIFTS - 1)) if onsets else float("nan")
+
+
+def score_ground(
+    pairs: Sequence[tuple[GroundModel, Sequence[WatchedTrial]]],
+) -> GroundScore | None:
+    """Return how surfaces were told apart; None where no model has two of them.
+
+    Args:
+        pairs: models, each with trials that it has not seen.
+    """
+    begun: list[list[bool]] = [[] for _ in MOMENTS]
+    anew: list[list[tuple[float, bool]]] = [[] for _ in MOMENTS]
+    back: list[float] = []
+    count = 0
+    for model, trials in pairs:
+        if not model.surfaces:
+            continue
+        known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
+        count += len(known)
+        for trial in known:
+            _judge_trial(model, trial, begun, anew)
+        back += _changes(model, known)
+    if not count or not all(anew):
+        return None
+    p, is_rocky = (np.array(column) for column in zip(*anew[0], strict=True))
+    share = float(is_rocky.mean())
+    weight = np.where(is_rocky, 0.5 / max(share, 1e-9), 0.5 / max(1.0 - share, 1e-9))
+    return GroundScore(
+        trials=count,
+        accuracy=tuple(float(np.mean(right)) for right in begun),
+        anywhere=tuple(float(np.mean([(p > 0.5) == r for p, r in a])) for a in anew),
+        sure_and_wrong=float((np.where(is_rocky, 1.0 - p, p) >= SURE).mean()),
+        calibration=calibration_error(p, is_rocky, weight),
+        back=float(np.median(back)) if back else float("nan"),
+        slowest=max(back, default=float("nan")),
+    )
+
+
+def _judge_trial(
+    model: GroundModel,
+    trial: WatchedTrial,
+    begun: list[list[bool]],
+    anew: list[list[tuple[float, bool]]],
+) -> None:
+    """Add the answers of a trial, from its beginning and begun anew every second."""
+    is_rocky, rows = trial.surface == ROCKY_SURFACE, trial.sliding
+    first = _first_run(trial.tick[rows].tolist())
+    recogniser = GroundRecogniser(model)
+    asked = {first + moment: k for k, moment in enumerate(MOMENTS)}
+    for count, row in enumerate(rows, 1):
+        _feed(recogniser, trial, row)
+        if count in asked and recogniser.rocky is not None:
+            begun[asked[count]].append((recogniser.rocky > 0.5) == is_rocky)
+    recogniser.reset()
+    for start in range(0, len(rows) - MOMENTS[-1], MOMENTS[-1]):
+        recogniser.forget()
+        for count, row in enumerate(rows[start : start + MOMENTS[-1]], 1):
+            _feed(recogniser, trial, row)
+            if count in MOMENTS and recogniser.rocky is not None:
+                anew[MOMENTS.index(count)].append((recogniser.rocky, is_rocky))
+
+
+def _feed(recogniser: GroundRecogniser, trial: WatchedTrial, row: int) -> None:
+    v, F_t, F_n = trial.motion[row].tolist()
+    recogniser.push(int(trial.tick[row]), v, F_t, F_n)
+
+
+def _first_run(ticks: Sequence[int]) -> int:
+    """Return how many sliding ticks lie before the first continuous 0.1 s."""
+    for k in range(len(ticks) - _RUN + 1):
+        if ticks[k + _RUN - 1] - ticks[k] == _RUN - 1:
+            return k
+    return len(ticks)
+
+
+def _changes(model: GroundModel, trials: Sequence[WatchedTrial]) -> list[float]:
+    """Return the times to 95 % on the right surface after changes of ground [s]."""
+    flat = [t for t in trials if t.surface == FLAT_SURFACE]
+    rocky = [t for t in trials if t.surface == ROCKY_SURFACE]
+    if not flat or not rocky:
+        return []
+    times: list[float] = []
+    for k, before in enumerate(trials):
+        others = rocky if before.surface == FLAT_SURFACE else flat
+        after = others[k % len(others)]
+        least = _BEFORE + MOMENTS[-1]
+        if len(before.sliding) >= _BEFORE and len(after.sliding) >= least:
+            times.append(_time_back(model, before, after))
+    return times
+
+
+def _time_back(model: GroundModel, before: WatchedTrial, after: WatchedTrial) -> float:
+    recogniser = GroundRecogniser(model)
+    for row in before.sliding[:_BEFORE]:
+        _feed(recogniser, before, row)
+    offset = int(before.tick[before.sliding[_BEFORE - 1]])
+    rows = after.sliding[_BEFORE : _BEFORE + _AFTER]
+    offset += 1 - int(after.tick[rows[0]])
+    for count, row in enumerate(rows, 1):
+        v, F_t, F_n = after.motion[row].tolist()
+        recogniser.push(int(after.tick[row]) + offset, v, F_t, F_n)
+        rocky = recogniser.rocky
+        if rocky is None:
+            continue
+        right = rocky if after.surface == ROCKY_SURFACE else 1.0 - rocky
+        if right >= RIGHT:
+            return count * 0.01
+    return float("inf")

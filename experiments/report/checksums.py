@@ -1,0 +1,110 @@
+"""Checksums of a folder: written as `sha256sum -c` reads them, and held against it."""
+
+import hashlib
+import os
+import re
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition import TrialFileError
+from experiments.session import write_new
+
+SUMS = "SHA256SUMS"
+_LINE = re.compile(r"(?P<digest>[0-9a-f]{64})  (?P<path>[^\0\n]{1,1000})")
+_LARGEST = 16_000_000  # bytes of the list
+_MOST = 100_000  # files below a folder
+_NO_LINKS = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedFile:
+    """One file of a folder that is not as it was written.
+
+    Attributes:
+        path: below the folder.
+        problem: what is wrong, in words.
+    """
+
+    path: str
+    problem: str
+
+    def text(self) -> str:
+        """Return it in one line."""
+        return f"{self.path} {self.problem}"
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a regular file of any size; no link is followed.
+
+    Raises:
+        TrialFileError: it cannot be read, or is no regular file.
+    """
+    try:
+        descriptor = os.open(path, _NO_LINKS)
+        with os.fdopen(descriptor, "rb") as file:
+            if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                raise TrialFileError(path, "is no regular file")
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
+
+
+def write_sums(folder: Path) -> None:
+    """Write the SHA-256 of every file below `folder`.
+
+    Raises:
+        TrialFileError: a file cannot be read, or the list is there already.
+    """
+    lines = [f"{digest_of(folder / name)}  {name}\n" for name in sorted(_files(folder))]
+    write_new(folder / SUMS, "".join(lines).encode())
+
+
+def changed_files(folder: Path) -> list[ChangedFile]:
+    """Return every file below `folder` that is missing, changed or not in its list.
+
+    Raises:
+        TrialFileError: the list is missing or none.
+    """
+    listed = _read_sums(folder / SUMS)
+    there = _files(folder) - {SUMS}
+    changes: list[ChangedFile] = []
+    for name in sorted(set(listed) | there):
+        if name not in there:
+            changes.append(ChangedFile(name, "is missing"))
+        elif name not in listed:
+            changes.append(ChangedFile(name, f"is not in {SUMS}"))
+        else:
+            try:
+                if digest_of(folder / name) != listed[name]:
+                    changes.append(ChangedFile(name, "is changed"))
+            except TrialFileError as error:
+                changes.append(ChangedFile(name, error.reason))
+    return changes
+
+
+def _files(folder: Path) -> set[str]:
+    """Return everything below a folder that is no folder; links are not entered."""
+    names: set[str] = set()
+    for top, folders, files in os.walk(folder, followlinks=False):
+        links = [name for name in folders if (Path(top) / name).is_symlink()]
+        for name in (*files, *links):
+            names.add(str((Path(top) / name).relative_to(folder)))
+        if len(names) > _MOST:
+            raise TrialFileError(folder, f"holds more than {_MOST} files")
+    return names
+
+
+def _read_sums(path: Path) -> dict[str, str]:
+    digest_of(path)  # a regular file, and no link
+    with path.open("rb") as file:
+        text = file.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise TrialFileError(path, f"is larger than {_LARGEST / 1e6:.0f} MB")
+    sums: dict[str, str] = {}
+    for number, line in enumerate(text.decode(errors="replace").splitlines(), 1):
+        match = _LINE.fullmatch(line)
+        if match is None or match["path"] in sums:
+            raise TrialFileError(path, f"is changed: line {number} is no checksum")
+        sums[match["path"]] = match["digest"]
+    return sums

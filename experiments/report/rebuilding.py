@@ -1,0 +1,128 @@
+"""A publication held against its checksums, and its table computed once more."""
+
+import csv
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from typing import cast
+
+from acquisition import SettingsError, TrialFileError
+from analysis.findings import compute_results, findings_rows, summarise_rig
+from analysis.study import FitOptions, to_csv
+from experiments.operator import Console
+from experiments.report.checksums import SUMS, ChangedFile, changed_files
+from experiments.report.crate import METADATA
+from experiments.report.publication import ANALYSIS, TABLE
+from experiments.report.sessions import REPORTED, ReportRequest, study_sessions
+from experiments.session import list_sessions, read_json
+
+TOLERANCE = 1e-9  # relative
+_ABSOLUTE = 1e-12  # of values that are nothing but rounding
+_LARGEST = 64_000_000  # bytes of a table
+_PLACES = ("terrain", "model", "fold", "quantity", "unit")
+
+
+@dataclass(frozen=True, slots=True)
+class TableComparison:
+    """A table that was computed again beside the one that is published.
+
+    Attributes:
+        rows: that were compared.
+        worst: largest relative difference of two numbers.
+        different: rows that differ by more than the tolerance, in words.
+    """
+
+    rows: int
+    worst: float
+    different: Sequence[str]
+
+
+def is_publication(path: Path) -> bool:
+    """Return whether `path` is a folder that `traction publish` wrote."""
+    return (path / METADATA).is_file() or (path / SUMS).is_file()
+
+
+def check_publication(folder: Path) -> list[ChangedFile]:
+    """Return every file that is missing, changed or new.
+
+    Raises:
+        TrialFileError: the list of checksums is missing or damaged.
+    """
+    return changed_files(folder)
+
+
+def rebuild(folder: Path, console: Console) -> TableComparison:
+    """Compute the table of results from the recordings alone, and compare.
+
+    Nothing of an earlier run is used, and nothing is written into the folder.
+
+    Raises:
+        SettingsError: the folder does not state how its results were made.
+        TrialFileError: a file cannot be read.
+        SessionError: there is no kept trial.
+    """
+    choices = read_json(folder / ANALYSIS)
+    seed, terrains = choices.get("seed"), choices.get("terrains")
+    if type(seed) is not int or seed < 0 or not isinstance(terrains, list):
+        raise SettingsError(
+            f"{folder / ANALYSIS} does not state how the results were made.",
+            hint="Only a folder that traction publish wrote can be rebuilt.",
+        )
+    names = [str(name) for name in cast("list[object]", terrains)]
+    order = ReportRequest(names, seed)
+    fit = FitOptions(seed=seed, models=REPORTED)
+    with tempfile.TemporaryDirectory(prefix="traction-rebuild-") as empty:
+        sessions, data = list_sessions(folder), Path(empty)
+        analysed = study_sessions(sessions, data, order, console, fit)
+    trials = [trial for group in analysed.trials.values() for trial in group]
+    results = compute_results(analysed.study, summarise_rig(trials))
+    again = to_csv(analysed.study, findings_rows(results))
+    return compare_tables(_text(folder / TABLE), again)
+
+
+def compare_tables(published: str, again: str) -> TableComparison:
+    """Return where two tables in the form of fits.csv differ."""
+    worst, count = 0.0, 0
+    different: list[str] = []
+    for ours, theirs in zip_longest(_rows(published), _rows(again)):
+        count += 1
+        if ours is None or theirs is None or ours[0] != theirs[0]:
+            different.append(f"row {count} is {theirs}, published is {ours}")
+            continue
+        one, other = ours[1], theirs[1]
+        if one == other or (math.isnan(one) and math.isnan(other)):
+            continue
+        scale = max(abs(one), abs(other))
+        if not math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=_ABSOLUTE):
+            place = " ".join(filter(None, ours[0]))
+            different.append(f"{place}: {other!r}, published is {one!r}")
+        if scale > _ABSOLUTE / TOLERANCE:
+            worst = max(worst, abs(one - other) / scale)
+    return TableComparison(count, worst, different)
+
+
+def _rows(text: str) -> Iterator[tuple[tuple[str, ...], float]]:
+    """Give (place, value) of every row."""
+    for row in csv.DictReader(text.splitlines()):
+        try:
+            value = float(row["value"])
+            yield tuple(row[name] for name in _PLACES), value
+        except (KeyError, TypeError, ValueError) as error:
+            raise SettingsError(
+                f"{TABLE} is no table of results ({error!r}).",
+                hint="Was it edited? Name the changed files with: traction verify DIR",
+            ) from error
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST + 1)
+    except OSError as error:
+        raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
+    if len(content) > _LARGEST:
+        raise TrialFileError(path, f"is larger than {_LARGEST / 1e6:.0f} MB")
+    return content.decode(errors="replace")

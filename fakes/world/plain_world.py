@@ -1,0 +1,56 @@
+"""A simulated rig from plain values, as they go to a process of its own."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from acquisition import Clock
+from fakes.plant import PACES, PlantOptions
+from fakes.sensor import SensorChoice
+from fakes.world.rig import FakeRig, LocalSimulation, SimulatedScene
+from ft_sensor import TerrainFrame
+from wam.model import ArmConstants, MotorFriction, friction_of, tool_of
+
+
+def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
+    """Return the scene that was put into plain values."""
+    frame = fields["frame"]
+    return SimulatedScene(
+        terrain=fields["terrain"],
+        stones=fields["stones"],
+        foot=fields["foot"],
+        frame=TerrainFrame(
+            frame["incline"],
+            frame["heading"],
+            tuple(frame["far_end"]),
+            frame["travel"],
+        ),
+        start_q=np.array(fields["start_q"]),
+        seed=fields["seed"],
+        sensor=SensorChoice(**fields["sensor"]),
+    )
+
+
+def simulated_rig(
+    fields: Mapping[str, Any], constants: ArmConstants, clock: Clock
+) -> LocalSimulation:
+    """Return the simulation that was put into plain values.
+
+    Args:
+        fields: scene, tool, share of friction, pace; "body" of the twin of an arm:
+            centres of mass of its links and, unless None, friction of its motors.
+        constants: of the arm by its drawings.
+        clock: of the world.
+    """
+    scene, body = _scene_of(fields["scene"]), fields.get("body")
+    rubbing: MotorFriction | None = None
+    if body is not None:
+        pairs = zip(constants.links, body["com"], strict=True)
+        links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
+        constants = replace(constants, links=links)
+        rubbing = None if body["motors"] is None else friction_of(body["motors"])
+    options = PlantOptions(fields["friction"], seed=scene.seed, rubbing=rubbing)
+    rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
+    return LocalSimulation(rig, PACES[fields["pace"]])

@@ -1,0 +1,69 @@
+"""Foresight in a process of its own reads the ring and says what the record gives."""
+
+import numpy as np
+import pytest
+
+from acquisition.ipc.child import Child
+from acquisition.ipc.layout import SharedLayout
+from acquisition.schema import CYCLE
+from experiments.rig.foresight import read_foresight, state_record, states_of
+from tests.acquisition.trials import make_cycles
+from tests.analysis.foresight.databases import write_database
+from tests.analysis.foresight.made import RIG, STONES, trial
+from tests.processes.watching import until
+
+pytestmark = pytest.mark.wall_clock
+ALONG = [1.0, 0.0, 0.0]
+LONGEST = 20.0  # s, on a machine with other work
+
+
+@pytest.fixture
+def cycles():
+    samples = trial(STONES, 50).samples[:3000]
+    records = make_cycles(len(samples))
+    for k, sample in enumerate(samples):
+        records["foot_position"][k] = (sample.x, 0.0, 0.0)
+        records["traction"][k] = (0.0, sample.F_t, sample.F_n)
+    return records
+
+
+def test_a_process_says_bit_for_bit_what_the_record_gives(tmp_path, cycles):
+    source = read_foresight(write_database(tmp_path / "terrains.json"))
+    shared = SharedLayout.create()
+    settings = {**source.settings(), "rig": RIG.to_dict(), "along": ALONG}
+    child = Child("foresight", "experiments.rig.foresight:main", settings, shared)
+    try:
+        reader = shared.foresight.reader()
+        data = memoryview(cycles.tobytes())
+        for k in range(len(cycles)):
+            shared.cycles.write(data[k * CYCLE.size : (k + 1) * CYCLE.size])
+        # Once more wherever the process came up only after it was told.
+        wanted = list(map(state_record, states_of(source.started(RIG), cycles, ALONG)))
+        assert until(lambda: told(shared, reader, len(wanted)), LONGEST)
+        records = reader.read()
+        assert [record.tobytes() for record in records[: len(wanted)]] == wanted
+    finally:
+        child.stop()
+        shared.close()
+
+
+def told(shared, reader, count):
+    """Let the trial begin until the process has seen it; say whether it is through."""
+    if not reader.backlog:
+        shared.trial_start.write(b"0")
+    return reader.backlog >= count
+
+
+def test_a_process_at_rest_says_nothing(tmp_path, cycles):
+    source = read_foresight(write_database(tmp_path / "terrains.json"))
+    shared = SharedLayout.create()
+    settings = {**source.settings(), "rig": RIG.to_dict(), "along": ALONG}
+    child = Child("foresight", "experiments.rig.foresight:main", settings, shared)
+    try:
+        shared.cycles.write(cycles[:1].tobytes())
+        assert not until(lambda: shared.foresight.written > 0, 1.0)
+        assert child.is_alive
+    finally:
+        child.stop()
+        shared.close()
+    assert not np.isnan(cycles["foot_position"]).any()

@@ -1,0 +1,44 @@
+"""Every example in the documentation of the public package runs as it is printed."""
+
+import doctest
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+@pytest.mark.parametrize(
+    ("module", "least"),
+    [("loading", 3), ("trials", 1), ("trial_sets", 1), ("models", 3)],
+)
+def test_examples_of_a_module_print_what_they_say(module, least):
+    found = importlib.import_module(f"traction.{module}")
+    parts = [test for test in doctest.DocTestFinder().find(found) if test.examples]
+    assert len(parts) >= least
+    runner = doctest.DocTestRunner(optionflags=FLAGS)
+    for test in parts:
+        runner.run(test)
+    assert runner.summarize(verbose=False).failed == 0
+
+
+def test_the_page_for_notebooks_runs_as_it_is(tmp_path, monkeypatch, workplace):
+    page = ROOT / "docs" / "notebook.md"
+    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    for name in ("data", "tables"):
+        (tmp_path / name).symlink_to(workplace / name)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, str(page), "exec"), {})
+    assert {path.name for path in tmp_path.glob("*.pdf")} == {"T01.pdf", "session.pdf"}
+
+
+def test_the_example_of_the_readme_runs_as_it_is(tmp_path, monkeypatch, workplace):
+    page = ROOT / "README.md"
+    (block,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "demo").symlink_to(workplace / "data")
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block, str(page), "exec"), {})
+    assert (tmp_path / "T01.pdf").stat().st_size > 1000

@@ -1,0 +1,34 @@
+"""Tables as pandas data frames, the one door to pandas."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from acquisition import MissingLibraryError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from pandas import DataFrame
+
+
+def data_frame(
+    columns: Mapping[str, Any], units: Mapping[str, str], **about: object
+) -> DataFrame:
+    """Return columns as a data frame.
+
+    Args:
+        columns: values by name, all of shape (n,).
+        units: by name; kept in `attrs["units"]`.
+        about: kept in `attrs`.
+
+    Raises:
+        MissingLibraryError: pandas is not installed.
+    """
+    try:
+        import pandas as pd
+    except ImportError as error:
+        raise MissingLibraryError("pandas", "pandas") from error
+    frame = pd.DataFrame(dict(columns))
+    frame.attrs.update(units=dict(units), **about)
+    return frame

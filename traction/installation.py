@@ -1,0 +1,48 @@
+"""Whether the packages of the program are its own, and none of the same name."""
+
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+OWN = ("acquisition", "analysis", "experiments", "fakes", "ft_sensor", "wam")
+
+
+@cache
+def check_packages() -> None:
+    """Compare every package of the program with what Python would import.
+
+    Raises:
+        ImportError: another folder or module of the same name comes first, or one of
+            the packages is missing.
+    """
+    home = Path(__file__).resolve().parent.parent
+    for name in OWN:
+        places = _places(name)
+        if (home / name) in places:
+            continue
+        if not places:
+            raise ImportError(
+                f"Traction is not complete: its package {name!r} is missing beside "
+                f"{home / 'traction'}. Install it again.",
+                name=name,
+            )
+        raise ImportError(
+            f"{places[0]} hides the package {name!r} of Traction, which is "
+            f"{home / name}. Rename the one that hides it, or start Python in another "
+            "folder.",
+            name=name,
+        )
+
+
+def _places(name: str) -> list[Path]:
+    """Return where Python finds a package: its folders, or its file."""
+    try:
+        spec = find_spec(name)
+    except (ImportError, ValueError):  # a module without a specification
+        return []
+    if spec is None:
+        return []
+    places = list(spec.submodule_search_locations or [])
+    if not places and spec.origin:
+        places = [spec.origin]
+    return [Path(place).resolve() for place in places]

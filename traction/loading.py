@@ -1,0 +1,100 @@
+"""Trials from the disk: of a session, a recording, or tables."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from acquisition import SessionError, SettingsError
+from analysis import api
+from experiments.session import check_kept, find_session
+from traction.trial_sets import TrialSet
+from traction.trials import Trial, trial_of
+
+_RECORDED = ".mcap"
+
+
+def load_session(
+    name: str, data: Path | str = "data", *, allow_missing: bool = False
+) -> TrialSet:
+    """Return the kept trials of a recorded session, held against their checksums.
+
+    >>> import traction as tr
+    >>> session = tr.load_session("S001")
+    >>> session
+    <S001: 2 trials on TF, simulated>
+    >>> session["T02"]
+    <Trial S001/T02 on TF: ... s, ... samples at 500 Hz, ... kept, simulated>
+
+    Args:
+        name: "S012", the name of its folder, or a path to it.
+        data: the data folder, as `--data` of the commands.
+        allow_missing: go on without kept trials that are missing or changed.
+
+    Raises:
+        SessionError: there is no such session, or it has no kept trial.
+        KeptDataError: a kept trial is missing or changed.
+        TrialFileError: a file cannot be read.
+    """
+    folder = find_session(Path(data), str(name))
+    check_kept([folder], allow_missing=allow_missing)
+    paths = folder.kept_trials()
+    if not paths:
+        raise SessionError(f"{folder.id}: no kept trials in {folder.path}.")
+    return TrialSet(folder.id, tuple(trial_of(api.load_trial(path)) for path in paths))
+
+
+def load_trial(path: Path | str) -> Trial:
+    """Return one recorded trial, or the trial in one table.
+
+    >>> import traction as tr
+    >>> folder = tr.load_session("S001")["T01"].recorded.path.parent
+    >>> tr.load_trial(folder / "T01.mcap")
+    <Trial S001/T01 on TF: ... s, ... samples at 500 Hz, ... kept, simulated>
+
+    Args:
+        path: T04.mcap of a session, or a CSV or Parquet table with the columns t, v_t,
+            F_n and F_t.
+
+    Raises:
+        TrialFileError: the file is no sound recording.
+        SettingsError: the table cannot be read, or holds more than one trial.
+    """
+    path = Path(path)
+    if path.suffix == _RECORDED:
+        return trial_of(api.load_trial(path))
+    trials = load_tables(path)
+    if len(trials) != 1:
+        raise SettingsError(
+            f"{path} holds {len(trials)} trials.", hint="Read it with load_tables."
+        )
+    return trials[0]
+
+
+def load_tables(
+    paths: Path | str | Iterable[Path | str],
+    columns: Mapping[str, str] | None = None,
+    terrain: str | None = None,
+    units: Mapping[str, str] | None = None,
+    rate: float | None = None,
+) -> TrialSet:
+    """Return the trials of tables: those of `traction export`, or of other programs.
+
+    >>> import traction as tr
+    >>> tr.load_tables("tables")
+    <tables: 2 trials on TF, simulated>
+
+    Args:
+        paths: a folder of `traction export`, CSV or Parquet files of one trial each, or
+            npz files of many; one or several.
+        columns: names of t, v_t, F_n and F_t in the tables, where they differ.
+        terrain: of every CSV and Parquet file; by default what its data package says.
+        units: of columns whose header gives none, e.g. {"v_t": "mm/s"}.
+        rate: rows per second where a CSV has no time [Hz].
+
+    Raises:
+        SettingsError: a table that is missing, too large, changed, or none.
+    """
+    many = [paths] if isinstance(paths, str | Path) else list(paths)
+    files = [Path(path) for path in many]
+    tables = api.load_tables(files, columns, terrain, None, units, rate)
+    name = files[0].name if len(files) == 1 else f"{len(files)} files"
+    return TrialSet(name, tuple(trial_of(s) for of in tables.values() for s in of))

@@ -1,0 +1,299 @@
+"""Models of trials: fitted, compared with one trial left out at a time, and known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from acquisition import SettingsError
+from analysis import api
+from analysis.study import TITLES, Distribution, FoldResult, mean_of, standard_error
+from analysis.tustin import UNITS
+from traction.frames import data_frame
+from traction.trial_sets import by_terrain
+from traction.trials import Trial
+
+if TYPE_CHECKING:
+    from traction.frames import DataFrame
+
+_CONSTANT = "constant"  # the median F_t of the other trials, for scale
+_SCORE_UNITS = {
+    "mae": "N",
+    "mae_error": "N",
+    "rmse": "N",
+    "nlpd": "log N",
+    "crps": "N",
+    "coverage90": "1",
+}
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Model:
+    """A model of F_t over F_n and v_t, fitted to the trials of one terrain.
+
+    Attributes:
+        name: e.g. "tustin" or "gp_se".
+        terrain: it was fitted to.
+        trials: it was fitted to.
+        samples: kept samples of these trials.
+        fitted: the model of `analysis.study`.
+    """
+
+    name: str
+    terrain: str
+    trials: int
+    samples: int
+    fitted: api.FittedModel
+
+    def __repr__(self) -> str:
+        values = ""
+        if self.name == api.TUSTIN:
+            parts = (f"{key} {self.parameters[key]:.3g} {UNITS[key]}" for key in UNITS)
+            values = ": " + ", ".join(part.removesuffix(" 1") for part in parts)
+        doubts = f" [{', '.join(self.flags)}]" if self.flags else ""
+        return (
+            f"<{TITLES[self.name]} of {self.terrain}, {self.trials} trials, "
+            f"{self.samples} samples{values}{doubts}>"
+        )
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Parameters as fitted; those of "tustin" are mu, F_s, v_s, delta_s and b."""
+        return self.fitted.describe()
+
+    @property
+    def flags(self) -> tuple[str, ...]:
+        """What to know before the parameters are believed."""
+        return self.fitted.flags
+
+    def predict(self, F_n: ArrayLike, v_t: ArrayLike) -> Distribution:
+        """Return the traction to expect of a measurement, noise included.
+
+        >>> import traction as tr
+        >>> answer = tr.fit(tr.load_session("S001"), "tustin").predict(3.5, [0.02, 0.1])
+        >>> answer.mean.shape, bool((answer.sd > 0).all())
+        ((2,), True)
+
+        Args:
+            F_n: normal force [N], a number or shape (n,).
+            v_t: slip velocity [m/s], a number or shape (n,).
+
+        Returns:
+            `.mean`, `.sd` and `.quantiles(shares)` of F_t [N], shape (n,).
+
+        Raises:
+            SettingsError: the two do not have one shape, or a value is not finite.
+        """
+        try:
+            loads, speeds = np.broadcast_arrays(
+                np.atleast_1d(np.asarray(F_n, dtype=np.float64)),
+                np.atleast_1d(np.asarray(v_t, dtype=np.float64)),
+            )
+        except ValueError as error:
+            raise SettingsError(
+                f"F_n and v_t are no numbers of one shape ({error}).",
+                hint="Give two numbers, or two arrays of one length.",
+            ) from error
+        if loads.ndim != 1 or not (np.isfinite(loads) & np.isfinite(speeds)).all():
+            raise SettingsError("F_n and v_t have to be finite numbers in one row.")
+        return self.fitted.predict(loads, speeds)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelScore:
+    """How well a model predicts trials that it was not fitted to.
+
+    Attributes:
+        terrain: of the trials.
+        model: its name; "constant" is the median F_t of the other trials, for scale.
+        trials: that were left out, one at a time.
+        mae: mean absolute error [N].
+        mae_error: standard error of `mae` over the trials [N].
+        rmse: root mean square error [N].
+        nlpd: mean negative log predictive density [log N].
+        crps: mean continuous ranked probability score [N].
+        coverage90: share of measurements inside the 90 % band.
+    """
+
+    terrain: str
+    model: str
+    trials: int
+    mae: float
+    mae_error: float | None
+    rmse: float | None
+    nlpd: float | None
+    crps: float | None
+    coverage90: float | None
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Comparison:
+    """Models compared on trials that were left out.
+
+    Attributes:
+        scores: by terrain, the smallest error first.
+        folds: every fold with its fitted models.
+    """
+
+    scores: tuple[ModelScore, ...]
+    folds: tuple[FoldResult, ...]
+
+    def __repr__(self) -> str:
+        lines = [f"{'terrain':12} {'model':20} {'MAE [N]':>8}  {'90 % band':>9}"]
+        for score in self.scores:
+            share = score.coverage90
+            inside = "" if share is None else f"  {share:9.0%}"
+            lines.append(
+                f"{score.terrain:12} {score.model:20} {score.mae:8.3f}{inside}"
+            )
+        return "\n".join(lines)
+
+    def best(self, terrain: str) -> ModelScore:
+        """Return the model with the smallest mean absolute error on a terrain.
+
+        Raises:
+            SettingsError: the terrain was not compared.
+        """
+        for score in self.scores:
+            if score.terrain == terrain:
+                return score
+        known = ", ".join(dict.fromkeys(score.terrain for score in self.scores))
+        raise SettingsError(
+            f"There is no terrain {terrain!r}.", hint=f"The terrains are {known}."
+        )
+
+    def to_pandas(self) -> DataFrame:
+        """Return a row per terrain and model; units in `attrs["units"]`.
+
+        Raises:
+            MissingLibraryError: pandas is not installed.
+        """
+        rows = [asdict(score) for score in self.scores]
+        names = [field.name for field in fields(ModelScore)]
+        return data_frame({n: [row[n] for row in rows] for n in names}, _SCORE_UNITS)
+
+
+def fit(
+    trials: Trial | Iterable[Trial],
+    model: str = api.GP_SE,
+    options: api.FitOptions | None = None,
+) -> Model:
+    """Return a model fitted to the kept samples of trials on one terrain.
+
+    >>> import traction as tr
+    >>> tr.fit(tr.load_session("S001"), "tustin")
+    <Tustin of TF, 2 trials, ... samples: mu ..., F_s ... N, v_s ... m/s, ...>
+
+    Args:
+        trials: of one terrain, e.g. a session or `tables.on("S0")`.
+        model: "tustin", "gp_se", "gp_nn", "gp_se_tustin", "gp_nn_tustin",
+            "gp_se_noise", or "gp_se_trial" whose bands hold for a trial to come.
+        options: bounds, points and seed; see `analysis.api.FitOptions`.
+
+    Raises:
+        SettingsError: there is no such model, the trials are of several terrains, or
+            their samples are too few.
+    """
+    groups = by_terrain([trials] if isinstance(trials, Trial) else trials)
+    if len(groups) != 1:
+        named = ", ".join(groups) or "none"
+        raise SettingsError(
+            f"A model is fitted to trials of one terrain; these are of {named}.",
+            hint='Choose one, e.g. trials.on("S0").',
+        )
+    ((terrain, prepared),) = groups.items()
+    if model == api.TUSTIN:
+        fitted: api.FittedModel = api.fit_tustin(prepared, options)
+    else:
+        fitted = api.fit_gp(prepared, model, options)
+    samples = sum(trial.kept for trial in prepared)
+    return Model(model, terrain, len(prepared), samples, fitted)
+
+
+def compare(
+    trials: Iterable[Trial],
+    models: Sequence[str] = tuple(api.FITTERS),
+    options: api.FitOptions | None = None,
+    n_jobs: int | None = None,
+) -> Comparison:
+    """Return how well models predict whole trials that they were not fitted to.
+
+    >>> import traction as tr
+    >>> scores = tr.compare(tr.load_session("S001"), ["tustin"], n_jobs=1)
+    >>> scores
+    terrain      model                 MAE [N]  90 % band
+    TF           tustin ...
+    TF           constant ...
+    >>> scores.best("TF").model
+    'tustin'
+
+    Args:
+        trials: of one terrain or several, two of each at least.
+        models: their names; by default the five of the paper's Fig. 9.
+        options: bounds, points and seed; its `models` are not used.
+        n_jobs: processes; one per core by default. Does not change the results.
+
+    Raises:
+        SettingsError: there is no such model, or a terrain has a single trial.
+    """
+    groups = by_terrain(trials)
+    single = [name for name, group in groups.items() if len(group) < 2]
+    if single or not groups:
+        raise SettingsError(
+            f"No trial can be left out on {', '.join(single) or 'no terrain'}.",
+            hint="Give two trials of each terrain at least.",
+        )
+    wanted = replace(options or api.FitOptions(), models=tuple(models))
+    folds = tuple(api.crossvalidate(groups, wanted, n_jobs))
+    scores = [s for terrain in groups for s in _scores(terrain, folds, wanted.models)]
+    return Comparison(tuple(scores), folds)
+
+
+def load_terrains(path: Path | str) -> api.TerrainDatabase:
+    """Return the terrain database that `traction export --terrain-db` wrote.
+
+    `known.terrain("S0").predict(F_n=3.5, v_t=0.05)` is the traction to expect [N],
+    `.slip_risk(required, F_n)` answers for a push from rest, `.risk_in_motion` for a
+    foot that slides.
+
+    Raises:
+        SettingsError: the file cannot be read or is none.
+    """
+    return api.load_terrains(path)
+
+
+def _scores(
+    terrain: str, folds: Sequence[FoldResult], models: Sequence[str]
+) -> list[ModelScore]:
+    own = [fold for fold in folds if fold.terrain == terrain]
+    scores = [score for name in models if (score := _score(terrain, own, name))]
+    scores.sort(key=lambda score: score.mae)
+    if own:
+        constant = [fold.constant_mae for fold in own]
+        mae, error = float(np.mean(constant)), standard_error(constant)
+        unknown = (None, None, None, None)
+        scores.append(ModelScore(terrain, _CONSTANT, len(own), mae, error, *unknown))
+    return scores
+
+
+def _score(terrain: str, folds: Sequence[FoldResult], name: str) -> ModelScore | None:
+    """Return the means over the folds; None where the model could not be fitted."""
+    of_model = [fold.models[name].score for fold in folds if name in fold.models]
+    if not of_model:
+        return None
+    return ModelScore(
+        terrain=terrain,
+        model=name,
+        trials=len(of_model),
+        mae=float(np.mean([score.mae for score in of_model])),
+        mae_error=standard_error([score.mae for score in of_model]),
+        rmse=mean_of([score.rmse for score in of_model]),
+        nlpd=mean_of([score.nlpd for score in of_model]),
+        crps=mean_of([score.crps for score in of_model]),
+        coverage90=mean_of([score.coverage90 for score in of_model]),
+    )

@@ -1,0 +1,137 @@
+"""One trial as a person handles it: to look at, plot and tabulate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from analysis import api
+from analysis.data import Array, prepare_trial
+from experiments.report import KEPT, QUANTITIES, TableColumn, columns_of
+from traction.frames import data_frame
+
+if TYPE_CHECKING:
+    from analysis.figures import Figure
+    from traction.frames import DataFrame
+
+SERIES_UNITS = {"t": "s", "v_t": "m/s", "F_n": "N", "F_t": "N"}
+
+
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
+class Trial:
+    """One push of the foot across a container.
+
+    Attributes:
+        series: v_t, F_n and F_t at the recorded rate.
+        kept: the samples that models are fitted to: smoothed, thinned and inside the
+            window of velocities.
+        recorded: joints, wrench and sole as recorded; None for a table.
+    """
+
+    series: api.TractionSeries
+    kept: api.PreparedTrial
+    recorded: api.RecordedTrial | None = None
+
+    def __repr__(self) -> str:
+        kind = ", simulated" if self.is_simulated else ""
+        return (
+            f"<Trial {self.name} on {self.terrain}: {self.duration:.1f} s, "
+            f"{self.t.size} samples at {self.series.rate:.0f} Hz, "
+            f"{self.kept.kept} kept{kind}>"
+        )
+
+    @property
+    def name(self) -> str:
+        """Session and trial, e.g. S012/T04; of a table its file."""
+        return self.series.name
+
+    @property
+    def terrain(self) -> str:
+        """Name of the terrain."""
+        return self.series.terrain
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the devices were simulated."""
+        return self.series.is_simulated
+
+    @property
+    def duration(self) -> float:
+        """Length of the record [s]."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def t(self) -> Array:
+        """Time since the first cycle [s], shape (n,)."""
+        return self.series.t
+
+    @property
+    def v_t(self) -> Array:
+        """Slip velocity [m/s], > 0 in ordinary slip, shape (n,)."""
+        return self.series.v_t
+
+    @property
+    def F_n(self) -> Array:
+        """Normal force [N], > 0 in compression, shape (n,)."""
+        return self.series.F_n
+
+    @property
+    def F_t(self) -> Array:
+        """Traction force [N], > 0 against ordinary slip, shape (n,)."""
+        return self.series.F_t
+
+    def to_pandas(self, *, kept: bool = False) -> DataFrame:
+        """Return the trial as a table; the columns are those of `traction export`.
+
+        >>> import traction as tr
+        >>> frame = tr.load_session("S001")["T01"].to_pandas()
+        >>> frame.attrs["units"]["v_t"], frame.attrs["units"]["tau7"]
+        ('m/s', 'N m')
+
+        Args:
+            kept: only the samples that models are fitted to, smoothed.
+
+        Returns:
+            A row per sample. `attrs` holds "units" and "meanings" by column, "trial",
+            "terrain" and "simulated".
+
+        Raises:
+            MissingLibraryError: pandas is not installed.
+        """
+        columns = self._columns(kept=kept)
+        return data_frame(
+            {column.name: column.values for column in columns},
+            {column.name: column.unit for column in columns},
+            meanings={column.name: column.meaning for column in columns},
+            trial=self.name,
+            terrain=self.terrain,
+            simulated=self.is_simulated,
+        )
+
+    def plot(self) -> Figure:
+        """Return F_t and v_t over time as the report's Fig. 4 draws them, slips marked.
+
+        A notebook shows the figure; `figure.savefig("T01.pdf")` keeps it.
+        """
+        from analysis.figures import excerpts
+
+        return excerpts.plot_trial(self.kept, is_simulated=self.is_simulated)
+
+    def _columns(self, *, kept: bool) -> list[TableColumn]:
+        if kept:
+            return columns_of(KEPT, self.kept, is_rounded=False)
+        if self.recorded is not None:
+            return columns_of(QUANTITIES, self.recorded, is_rounded=False)
+        return [
+            TableColumn(name, unit, "number", "", 0, getattr(self.series, name))
+            for name, unit in SERIES_UNITS.items()
+        ]
+
+
+def trial_of(source: api.RecordedTrial | api.TractionSeries) -> Trial:
+    """Return a recording or a series as a trial, prepared by the default rule."""
+    if isinstance(source, api.TractionSeries):
+        return Trial(source, prepare_trial(source, api.PrepareOptions()))
+    options = api.PrepareOptions(container_travel=source.frame.travel)
+    series = source.series()
+    return Trial(series, prepare_trial(series, options), source)
