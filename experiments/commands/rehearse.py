@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import FRICTION
+from experiments.arguments import FRICTION, add_simulated_arm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import FRICTION, PACES, add_fault, data_option
+from experiments.arguments import PACES, add_fault, add_simulated_arm, data_option
 
 if TYPE_CHECKING:
     from experiments.run import ResumeRequest, SessionRequest
