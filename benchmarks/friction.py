@@ -34,7 +34,8 @@ from wam.calibration import (
 )
 from wam.model import ArmModel, Body, Tool
 
-_REST = 0.4  # s of a record in which the foot stands
+_REST_NS = 400_000_000  # in which the foot stands, before the hand pushes
+_PUSHED = 0.5  # N, horizontal, of a hand that begins to push
 _SLIDING = 0.02  # m/s
 _BOUNCE = 0.6  # s after a slip in which the foot may go back
 _MEAN_OFF, _SPREAD = 0.1, 0.3  # goal at rest: share of the load, N
@@ -140,14 +141,16 @@ def figures_of(folder: Path, share: float, compensated: str) -> SessionFigures:
     for path in paths:
         trial = load_trial(path)
         series = trial.series()
-        rest.append(float(series.F_n[series.t - series.t[0] < _REST].mean()))
         found = find_slips(prepare(series).smooth)
         slips += len(found)
         bounces += [bounce_of(trial, slip) for slip in found if slip.has_bounce]
         truth = TrialReader(path.with_name(f"{path.stem}.truth.mcap")).truth().data
-        is_sliding = truth["traction"][:, 0] > _SLIDING
-        along = np.hypot(*truth["hand_force"][is_sliding, :2].T)
-        hands.append(float(np.median(along)))
+        along = np.hypot(*truth["hand_force"][:, :2].T)
+        hands.append(float(np.median(along[truth["traction"][:, 0] > _SLIDING])))
+        before_ns = int(truth["host_ns"][np.argmax(along > _PUSHED)])
+        host_ns = trial.cycles["host_ns"].astype(np.int64)
+        stands = (host_ns >= before_ns - _REST_NS) & (host_ns < before_ns)
+        rest.append(float(series.F_n[stands].mean()))
     reach = _reach(load_trial(paths[0]), folder, compensated)
     found_all = tuple(rest), tuple(hands), slips, tuple(bounces)
     return SessionFigures(share, compensated, *found_all, reach)

@@ -96,10 +96,36 @@ def add_simulated_arm(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--friction",
         type=float,
-        default=FRICTION,
         metavar="SHARE",
-        help="of the simulated joints: 1 = as identified on another arm (0.02)",
+        help="of the simulated joints: 1 = as identified on another arm "
+        f"({FRICTION:g})",
     )
+
+
+def friction_share(args: Namespace) -> float:
+    """Return how much the simulated joints rub, as a share of another arm's.
+
+    Raises:
+        SettingsError: the number is none that is simulated, or the arm is the twin of
+            one whose friction is known.
+    """
+    from acquisition import SettingsError
+
+    if args.friction is None:
+        return FRICTION
+    nothing = "Nothing was started."
+    if getattr(args, "twin", None):
+        raise SettingsError(
+            "--friction and --twin each say how the arm rubs.",
+            hint=f"Leave one of them out. {nothing}",
+        )
+    if not 0.0 <= args.friction <= 2.0:
+        raise SettingsError(
+            f"--friction {args.friction:g} - expected a number 0..2, "
+            f"e.g. {FRICTION:g}.",
+            hint=nothing,
+        )
+    return args.friction
 
 
 def add_seed(parser: ArgumentParser) -> None:

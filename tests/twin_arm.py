@@ -24,6 +24,7 @@ from experiments.rig.law_calibrations import read_law_calibrations
 from experiments.settings.load import load_settings
 from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
+from fakes.world.plain_world import arm_of
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -64,11 +65,8 @@ def twin_of(folder: Path):
     known = read_law_calibrations(settings, is_twin=True)
     row = settings.matrix.terrains[0]
     world = SimulatedRig(settings.rig, row, 1, 0.02, "steady", twin=known)
-    body = world.metadata()["body"]
-    pairs = zip(CONSTANTS.links, body["com"], strict=True)
-    links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
-    rubbing = friction_of(body["motors"])
-    return free_arm(replace(CONSTANTS, links=links), PlantOptions(rubbing=rubbing))
+    constants, rubbing = arm_of(world.metadata()["body"], CONSTANTS)
+    return free_arm(constants, PlantOptions(rubbing=rubbing))
 
 
 def wanted(seconds: float, start: np.ndarray) -> np.ndarray:

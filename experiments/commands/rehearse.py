@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import FRICTION, add_simulated_arm
+from experiments.arguments import FRICTION, add_simulated_arm, friction_share
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         travel=min(row.travel for row in rows),
         trials=args.trials,
         seed=args.seed,
-        friction=args.friction,
+        friction=friction_share(args),
         jobs=args.jobs,
         is_twin=args.twin is not None,
     )
@@ -128,7 +128,6 @@ def _check_arguments(args: argparse.Namespace) -> None:
         ("seed", args.seed, 0, 10**9),
         ("trials", args.trials, 1, 99),
         ("jobs", args.jobs or 1, 1, 64),
-        ("friction", args.friction, 0.0, 2.0),
     ):
         if not least <= value <= most:
             raise SettingsError(

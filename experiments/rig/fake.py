@@ -28,7 +28,7 @@ from experiments.rig.build import (
     terrain_frame,
     tool_with,
 )
-from experiments.rig.law_calibrations import LawCalibrations
+from experiments.rig.law_calibrations import LawCalibrations, twin_gravity
 from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
@@ -101,24 +101,20 @@ class SimulatedRig:
         known = None
         if twin.friction:
             known = friction_from_toml(twin.friction, self.rig.friction.file)
-        arm = self._weighed(twin.gravity, known)
+        arm = self._weighed(twin, known)
         return {
             "com": [link.com.tolist() for link in arm.links],
             "motors": None if known is None else known.fit.friction.metadata(),
         }
 
-    def _weighed(self, text: str, known: FrictionCalibration | None) -> ArmConstants:
-        """Return the arm as calibrated.
-
-        What a calibration of friction takes for an asymmetry depends on the weight that
-        it subtracted: both belong together.
-        """
-        constants, weight = load_constants(), "calibrated"
-        change = np.zeros((7, 3))
-        if known is not None:
-            weight, change = known.gravity, known.fit.moments
-        if weight == "calibrated" and text:
-            stored = gravity_from_toml(text, self.rig.gravity.file)
+    def _weighed(
+        self, twin: LawCalibrations, known: FrictionCalibration | None
+    ) -> ArmConstants:
+        """Return the arm as weighed, corrected by what its friction showed."""
+        constants, weight = load_constants(), twin_gravity(self.rig, twin)
+        change = np.zeros((7, 3)) if known is None else known.fit.moments
+        if weight == "calibrated":
+            stored = gravity_from_toml(twin.gravity, self.rig.gravity.file)
             return weighed_arm(constants, stored.mus + change, stored.tool)
         if weight == "shipped":
             return weighed_arm(constants, constants.mus + change)

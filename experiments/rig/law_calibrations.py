@@ -189,6 +189,30 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
             )
 
 
+def twin_gravity(rig: RigSettings, known: LawCalibrations) -> str:
+    """Return which gravity the twin of a rig has, corrected by what rubbing showed.
+
+    What a calibration of friction takes for an asymmetry depends on the weight that it
+    subtracted: both belong together. Without one it is what was weighed, if anything.
+
+    Raises:
+        SettingsError: a calibration is wrong, or the weight that friction was measured
+            with is gone.
+    """
+    if not known.friction:
+        return "calibrated" if known.gravity else "cad"
+    rubbed = friction_from_toml(known.friction, rig.friction.file)
+    if rubbed.gravity == "calibrated" and not known.gravity:
+        raise SettingsError(
+            f"{rig.friction.file} was measured with gravity calibrated, and "
+            f"{rig.gravity.file} cannot be read: what pulls one way would be taken for "
+            "friction.",
+            hint=f"Bring {rig.gravity.file} back beside it, or run traction calibrate "
+            f"friction again. {NOTHING}",
+        )
+    return rubbed.gravity
+
+
 def twin_words(settings: Settings) -> list[str]:
     """Return what the twin of a rig takes from calibrations, and what from nominal.
 
@@ -197,7 +221,8 @@ def twin_words(settings: Settings) -> list[str]:
     """
     measured: dict[str, str] = {}
     rig, known = settings.rig, read_law_calibrations(settings, is_twin=True)
-    if known.gravity:
+    weight = twin_gravity(rig, known)
+    if weight == "calibrated":
         stored = gravity_from_toml(known.gravity, rig.gravity.file)
         measured["gravity"] = f"{rig.gravity.file} of {stored.measured_utc}"
     if known.friction:
@@ -211,10 +236,15 @@ def twin_words(settings: Settings) -> list[str]:
             hint="Make one with: traction calibrate gravity, friction, sensor or "
             f"terrain. {NOTHING}",
         )
-    nominal = [name for name in ("gravity", "friction") if name not in measured]
     lines = [f"twin of {settings.origin}: {', '.join(measured.values())}"]
-    if nominal:
+    if not known.friction:
+        nominal = [name for name in ("gravity", "friction") if name not in measured]
         lines.append(f"not calibrated, so nominal: {' and '.join(nominal)}")
+    elif weight != "calibrated":
+        lines.append(
+            f"gravity {weight}, corrected by {rig.friction.file}, which was measured "
+            "with it" + (f"; {rig.gravity.file} is not used" if known.gravity else "")
+        )
     return lines
 
 

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from acquisition import TractionError
+from acquisition.trial_file import is_there
 from experiments.arguments import data_option
 from experiments.fault_injection import HostFaults, plan_faults
 from experiments.operator import WARNING, Console, OperatorInput, keyboard
@@ -148,10 +149,8 @@ def _foresight_of(request: SessionRequest) -> ForesightSource | None:
     if request.foresight is not None:
         return read_foresight(request.foresight)
     path = request.data / STUDY_DATABASE
-    if not path.exists():
-        return None
     try:
-        return read_foresight(path)
+        return read_foresight(path) if is_there(path) else None
     except TractionError as error:  # it is in the way of nothing
         request.console.say(f"{WARNING} Nothing is foreseen. {error}")
         return None

@@ -156,11 +156,11 @@ def _record(arguments: list[str], place: Path) -> int:
 
 def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
     config = [] if plan.config is None else ["--config", str(plan.config)]
-    config += ["--twin"] if plan.is_twin else []
+    config += ["--twin"] if plan.is_twin else ["--friction", repr(plan.friction)]
     return [
         *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
         *("--trials", str(plan.trials), "--seed", str(plan.seed)),
-        *("--friction", repr(plan.friction), "--data", str(data), "--no-color"),
+        *("--data", str(data), "--no-color"),
         *config,
     ]
 

@@ -33,6 +33,24 @@ def _scene_of(fields: Mapping[str, Any]) -> SimulatedScene:
     )
 
 
+def arm_of(
+    body: Mapping[str, Any] | None, constants: ArmConstants
+) -> tuple[ArmConstants, MotorFriction | None]:
+    """Return the arm that is not the one of the drawings, and how its motors rub.
+
+    Args:
+        body: centres of mass of its links [m] and, unless None, friction of its motors;
+            None = the arm of the drawings.
+        constants: of the arm by its drawings.
+    """
+    if body is None:
+        return constants, None
+    pairs = zip(constants.links, body["com"], strict=True)
+    links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
+    rubbing = None if body["motors"] is None else friction_of(body["motors"])
+    return replace(constants, links=links), rubbing
+
+
 def simulated_rig(
     fields: Mapping[str, Any], constants: ArmConstants, clock: Clock
 ) -> LocalSimulation:
@@ -44,13 +62,8 @@ def simulated_rig(
         constants: of the arm by its drawings.
         clock: of the world.
     """
-    scene, body = _scene_of(fields["scene"]), fields.get("body")
-    rubbing: MotorFriction | None = None
-    if body is not None:
-        pairs = zip(constants.links, body["com"], strict=True)
-        links = tuple(replace(link, com=np.array(com)) for link, com in pairs)
-        constants = replace(constants, links=links)
-        rubbing = None if body["motors"] is None else friction_of(body["motors"])
+    scene = _scene_of(fields["scene"])
+    constants, rubbing = arm_of(fields.get("body"), constants)
     options = PlantOptions(fields["friction"], seed=scene.seed, rubbing=rubbing)
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

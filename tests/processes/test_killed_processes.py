@@ -12,12 +12,9 @@ from acquisition.control_loop.states import ArmState
 from acquisition.devices import SafetyMode
 from acquisition.schema import CYCLE
 from tests.processes.watching import (
-    CLOCK,
-    TRIES,
     is_running,
-    not_judged,
+    judged,
     session,
-    stall_witness,
     until,
     wait,
 )
@@ -74,14 +71,7 @@ def seconds_lost(tmp_path, victim, after):
     On a machine that stalls, the guard may have ended the trial before: that is no
     loss, and no test of it. The session is begun anew then.
     """
-    with stall_witness(tmp_path) as witness:
-        for number in range(TRIES):
-            start_ns = CLOCK.now_ns()
-            lost = seconds_lost_once(tmp_path / f"data{number}", victim, after)
-            if lost is not None:
-                return lost
-            assert witness.stalls_since(start_ns), "the machine did not stall"
-    return not_judged(TRIES)
+    return judged(tmp_path, lambda data: seconds_lost_once(data, victim, after))
 
 
 def seconds_lost_once(data, victim, after):

@@ -226,6 +226,22 @@ def stall_witness(folder):
         witness.close()
 
 
+def judged(folder, attempt, tries=TRIES):
+    """Return what `attempt(folder of its own)` finds on a machine that may stall.
+
+    An attempt that the machine ended by standing still returns None, and another is
+    begun. One that ended like that without a stall of the witness is a failure.
+    """
+    with stall_witness(folder) as witness:
+        for number in range(tries):
+            start_ns = CLOCK.now_ns()
+            found = attempt(folder / f"try{number}")
+            if found is not None:
+                return found
+            assert witness.stalls_since(start_ns), "the machine did not stall"
+    return not_judged(tries)
+
+
 @contextmanager
 def session(data, *options):
     """Start a session; whatever is left of it at the end is ended."""

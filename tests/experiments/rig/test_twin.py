@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from experiments.rig.law_calibrations import twin_words
+from experiments.rig.fake import SimulatedRig
+from experiments.rig.law_calibrations import read_law_calibrations, twin_words
 from experiments.rig.rig import FakeOptions, build_rig
 from experiments.settings.load import load_settings
 from tests.experiments.built import watch_builds
@@ -50,6 +51,14 @@ def plant_of(folder, options=TWIN):
     return built.rig.plant, rig
 
 
+def body_of(folder):
+    """Return what the simulation is told of the arm."""
+    settings = load_settings(folder / "rig.toml")
+    known = read_law_calibrations(settings, is_twin=True)
+    row = settings.row("TF")
+    return SimulatedRig(settings.rig, row, 1, 0.0, "steady", known).metadata()["body"]
+
+
 def test_the_motors_of_a_twin_rub_as_calibrated(folder):
     plant, _ = plant_of(folder)
     stored = friction_from_toml((folder / "friction.toml").read_text(), "f")
@@ -86,6 +95,25 @@ def test_what_is_not_calibrated_is_nominal_and_named(folder):
     assert lines[1] == "not calibrated, so nominal: friction"
 
 
+def test_friction_measured_with_a_gravity_that_is_gone_describes_no_arm(folder):
+    (folder / "gravity.toml").unlink()
+    with pytest.raises(SettingsError, match=r"gravity\.toml cannot be read"):
+        twin_words(load_settings(folder / "rig.toml"))
+    with pytest.raises(SettingsError, match=r"gravity\.toml cannot be read"):
+        plant_of(folder)
+
+
+def test_a_gravity_that_friction_was_not_measured_with_is_not_used(folder):
+    rubbed = friction(0.7, gravity="cad", is_simulated=False)
+    (folder / "friction.toml").write_text(rubbed)
+    lines = twin_words(load_settings(folder / "rig.toml"))
+    assert "gravity.toml" not in lines[0]
+    assert lines[1].endswith("gravity.toml is not used")
+    with_both = body_of(folder)
+    (folder / "gravity.toml").unlink()
+    assert with_both == body_of(folder)
+
+
 def test_a_folder_without_calibrations_describes_no_arm(tmp_path):
     config = write_config(tmp_path)
     with pytest.raises(SettingsError, match="no calibration"):
@@ -102,6 +130,17 @@ def test_a_rehearsal_of_a_twin_takes_no_second_rig_toml(folder):
     done = traction("rehearse", "--twin", folder, "--config", folder / "rig.toml")
     assert done.code == 2
     assert "--twin and --config" in done.err
+
+
+@pytest.mark.parametrize(
+    "command", [("rehearse", "--twin"), ("run", "TF", "--fake", "--twin", "--config")]
+)
+def test_a_twin_that_rubs_as_calibrated_takes_no_other_share(command, folder):
+    *words, option = command
+    place = folder if option == "--twin" else folder / "rig.toml"
+    done = traction(*words, option, place, "--friction", 0.5, "--data", folder / "data")
+    assert done.code == 2
+    assert "--friction and --twin" in done.err
 
 
 @pytest.mark.slow
