@@ -90,6 +90,8 @@ class JointDrives:
             dt: length of a step [s].
         """
         self._dt = dt
+        self._turns = np.array(constants.cts) / (2.0 * np.pi)  # counts per radian
+        self._to_counts = self._turns[:, None] * constants.j2mp
         self._j2mp, self._ipnm = constants.j2mp, constants.ipnm
         self._of_units = constants.j2mp.T / np.array(constants.ipnm, dtype=float)
         self._dampings = constants.j2mp.T**2  # of the joints by those of the motors
@@ -101,6 +103,10 @@ class JointDrives:
         self._stopping = _CLEAR
         self.armature = self._inertia
         self.drive([0.0] * 7)
+
+    def counts(self, q: Array) -> Array:
+        """Return what the encoders count at `q` of the joints [rad], shape (7,)."""
+        return self._to_counts.dot(q)
 
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
@@ -121,10 +127,7 @@ class JointDrives:
             t_ns: time [ns].
         """
         self._stop(rows)
-        if t_ns % _BEARING_NS == 0:
-            against = zip(self._sent, self._bristles.torques(speeds), strict=True)
-            borne = [sent + friction for sent, friction in against]
-            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
+        self._bear(rows, speeds, t_ns)
         self._is_lively = self._bristles.is_lively(speeds)
         self._resist(speeds)
 
@@ -144,6 +147,12 @@ class JointDrives:
     def follow(self, speeds: Sequence[float]) -> None:
         """Go on by a step at `speeds` of the motors [rad/s]."""
         self._bristles.follow(speeds)
+
+    def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
+        if t_ns % _BEARING_NS == 0:
+            against = zip(self._sent, self._bristles.torques(speeds), strict=True)
+            borne = [sent + friction for sent, friction in against]
+            self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
 
     def _stop(self, rows: Array) -> None:
         self._stopping = self.stops.at(*rows[:2].tolist())

@@ -31,6 +31,7 @@ class PlantOptions:
         substeps: steps per 2 ms cycle.
         seed: draws the parameters of friction; None = the nominal ones.
         rubbing: friction of the motors, given instead of drawn; None = drawn.
+        cables: resonance of the joints on their cables [Hz]; None = stiff cables.
         has_hand: a person holds the arm by its forearm, from the beginning.
     """
 
@@ -38,6 +39,7 @@ class PlantOptions:
     substeps: int = 4
     seed: int | None = None
     rubbing: MotorFriction | None = None
+    cables: float | None = None
     has_hand: bool = True
 
 
@@ -70,6 +72,24 @@ def motor_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Arra
     upper = np.triu(pin.computeMinverse(model, model.createData(), q))
     inverse = upper + np.triu(upper, 1).T
     return 1.0 / np.einsum("ij,jk,ik->i", constants.j2mp, inverse, constants.j2mp)
+
+
+def cable_inertia(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:
+    """Return what swings on the cable of each motor [kg m^2], shape (7,).
+
+    Of the heaviest joint that the motor turns, the others held still, its share by
+    motors that turn it. The two cables of a differential are alike.
+
+    Args:
+        model: the arm; loses the inertia of its drives.
+        constants: of the arm.
+        q: joint positions [rad], shape (7,).
+    """
+    model.armature = np.zeros(7)
+    of_joints = np.diag(pin.crba(model, model.createData(), q))
+    ratios = constants.j2mp**2
+    shared = of_joints / ratios.sum(axis=0)
+    return np.where(ratios > 0.0, shared, 0.0).max(axis=1)
 
 
 def motor_weights(model: "pin.Model", constants: ArmConstants, q: Array) -> Array:

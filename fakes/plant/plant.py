@@ -22,6 +22,7 @@ import pinocchio as pin
 
 from acquisition import PERIOD_NS
 from fakes.ground import NO_CONTACT, Terrain
+from fakes.plant.cables import CableDrives
 from fakes.plant.friction import draw_friction
 from fakes.plant.gauges import Wrench, WristGauges
 from fakes.plant.hand import Hand
@@ -30,6 +31,7 @@ from fakes.plant.model import (
     FOREARM_MASS,
     PlantOptions,
     arm_and_hand,
+    cable_inertia,
     motor_inertia,
     motor_weights,
 )
@@ -83,9 +85,7 @@ class ArmPlant:
         self._midway = np.array([1.0, 5e-10 * (PERIOD_NS - self._substep_ns), 0.0])
         up = frame.axes()[:, 2]
         self._up: list[float] = (up * forearm * GRAVITY).tolist()
-        # counts of the encoders per joint angle
-        turns = np.array(constants.cts) / (2.0 * np.pi)
-        self._to_counts = turns[:, None] * constants.j2mp
+        self._cables = options.cables
         self._is_held = True
         self.terrain: Terrain | None = None
         self.hand = Hand(PERIOD_NS * 1e-9, is_there=options.has_hand)
@@ -106,11 +106,18 @@ class ArmPlant:
         self._wanted = hand.rotation.copy()
         self._loads = JointLoads(self._constants.j2mp)
         self._linearise()
-        inertia = motor_inertia(self._model, self._constants, self.q)
-        self._drives = JointDrives(self._constants, self.friction, inertia, self._dt)
+        self._drives = self._build_drives()
         self.disturbance, self.stops = self._drives.disturbance, self._drives.stops
         self._begin_drives()
         self._wrist.end_cycle(self._foot_rotation, self._ground, self._rates[:6])
+
+    def _build_drives(self) -> JointDrives:
+        model, constants, dt = self._model, self._constants, self._dt
+        inertia = motor_inertia(model, constants, self.q)
+        if self._cables is None:
+            return JointDrives(constants, self.friction, inertia, dt)
+        both = inertia, cable_inertia(model, constants, self.q)
+        return CableDrives(constants, self.friction, both, dt, self._cables)
 
     @property
     def q(self) -> Array:
@@ -136,7 +143,7 @@ class ArmPlant:
 
     def counts(self) -> Sequence[int]:
         """Return encoder counts of the seven motors."""
-        return [floor(count) for count in self._to_counts.dot(self.q).tolist()]
+        return [floor(count) for count in self._drives.counts(self.q).tolist()]
 
     def set_torques(self, units: Sequence[int]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""

@@ -67,16 +67,24 @@ class HoldBench:
 
     `error`: by how much rig.toml makes the foot too heavy [kg]. `compensation`: of
     friction, in the law. `rubbing`: friction of the motors, given instead of drawn.
-    `late`: cycles by which torques arrive late. `sent`: the torques beside gravity's
+    `late`: cycles by which torques arrive late. `cables`: their resonance [Hz], None =
+    stiff. `sent`: the torques beside gravity's
     [N m], cycle by cycle.
     """
 
     def __init__(
-        self, *, friction=0.02, error=0.0, compensation=None, rubbing=None, late=0
+        self,
+        *,
+        friction=0.02,
+        error=0.0,
+        compensation=None,
+        rubbing=None,
+        late=0,
+        cables=None,
     ):
         self.clock = SteppedClock()
         scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
-        options = PlantOptions(friction, rubbing=rubbing)
+        options = PlantOptions(friction, rubbing=rubbing, cables=cables)
         self.rig = FakeRig(scene, CONSTANTS, TOOL, self.clock, options)
         self.clock.attach(self.rig)
         finalize(self, self.rig.bus.shutdown)

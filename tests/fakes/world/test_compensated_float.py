@@ -23,12 +23,19 @@ def over(rubbing, factor):
     return KnownFriction(level, level, NOTHING, NOTHING, NOTHING)
 
 
-def settled(rubbing, known, share=0.8, *, late=0, joint=1, held=False):
-    """Kick a joint of a floating arm; return its positions in the sixth second."""
+def settled(rubbing, known, share=0.8, *, late=0, joint=1, grip="none", cables=None):
+    """Kick a joint of a floating arm; return its positions in the sixth second.
+
+    `grip`: "stiff" of a hand that carries, "loose" of one that lies on the arm.
+    """
     compensation = FrictionCompensation(CONSTANTS, known, share)
-    bench = HoldBench(compensation=compensation, rubbing=rubbing, late=late)
-    if held:
+    bench = HoldBench(
+        compensation=compensation, rubbing=rubbing, late=late, cables=cables
+    )
+    if grip != "none":
         bench.plant.hand.carry()
+    if grip == "loose":
+        bench.plant.hand.rest()
     bench.throw(joint, KICK)
     bench.run(4.9)
     q = bench.run(1.0)
@@ -73,5 +80,22 @@ def test_bristles_that_are_softer_or_stiffer_leave_no_swing(joint, presliding):
 @pytest.mark.parametrize("joint", [1, 3])
 def test_a_person_who_holds_the_arm_feels_no_swing(joint):
     rubbing = whole()
-    q = settled(rubbing, over(rubbing, 1.2), joint=joint, held=True)
+    q = settled(rubbing, over(rubbing, 1.2), joint=joint, grip="stiff")
     assert np.ptp(q, axis=0)[:6].max() < 5 * STILL
+
+
+@pytest.mark.parametrize(
+    ("cables", "joint", "grip"),
+    every(
+        product((8.0, 15.0, 20.0), (1, 3, 5), ("none", "loose", "stiff")),
+        (8.0, 1, "none"),
+        (15.0, 3, "loose"),
+        (20.0, 5, "none"),
+        (8.0, 3, "stiff"),
+    ),
+)
+def test_cables_that_give_way_leave_no_swing(cables, joint, grip):
+    rubbing = whole()
+    known = over(rubbing, 1.2)
+    q = settled(rubbing, known, joint=joint, grip=grip, cables=cables, late=2)
+    assert np.ptp(q, axis=0)[:6].max() < (STILL if grip == "none" else 5 * STILL)
