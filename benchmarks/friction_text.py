@@ -5,7 +5,8 @@ MEASURED = (
     "| hand sliding [N] | slips back | way back [mm] | of it joint 6 |\n"
     "|---|---|---|---|---|---|---|---|---|"
 )
-SESSIONS, CALIBRATIONS = "## Sessions", "## Calibrations"
+SESSIONS, SLIDING = "## Sessions", "## Sliding at a constant speed"
+CALIBRATIONS = "## Calibrations"
 _HEAD = """# Friction of the drives
 
 What dry friction does to this experiment, and what its compensation can take off. All
@@ -76,8 +77,13 @@ def with_calibrations(old: str, body: str) -> str:
     return _put(old, CALIBRATIONS, body)
 
 
+def with_sliding(old: str, body: str) -> str:
+    """Return the page with the loads of a sliding foot anew."""
+    return _put(old, SLIDING, body)
+
+
 def _put(old: str, heading: str, body: str) -> str:
-    parts = {name: _part(old, name) for name in (SESSIONS, CALIBRATIONS)}
+    parts = {name: _part(old, name) for name in (SESSIONS, SLIDING, CALIBRATIONS)}
     parts[heading] = body.strip()
     shown = [f"{name}\n\n{text}" for name, text in parts.items() if text]
     return "\n\n".join([_HEAD.strip(), *shown]) + "\n"

@@ -172,12 +172,13 @@ class RecordedTrial:
         return np.column_stack([v_t, F_t, np.einsum("ni,ni->n", self.force, normal)])
 
 
-def load_trial(path: Path) -> RecordedTrial:
+def load_trial(path: Path | str) -> RecordedTrial:
     """Read a trial file, recovered or not, and derive sole, force and traction.
 
     Raises:
         TrialFileError: the file is not a sound trial, or lacks its calibration.
     """
+    path = Path(path)
     reader = TrialReader(path)
     _check_metadata(reader)
     cycles = reader.cycles().data

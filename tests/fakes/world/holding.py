@@ -68,7 +68,7 @@ class HoldBench:
     `error`: by how much rig.toml makes the foot too heavy [kg]. `compensation`: of
     friction, in the law. `rubbing`: friction of the motors, given instead of drawn.
     `late`: cycles by which torques arrive late. `cables`: their resonance [Hz], None =
-    stiff. `sent`: the torques beside gravity's
+    stiff. `mass`: virtual, in float [kg]. `sent`: the torques beside gravity's
     [N m], cycle by cycle.
     """
 
@@ -81,6 +81,7 @@ class HoldBench:
         rubbing=None,
         late=0,
         cables=None,
+        mass=0.0,
     ):
         self.clock = SteppedClock()
         scene = SimulatedScene("S0", "small", "tread", FRAME, START_Q, 1)
@@ -111,7 +112,7 @@ class HoldBench:
         kd = tuple(CONSTANTS.kd.tolist())
         walls = Walls(tuple(LIMITS.q_lower), tuple(LIMITS.q_upper), TORQUE, kd)
         self.law = FootController(
-            heavier(error), 0.0, walls=SoftWalls(walls), friction=compensation
+            heavier(error), mass, walls=SoftWalls(walls), friction=compensation
         )
         outputs = CycleOutputs(lambda payload: None, lambda samples: None)
         self.cycle = Cycle(self.arm, NoSensor(), self.law, NoFoot(), LIMITS, outputs)
