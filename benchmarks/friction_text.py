@@ -26,8 +26,8 @@ then ten trials on S0 without and with each compensation (seed 3).
 
 {table}
 
-F_n at rest: mean of the first 0.4 s, mean and standard deviation over the put-downs;
-{load:.2f} N were set. By statics: half the width of the interval that friction leaves
+F_n at rest: mean of the 0.4 s before the hand pushes, mean and standard deviation over
+the put-downs; {load:.2f} N were set. By statics: half the width of the interval that friction leaves
 at the far end, upper end (95 %) of what the calibration found. Hand: true horizontal
 force while the foot is faster than 0.02 m/s. Slips back: smoothed v_t below -0.01 m/s
 within 0.6 s; medians of the way back and of joint 6's part of the lowest v_t (below 0:
@@ -37,9 +37,6 @@ The goal is a mean within 10 % of the load and a deviation of 0.3 N at most:
 
 {goals}
 
-An arm almost without friction misses the mean, too: what its foot bears at 0.02 is what
-the others are to be compared with.
-
 At 0.02 the calibration is refused: such a friction is hardly above what gravity and
 inertia leave unexplained, and needs no compensation.
 
@@ -47,9 +44,10 @@ What the compensation cannot reach: it takes off at most {most:g} of the *lower 
 what slides, at the worst place of a motor's turn, because more would drive an arm whose
 cables have worn in. Of the break-away of a joint it leaves a third to a half. The foot
 comes to rest on its way down, so what is left tends to hold it up: the shortfall has
-one sign and does not average out over put-downs. That the mean at the whole friction is
-lower with compensation than without is not explained. A mean within 10 % of the load
-takes a heavier virtual mass (`traction check` prints it) or an arm that rubs less.
+one sign and does not average out over put-downs. Without compensation the whole
+friction holds part of what the hand had pressed: no weight, but more than with it. A
+mean within 10 % of the load takes a heavier virtual mass (`traction check` prints it)
+or an arm that rubs less.
 """
 _MOST = 0.8
 

@@ -132,5 +132,6 @@ FIGURES = (
         draw_excerpts,
         caption_excerpts,
         ReportSection.PAPER,
+        is_vector=True,
     ),
 )

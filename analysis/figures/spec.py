@@ -19,6 +19,7 @@ class FigureSpec:
         draw: draws it; None where there are no numbers for it.
         caption: states what is seen in it, with numbers.
         section: where it stands.
+        is_vector: the page shows it as SVG, to be enlarged and read.
     """
 
     key: str
@@ -27,3 +28,4 @@ class FigureSpec:
     draw: Callable[[StudyResults], Figure | None]
     caption: Callable[[StudyResults], str]
     section: ReportSection = ReportSection.BEYOND
+    is_vector: bool = False

@@ -6,6 +6,8 @@ shared between them and no screen is needed.
 """
 
 import io
+import json
+import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,8 +19,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_pdf import FigureCanvasPdf
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from PIL import Image
 
 from analysis.data import BIG, FLAT, SMALL
 
@@ -59,7 +63,10 @@ MODEL_COLOURS = (
 MODEL_HATCHES = ("", "///", "...", "xxx", "---")
 MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
-_DPI = 160
+_DPI = 320
+_SHOWN = 160  # pixels of a page per inch
+_COLOURS = 256  # of a PNG
+_MOST_TICKS = 5  # below a small panel
 _MARK = 6.0  # points of the watermark per inch of the figure's width
 _KIND_COLOURS = {
     SMALL: ("#08306b", "#2f79b5", "#9dc7e6"),
@@ -79,6 +86,7 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 7.5,
     "pdf.fonttype": 42,  # letters stay letters
+    "svg.fonttype": "none",
 }
 
 
@@ -90,11 +98,16 @@ class Picture:
         key: name of its files, e.g. "fig4_excerpts".
         png: the figure as PNG.
         pdf: the figure as vector PDF.
+        width: at which a page shows it [pixels of CSS].
+        svg: the figure as an element of a page, which says where its axes are; empty =
+            it is shown as PNG.
     """
 
     key: str
     png: bytes
     pdf: bytes
+    width: int = 0
+    svg: str = ""
 
 
 @contextmanager
@@ -152,6 +165,7 @@ def panel_grid(
     figure = new_figure(height * rows + 0.7, ONE_COLUMN if count == 1 else WIDTH)
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     axes = list(grid.flat)
+    axes[0].locator_params(axis="x", nbins=_MOST_TICKS)  # of all: they share it
     for spare in axes[count:]:
         spare.set_visible(False)
         # the panel above it is the lowest of its column
@@ -170,20 +184,83 @@ def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
     ax.grid(visible=False)
 
 
-def render(key: str, figure: Figure, is_simulated: bool) -> Picture:
-    """Return the finished figure as files, watermarked if simulated."""
+def render(
+    key: str, figure: Figure, is_simulated: bool, *, is_vector: bool = False
+) -> Picture:
+    """Return the finished figure as files, watermarked if simulated.
+
+    Args:
+        key: name of the files.
+        figure: the figure.
+        is_simulated: its data were.
+        is_vector: a page shows it as SVG, which can be enlarged and read.
+    """
     if is_simulated:
         mark_simulated(figure)
-    png, pdf = io.BytesIO(), io.BytesIO()
+    pdf = io.BytesIO()
     with warnings.catch_warnings():
         # a terrain may be named in a script the font does not have
         warnings.filterwarnings("ignore", message="Glyph")
         # canvases of their own draw once; savefig would draw twice for each format
         figure.set_dpi(_DPI)
-        FigureCanvasAgg(figure).print_png(png, metadata={"Software": None})
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        png = _few_colours(np.asarray(canvas.buffer_rgba()))
         figure.set_layout_engine("none")  # the layout is found; do not search again
         FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
-    return Picture(key, png.getvalue(), pdf.getvalue())
+        svg = _svg(key, figure) if is_vector else ""
+    width = round(_SHOWN * figure.get_figwidth())
+    return Picture(key, png, pdf.getvalue(), width, svg)
+
+
+def _few_colours(pixels: "np.ndarray[Any, np.dtype[np.uint8]]") -> bytes:
+    """Return a picture as PNG of few colours: a third of the bytes, looks the same."""
+    png = io.BytesIO()
+    opaque = Image.fromarray(pixels).convert("RGB")
+    few = opaque.quantize(_COLOURS, dither=Image.Dither.NONE)
+    few.save(png, "PNG", optimize=True, dpi=(_DPI, _DPI))
+    return png.getvalue()
+
+
+def _svg(key: str, figure: Figure) -> str:
+    """Return the figure as an element of a page.
+
+    Its identifiers begin with `key`: a page holds several. "data-axes" lists where its
+    axes are, in the unit of the drawing, with their limits and labels.
+    """
+    written = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": key}):
+        none = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        FigureCanvasSVG(figure).print_svg(written, metadata=none)
+    text = written.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' xmlns(:\w+)?="[^"]*"', "", text)
+    text = text.replace("xlink:href=", "href=")
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{key}-", text)
+    text = text.replace("*{", f"#{key}-figure_1 *{{")
+    text = re.sub(r'<svg\b[^>]*?(viewBox="[^"]*")[^>]*>', r"<svg \1>", text, count=1)
+    return text.replace("<svg ", f"<svg data-axes='{_axes_of(figure)}' ", 1)
+
+
+def _axes_of(figure: Figure) -> str:
+    """Return place, limits and labels of the axes that are shown, as JSON."""
+    width, height = 72.0 * figure.get_size_inches()
+    found: list[dict[str, Any]] = []
+    for ax in figure.axes:
+        if not ax.get_visible() or "log" in (ax.get_xscale(), ax.get_yscale()):
+            continue
+        place = ax.get_position()
+        left, right = width * place.x0, width * place.x1
+        top, bottom = height * (1.0 - place.y1), height * (1.0 - place.y0)
+        found.append(
+            {
+                "box": [round(v, 2) for v in (left, top, right, bottom)],
+                "x": [float(v) for v in ax.get_xlim()],
+                "y": [float(v) for v in ax.get_ylim()],
+            }
+        )
+    return json.dumps(found, separators=(",", ":"))
 
 
 def terrain_colours(kinds: Mapping[str, str]) -> dict[str, str]:

@@ -234,6 +234,7 @@ FIGURES = (
         "terrain.",
         draw_trials,
         caption_trials,
+        is_vector=True,
     ),
     FigureSpec(
         "trends",
@@ -249,5 +250,6 @@ FIGURES = (
         "terrain; slips are shaded.",
         draw_stick_slip,
         caption_stick_slip,
+        is_vector=True,
     ),
 )

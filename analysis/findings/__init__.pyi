@@ -11,7 +11,7 @@ from .new_trial_bands import BINS, ORACLE, HeldOutShares
 from .paper_claims import PaperClaim
 from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
 from .surfaces import Surface, common_range
-from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend
+from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend, traction_ratio
 
 __all__ = [
     "BINS",
@@ -36,6 +36,7 @@ __all__ = [
     "findings_rows",
     "plain_findings",
     "summarise_rig",
+    "traction_ratio",
     "uncertainties_of",
     "uncertainty_of",
 ]

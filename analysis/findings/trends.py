@@ -99,6 +99,20 @@ _MEASURES: Mapping[str, Callable[[PreparedTrial], float]] = {
 }
 
 
+def traction_ratio(result: TerrainResult) -> str:
+    """Return F_t/F_n of a terrain as text: mean of its trials ± their deviation.
+
+    Of a trial it is the ratio of its means. A dash where there is none.
+    """
+    ratios = np.array([_ratio(trial) for trial in result.trials if trial.kept])
+    ratios = ratios[np.isfinite(ratios)]
+    if not ratios.size:
+        return "–"
+    if ratios.size == 1:
+        return f"{ratios[0]:.2f}"
+    return f"{ratios.mean():.2f} ± {ratios.std(ddof=1):.2f}"
+
+
 SHARES = (0.05, 0.5, 0.95)  # quantiles of the residual that are shown
 _BINS = 10
 _FEWEST = 20  # residuals of a bin that quantiles are taken of

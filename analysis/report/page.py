@@ -40,6 +40,8 @@ from analysis.report.page_model import (
     ReportContext,
     ReportFigure,
     ReportTable,
+    cell_text,
+    number_columns,
 )
 from analysis.report.paper_tables import (
     parameters,
@@ -144,7 +146,8 @@ def _draw(spec: FigureSpec, results: StudyResults) -> ReportFigure | None:
     figure = spec.draw(results)
     if figure is None:
         return None
-    picture = render(spec.key, figure, results.study.simulated)
+    is_simulated = results.study.simulated
+    picture = render(spec.key, figure, is_simulated, is_vector=spec.is_vector)
     return ReportFigure(
         spec.section, spec.title, spec.alt, spec.caption(results), picture
     )
@@ -256,7 +259,8 @@ def html_page(
         lstrip_blocks=True,
     )
     environment.filters["base64"] = lambda data: base64.b64encode(data).decode()
-    environment.filters["unbroken"] = lambda text: text.replace(" ± ", "\u00a0±\u00a0")
+    environment.filters["cell"] = cell_text
+    environment.filters["numbers"] = number_columns
     template = environment.get_template("report.html.j2")
     return template.render(
         context=context, sections=shown, warnings=warnings, notes=notes

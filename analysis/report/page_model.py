@@ -1,5 +1,6 @@
 """What stands on the page of a report: tables and figures, each in its section."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,6 +27,26 @@ class ReportTable:
     rows: Sequence[Sequence[str]]
     note: str = ""
     section: ReportSection = ReportSection.ORIGIN
+
+
+_MINUS = re.compile(r"(?<![\w.\u2212-])-(?=\.?\d)")
+_NUMBER = re.compile(r"[<>≤≥~]? ?[-+\u2212]?\.?\d[\d.,]*( ?(%|±.*|\(.*\)|×.*))?")
+_NOTHING = {"", "–", "-"}
+
+
+def cell_text(text: str) -> str:
+    """Return a cell as it is shown: with true minus signs, unbroken at ±."""
+    return _MINUS.sub("\u2212", text).replace(" ± ", "\u00a0±\u00a0")
+
+
+def number_columns(table: ReportTable) -> list[bool]:
+    """Return of each column whether it holds numbers, which are aligned right."""
+    found: list[bool] = []
+    for column in zip(*table.rows, strict=True):
+        filled = [cell for cell in column if cell not in _NOTHING]
+        is_number = all(_NUMBER.fullmatch(cell) for cell in filled)
+        found.append(bool(filled) and is_number)
+    return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,10 +1,10 @@
 """Summary, verdicts and tables of the paper, as text without markup."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from analysis.data import PULLED_WARNING, SENSOR_ERROR
 from analysis.figures import ReportSection
-from analysis.findings import PaperClaim, StudyResults
+from analysis.findings import PaperClaim, StudyResults, traction_ratio
 from analysis.report.page_model import ReportTable
 from analysis.study import (
     FITTERS,
@@ -51,15 +51,17 @@ def summary(study: Study) -> ReportTable:
             "trials",
             "kept samples",
             "slips",
+            "F_t/F_n",
             *(f"{TITLES[model]} MAE [N]" for model in FITTERS),
             "constant MAE [N]",
             "F_n ≤ 0",
         ),
         rows=[_summary_row(result) for result in study.terrains.values()],
-        note="MAE: mean absolute error on trials that were left out of the fit, mean "
-        "over trials ± its standard error. Constant: always the median F_t of the "
-        "other trials. F_n ≤ 0: share of the kept samples with the foot off the "
-        "ground, where it hops in a slip, or the tare wrong; a warning where F_n is "
+        note="F_t/F_n: ratio of the means of a trial, mean of the trials ± their "
+        "standard deviation. MAE: mean absolute error on trials that were left out of "
+        "the fit, mean over trials ± its standard error. Constant: always the median "
+        "F_t of the other trials. F_n ≤ 0: share of the kept samples with the foot off "
+        "the ground, where it hops in a slip, or the tare wrong; a warning where it is "
         f"below -{SENSOR_ERROR:g} N in more than {PULLED_WARNING:.0%}.",
         section=ReportSection.SUMMARY,
     )
@@ -90,11 +92,14 @@ def parameters(study: Study) -> ReportTable:
 
 
 def verdicts(study: Study) -> list[str]:
-    """Return for every terrain whether a model says more than a constant does."""
+    """Return for every terrain F_t/F_n, and whether a model says more than a constant.
+
+    Without errors of a model and of the constant nothing is said.
+    """
     return [
-        verdict
-        for result in study.terrains.values()
-        if (verdict := _verdict(result)) is not None
+        f"{name}: F_t/F_n {traction_ratio(result)}; {verdict} ({numbers})."
+        for name, result in study.terrains.items()
+        for verdict, numbers in _verdict(result)
     ]
 
 
@@ -205,28 +210,26 @@ def _summary_row(result: TerrainResult) -> list[str]:
         str(len(result.trials)),
         str(result.kept),
         str(sum(map(len, result.slips))),
+        traction_ratio(result),
         *(with_error(result.maes(model)) for model in FITTERS),
         with_error([result.constant_mae]),
         f"{result.lifted_share:.1%}",
     ]
 
 
-def _verdict(result: TerrainResult) -> str | None:
+def _verdict(result: TerrainResult) -> Iterator[tuple[str, str]]:
+    """Yield what the best model is worth, and the errors that say so, if any do."""
     errors = {m: mae for m in FITTERS if (mae := result.mae(m)) is not None}
     constant = result.constant_mae
     if not errors or not constant:
-        return None
+        return
     best = min(errors, key=errors.__getitem__)
     ratio = errors[best] / constant
-    numbers = f"{TITLES[best]} {errors[best]:.2f} N, constant {constant:.2f} N"
-    if ratio >= 1.0:
-        return f"{result.terrain}: no model beats a constant ({numbers})."
+    words = f"the best model's error is {ratio:.0%} of a constant's"
     if ratio > WORTHWHILE:
-        return f"{result.terrain}: no model beats a constant by much ({numbers})."
-    return (
-        f"{result.terrain}: the best model's error is {ratio:.0%} of a constant's "
-        f"({numbers})."
-    )
+        much = "" if ratio >= 1.0 else " by much"
+        words = f"no model beats a constant{much}"
+    yield words, f"{TITLES[best]} {errors[best]:.2f} N, constant {constant:.2f} N"
 
 
 def _flag_legend() -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from acquisition.trial_file import list_folder
 from analysis.data import RecordedTrial
 from analysis.figures import ReportSection
+from analysis.findings import traction_ratio
 from analysis.foresight import GroundScore, SlipScore
 from analysis.report import ReportTable
 from analysis.study import GP_SE, TUSTIN, Study
@@ -48,20 +49,13 @@ def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
     header += [f"error {title} [N]" for title, _ in shown] + ["of a constant [N]"]
     rows: list[list[str]] = []
     for name, result in study.terrains.items():
-        kept = [trial for trial in result.trials if trial.F_n.size]
-        loads = [float(trial.F_n.mean()) for trial in kept]
-        ratios = [
-            float(trial.F_t.mean()) / load
-            for trial, load in zip(kept, loads, strict=True)
-            if load > 0.0
-        ]
         errors = [result.maes(model) for _, model in shown]
         numbers = [[mae for mae in of if mae is not None] for of in errors]
         rows.append(
             [
                 name,
                 str(len(result.trials)),
-                f"{np.mean(ratios):.2f} ± {np.std(ratios):.2f}" if ratios else "–",
+                traction_ratio(result),
                 *(f"{np.mean(of):.2f}" if of else "–" for of in numbers),
                 f"{result.constant_mae:.2f}" if result.folds else "–",
             ]

@@ -13,6 +13,7 @@ from analysis.figures.style import render, styled
 from analysis.figures.surfaces import near_samples
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
+from analysis.report.page_model import cell_text, number_columns
 from analysis.report.paper_tables import summary, table_one, verdicts
 from analysis.report.rig_tables import choices
 from analysis.study.fits import to_fits
@@ -68,11 +69,50 @@ def test_page_needs_nothing_from_outside(written):
     text = path.read_text()
     assert "http:" not in text
     assert "https:" not in text
-    assert not page.attributes("script")
+    assert not any(attrs.get("src") for attrs in page.attributes("script"))
     assert not page.attributes("link")
     for attrs in page.attributes("img"):
         assert attrs["src"].startswith("data:image/png;base64,")
         assert len(attrs["alt"]) > 20
+        assert 100 < int(attrs["width"]) < 1200
+    for attrs in page.attributes("a"):
+        assert attrs["href"].startswith(("#", "../figures/"))
+
+
+def test_some_figures_are_drawings_whose_axes_are_known(written):
+    _, _, page = written
+    labels = [a["aria-label"] for a in page.attributes("div") if "aria-label" in a]
+    drawings = [a for a in page.attributes("svg") if "data-axes" in a]
+    assert len(drawings) == 3
+    assert len([label for label in labels if len(label) > 20]) >= 3
+    for attrs in drawings:
+        _, _, width, height = map(float, attrs["viewbox"].split())
+        for ax in json.loads(attrs["data-axes"]):
+            left, top, right, bottom = ax["box"]
+            assert 0.0 <= left < right <= width
+            assert 0.0 <= top < bottom <= height
+            assert ax["x"][0] < ax["x"][1]
+    ids = [attrs["id"] for _, attrs in page.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+
+
+def test_numbers_are_aligned_and_have_true_minus_signs():
+    table = ReportTable(
+        "a", ("name", "x", "y", "z"), [["S-1", "-1.5 ± 0.1", "none", "–"]] * 2
+    )
+    assert number_columns(table) == [False, True, False, False]
+    shown = cell_text("-1.5 ± 0.1; S-1, 2026-11-23, 1e-3, (-.5 to -2)")
+    assert shown == (
+        "\u22121.5\u00a0±\u00a00.1; S-1, 2026-11-23, 1e-3, (\u2212.5 to \u22122)"
+    )
+
+
+def test_every_link_to_a_pdf_leads_to_one(written):
+    _, path, page = written
+    links = [a["href"] for a in page.attributes("a") if a["href"].endswith(".pdf")]
+    assert len(links) > 10
+    for link in links:
+        assert (path.parent / link).is_file()
 
 
 def test_page_shows_the_papers_figures_and_table(written):
@@ -97,7 +137,7 @@ def test_every_number_and_figure_lies_beside_the_page(written, small_study):
     assert {key: fits[key] for key in to_fits(small_study)} == to_fits(small_study)
     assert fits["tables"][0]["rows"] == [["S012", "10"]]
     assert (folder / "fits.csv").read_text().startswith("terrain,model,fold")
-    shown = len(Page(path.read_text()).attributes("img"))
+    shown = len(Page(path.read_text()).attributes("figure"))
     figures = sorted(file.suffix for file in (folder / "figures").iterdir())
     assert figures == [".pdf"] * shown + [".png"] * shown
     for file in (folder / "figures").iterdir():
@@ -116,7 +156,7 @@ def hostile_study(make_series, moving):
 
 def test_markup_in_names_stays_text(hostile_study):
     page = Page(render_page(compute_results(hostile_study), [], context(title=HOSTILE)))
-    assert not page.attributes("script")
+    assert page.attributes("script") == [{}]  # the page's own
     assert page.text.count(HOSTILE) > 3
     assert "LIVE" in page.text
 
@@ -132,12 +172,21 @@ def test_mathematics_in_names_stays_text(hostile_study, draw):
     assert any(r"<script>\$x_1</b>&" in text for text in texts)
 
 
+def test_markup_in_a_drawing_stays_text(hostile_study):
+    with styled():
+        figure = draw_excerpts(compute_results(hostile_study))
+        picture = render("drawn", figure, is_simulated=False, is_vector=True)
+    page = Page(picture.svg)
+    assert page.attributes("script") == []
+    assert "<script>" in page.text
+
+
 def test_a_study_without_models_still_has_a_report(make_series, moving, tmp_path):
     study = run_study({"S0": [make_series(moving)]}, StudyOptions(), simulated=False)
     page = Page(write_report(study, tmp_path, context(is_foreign=True)).read_text())
     assert "What could not be done" in page.text
     assert "FOREIGN" in page.text
-    drawn = [image["alt"] for image in page.attributes("img")]
+    drawn = [a.get("aria-label", "") for a in page.attributes("div")]
     assert any("velocity below" in alt for alt in drawn)  # Fig. 4 needs no model
     assert not any("Bars of mean absolute error" in alt for alt in drawn)
 
