@@ -27,11 +27,11 @@ then ten trials on S0 without and with each compensation (seed 3).
 {table}
 
 F_n at rest: mean of the 0.4 s before the hand pushes, mean and standard deviation over
-the put-downs; {load:.2f} N were set. By statics: half the width of the interval that friction leaves
-at the far end, upper end (95 %) of what the calibration found. Hand: true horizontal
-force while the foot is faster than 0.02 m/s. Slips back: smoothed v_t below -0.01 m/s
-within 0.6 s; medians of the way back and of joint 6's part of the lowest v_t (below 0:
-against it).
+the put-downs; {load:.2f} N were set. By statics: half the width of the interval that
+friction leaves at the far end, upper end (95 %) of what the calibration found. Hand:
+true horizontal force while the foot is faster than 0.02 m/s. Slips back: smoothed v_t
+below -0.01 m/s within 0.6 s; medians of the way back and of joint 6's part of the
+lowest v_t (below 0: against it).
 
 The goal is a mean within 10 % of the load and a deviation of 0.3 N at most:
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-FRICTION = 0.02  # of the simulated joints, as a share of another arm's
+FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 
 

@@ -1,4 +1,11 @@
-from .acceptance import AcceptancePlan, analyse, as_plain, record_study
+from .acceptance import (
+    AcceptancePlan,
+    analyse,
+    as_plain,
+    calibrate_arm,
+    gated,
+    record_study,
+)
 from .bench import BenchReport, run_bench
 from .pendant import PRESSES, Lines, Pendant, Press, Pressable, TimedPress, read_script
 
@@ -13,6 +20,8 @@ __all__ = [
     "TimedPress",
     "analyse",
     "as_plain",
+    "calibrate_arm",
+    "gated",
     "read_script",
     "record_study",
     "run_bench",

@@ -2,11 +2,12 @@
 
 import contextlib
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,11 +30,15 @@ from analysis.validation import (
     measure_models,
     measure_slips,
 )
+from experiments.arguments import FRICTION
 from experiments.report import compare_with_truth, z_scores
 from experiments.session import list_sessions
 
 WHOLE = 10  # trials per terrain from which every band applies
 _OF_FEW = ("D", "E", "F", "T")  # groups that apply to fewer
+_RUBS = 0.1  # share of friction from which there is something to compensate
+_UNHINDERED = 0.02  # share of friction at which slips go back
+_GOING_BACK = {"D5", "E3"}  # bands on slips that go back
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 # Beside the 43: not met unless frames, signs, tare and kinematics are right.
@@ -72,6 +77,52 @@ class AcceptancePlan:
     friction: float
     jobs: int | None
     is_twin: bool = False
+
+
+def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResult]:
+    """Return the bands that decide.
+
+    Slips hardly go back on an arm whose wrist rubs: beyond a share of 0.02 the bands
+    on that are reported and do not decide. A twin, and an arm that rubs more than the
+    usual one, are judged by nobody.
+    """
+    if plan.is_twin or plan.friction > FRICTION:
+        return []
+    if plan.friction <= _UNHINDERED:
+        return list(results)
+    return [result for result in results if result.band.id not in _GOING_BACK]
+
+
+def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
+    """Return the plan for the arm whose friction was calibrated and is compensated.
+
+    The calibration is the one of `traction calibrate friction`, in `data`/rig. A rig
+    that somebody has described is taken as it is, as is one that hardly rubs.
+
+    Raises:
+        SessionError: the calibration failed; its words are in `data`.
+    """
+    if plan.config is not None or plan.is_twin or plan.friction < _RUBS:
+        return plan
+    data.mkdir(parents=True, exist_ok=True)
+    folder, place = data / "rig", data / "calibration"
+    config = folder / "rig.toml"
+    simulated = ["--fake", "--fast", "--operator-script", "auto", "--no-color"]
+    simulated += ["--seed", str(plan.seed), "--friction", repr(plan.friction)]
+    simulated += ["--config", str(config), "--data", str(place)]
+    steps = (["init", str(folder)], ["calibrate", "friction", *simulated])
+    for step in steps:
+        if code := _record(step, place):
+            raise SessionError(
+                f"traction {step[0]} ended with exit code {code}.",
+                hint=f"What it said: {place}.log",
+            )
+    section = r'(\[friction\][^\[]*?model = )"none"([^\[]*?file = )"friction.toml"'
+    used = r'\1"calibrated"\2"friction.fake.toml"'
+    text, count = re.subn(section, used, config.read_text())
+    assert count == 1
+    config.write_text(text)
+    return replace(plan, config=config)
 
 
 def record_study(

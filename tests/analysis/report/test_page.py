@@ -10,7 +10,15 @@ from pathlib import Path
 import pytest
 
 from analysis.data.tables import load_tables
-from analysis.report.page import ReportContext, write_report
+from analysis.figures.sections import ReportSection
+from analysis.figures.style import new_figure, render, styled
+from analysis.report.page import html_page, write_report
+from analysis.report.page_model import (
+    PageSection,
+    ReportContext,
+    ReportFigure,
+    ReportTable,
+)
 from analysis.study.models import FITTERS, GP_SE_NOISE, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -23,19 +31,50 @@ pytestmark = [
     pytest.mark.timeout(900),
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine"),
 ]
-WIDTHS = (1200, 500)  # of a desk and of the narrowest window it opens
+WIDTHS = (1600, 800, 500)  # of a desk and down to the narrowest window it opens
 _BROWSER = "not an origin"
 PROBE = """<script>
 addEventListener("load", () => {
   const images = [...document.images];
   document.title = "probe " + JSON.stringify({
-    figures: images.length,
-    broken: images.filter(image => !image.complete || image.naturalWidth < 300).length,
-    unsaid: images.filter(image => image.alt.length < 20).length,
+    figures: document.querySelectorAll("figure").length,
+    broken: images.filter(image => !image.complete || image.naturalWidth < 300).length
+      + [...document.querySelectorAll(".drawing svg")].filter(
+        drawing => drawing.getBoundingClientRect().height < 100).length,
+    unsaid: images.filter(image => image.alt.length < 20).length
+      + [...document.querySelectorAll(".drawing")].filter(
+        drawing => drawing.getAttribute("aria-label").length < 20).length,
     overflow: document.documentElement.scrollWidth - innerWidth,
     dead: [...document.querySelectorAll("nav a")].filter(
       link => !document.querySelector(link.getAttribute("href"))).length,
   });
+});
+</script>"""
+
+USE = """<script>
+addEventListener("load", () => {
+  const column = () => [...document.querySelectorAll("tbody tr")].map(
+    row => row.cells[1].textContent);
+  const found = { buttons: document.querySelectorAll("thead button").length };
+  document.querySelectorAll("thead button")[1].click();
+  found.up = column();
+  document.querySelectorAll("thead button")[1].click();
+  found.down = column();
+  const svg = document.querySelector(".drawing svg"), box = svg.getBoundingClientRect();
+  const point = (kind, x, y) => svg.dispatchEvent(new PointerEvent(kind, {
+    clientX: box.left + x * box.width, clientY: box.top + y * box.height,
+    pointerId: 1, pointerType: "mouse", bubbles: true }));
+  svg.setPointerCapture = () => {};
+  found.whole = svg.getAttribute("viewBox");
+  point("pointermove", 0.5, 0.5);
+  found.readout = document.querySelector(".readout").textContent;
+  point("pointerdown", 0.4, 0.4);
+  point("pointermove", 0.6, 0.6);
+  point("pointerup", 0.6, 0.6);
+  found.part = svg.getAttribute("viewBox");
+  svg.dispatchEvent(new MouseEvent("dblclick"));
+  found.again = svg.getAttribute("viewBox");
+  document.title = "probe " + JSON.stringify(found);
 });
 </script>"""
 
@@ -76,10 +115,10 @@ def open_page(page: Path, folder: Path, *options: str) -> Opened:
     )
 
 
-def probe(page: Path, folder: Path, width: int) -> dict:
+def probe(page: Path, folder: Path, width: int, script: str = PROBE) -> dict:
     """Return what a script in a copy of the page finds there."""
     copy = folder / "probe.html"
-    copy.write_text(page.read_text().replace("</body>", PROBE + "</body>"))
+    copy.write_text(page.read_text().replace("</body>", script + "</body>"))
     opened = open_page(copy, folder, f"--window-size={width},2000", "--dump-dom")
     found = re.search(r"<title>probe (.*?)</title>", opened.out)
     assert found is not None, opened.out[:500]
@@ -121,6 +160,39 @@ def written(study, folder: Path) -> Path:
 
 def test_a_report_is_readable_on_screen_and_paper(small_study, tmp_path):
     assert_readable(written(small_study, tmp_path), tmp_path, least=16)
+
+
+def small_page(folder: Path) -> Path:
+    """Write a page of one table and one drawing."""
+    cells = ("10 ± 1", "-2", "–", "≤ 0.5")
+    table = ReportTable("a", ("name", "x"), [(f"S{k}", x) for k, x in enumerate(cells)])
+    with styled():
+        figure = new_figure(3.0)
+        ax = figure.subplots()
+        ax.plot([0.0, 4.0], [-1.0, 1.0])
+        drawn = render("drawn", figure, is_simulated=True, is_vector=True)
+    shown = ReportFigure(ReportSection.BEYOND, "A line", "A line " * 5, "", drawn)
+    section = PageSection(ReportSection.BEYOND, (), [table], [shown])
+    context = ReportContext("Traction", "", True, False, "2027-03-14T10:00:00Z")
+    page = folder / "small.html"
+    page.write_text(html_page(context, [section], []))
+    return page
+
+
+def test_a_table_is_sorted_and_a_drawing_is_read_and_enlarged(tmp_path):
+    found = probe(small_page(tmp_path), tmp_path, 1200, USE)
+    assert found["buttons"] == 2
+    assert found["up"] == ["\u22122", "≤ 0.5", "10&nbsp;±&nbsp;1", "–"]
+    assert found["down"] == found["up"][::-1]
+    x, y = map(
+        float, re.findall(r"[xy] (\S+)", found["readout"].replace("\u2212", "-"))
+    )
+    assert 1.5 < x < 2.5
+    assert abs(y) < 0.3
+    whole, part = (list(map(float, found[k].split())) for k in ("whole", "part"))
+    assert part[2] == pytest.approx(0.2 * whole[2], rel=0.02)
+    assert part[3] == pytest.approx(0.2 * whole[3], rel=0.02)
+    assert found["again"] == found["whole"]
 
 
 def test_a_page_that_asks_or_complains_is_caught(tmp_path):

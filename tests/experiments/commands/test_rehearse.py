@@ -1,12 +1,17 @@
 """The rehearsed study through the whole program, in a short container."""
 
+import dataclasses
 import hashlib
+import itertools
 import json
 from concurrent.futures import Future
 
 import pytest
 
+from acquisition.errors import SessionError
 from acquisition.trial_file.reader import TrialReader
+from analysis.validation import Band, BandResult
+from experiments.arguments import FRICTION
 from experiments.session.store import list_sessions
 from experiments.settings.load import load_settings
 from experiments.tools import acceptance as simulation
@@ -117,7 +122,62 @@ def test_the_joints_of_another_arm_are_told_and_not_gated(tmp_path):
             *("--config", config, "--data", tmp_path),
         )
     assert done.code == 0
-    assert "not gated at this friction" in done.out
+    assert "not gated at friction 1" in done.out
+
+
+PLAN = simulation.AcceptancePlan(None, ("TF",), ("TF",), 0.4, 1, 3, FRICTION, 1)
+
+
+def test_an_arm_that_rubs_is_calibrated_first_and_compensated(tmp_path, monkeypatch):
+    monkeypatch.setattr(simulation, "_record", calibrated_at_once)
+    plan = simulation.calibrate_arm(PLAN, tmp_path)
+    section = load_settings(plan.config).rig.friction
+    assert section.model == "calibrated"
+    assert (plan.config.parent / section.file).read_text() == "--friction 0.4 --seed 3"
+    assert load_settings(plan.config).matrix == load_settings(None).matrix
+
+
+def calibrated_at_once(arguments, place):
+    """Write what `calibrate` was asked for; do everything else."""
+    if arguments[0] != "calibrate":
+        return in_this_process(arguments, place)
+    asked = dict(itertools.pairwise(arguments))
+    text = " ".join(f"{name} {asked[name]}" for name in ("--friction", "--seed"))
+    (place.with_name("rig") / "friction.fake.toml").write_text(text)
+    return 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"friction": 0.02}, {"is_twin": True, "config": "rig.toml"}, {"config": "a.toml"}],
+)
+def test_no_other_arm_is_calibrated(change, tmp_path):
+    plan = dataclasses.replace(PLAN, **change)
+    assert simulation.calibrate_arm(plan, tmp_path) is plan
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_calibration_that_fails_ends_the_rehearsal(tmp_path, monkeypatch):
+    monkeypatch.setattr(simulation, "_record", lambda arguments, _: len(arguments) > 2)
+    with pytest.raises(SessionError, match="traction calibrate"):
+        simulation.calibrate_arm(PLAN, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "deciding"),
+    [
+        ({"friction": 0.02}, {"D4", "D5", "E3"}),
+        ({}, {"D4"}),
+        ({"friction": 1.0}, set()),
+        ({"is_twin": True}, set()),
+    ],
+)
+def test_bands_on_slips_that_go_back_decide_where_nothing_rubs(change, deciding):
+    results = [
+        BandResult(Band(name, "what", 0, 1), (2.0,)) for name in ("D4", "D5", "E3")
+    ]
+    shown = simulation.gated(dataclasses.replace(PLAN, **change), results)
+    assert {result.band.id for result in shown} == deciding
 
 
 @pytest.mark.parametrize("option", [("--trials", 0), ("--friction", 3), ("--jobs", 99)])
