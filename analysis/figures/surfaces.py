@@ -23,6 +23,7 @@ from analysis.figures.style import (
 )
 from analysis.findings import StudyResults, Surface, common_range
 
+_WIDE = 0.7  # decades from which a logarithmic scale has logarithmic ticks
 _MOST_DIGITS = 15
 _LEVELS = 14  # contours
 _MOST_DOTS = 400  # samples shown per panel
@@ -130,6 +131,26 @@ def distinct_labels(values: Sequence[float]) -> list[str]:
     return [repr(float(value)) for value in values]
 
 
+def round_ticks(low: float, high: float, *, is_log: bool) -> list[float]:
+    """Return the round numbers of a scale from `low` to `high` that has few of them.
+
+    Both ends where there are less than two.
+    """
+    span = np.log10(high / low) if is_log else 0.0
+    if is_log and span > _WIDE:
+        digits = (1.0,) if span > 3.0 else (1.0, 3.0) if span > 1.5 else (1.0, 2.0, 5.0)
+        decades = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
+        ticks = [digit * 10.0**decade for decade in decades for digit in digits]
+    else:
+        step = (high - low) / 6.0
+        power = 10.0 ** np.floor(np.log10(step))
+        step = power * next(k for k in (1.0, 2.0, 2.5, 5.0, 10.0) if k * power >= step)
+        first = int(np.ceil(low / step))
+        ticks = [k * step for k in range(first, int(np.floor(high / step)) + 1)]
+    inside = [float(f"{tick:.6g}") for tick in ticks if low <= tick <= high]
+    return inside if len(inside) > 1 else [low, high]
+
+
 def _draw(
     results: StudyResults,
     values: Sequence[Array],
@@ -149,12 +170,12 @@ def _draw(
     axes[0].set_xlim(results.axes.v_t[0], results.axes.v_t[-1])
     axes[0].set_ylim(results.axes.F_n[0], results.axes.F_n[-1])
     _name_axes(figure)
-    ticks = levels[:: max(1, _LEVELS // 6)]
+    ticks = round_ticks(float(levels[0]), float(levels[-1]), is_log=norm is not None)
     bar = figure.colorbar(
         axes[0].collections[0], ax=axes, label=label, pad=0.01, ticks=ticks
     )
     bar.ax.minorticks_off()
-    bar.ax.set_yticks(ticks, distinct_labels(ticks.tolist()))
+    bar.ax.set_yticks(ticks, distinct_labels(ticks))
     return figure
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from analysis.figures.sections import ReportSection
 from analysis.figures.style import styled
-from analysis.figures.surfaces import distinct_labels
+from analysis.figures.surfaces import distinct_labels, round_ticks
 from analysis.findings.findings import compute_results
 from analysis.report.page import FIGURES
 from analysis.study.models import FitOptions
@@ -43,6 +43,21 @@ def test_nothing_of_a_figure_is_cut(findings, count, figures):
         shown = {key: figure for key, figure in drawn.items() if figure is not None}
         assert len(shown) >= figures
         assert [key for key, figure in shown.items() if not is_whole(figure)] == []
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "is_log", "wanted"),
+    [
+        (0.88, 15.1, False, [2.5, 5.0, 7.5, 10.0, 12.5, 15.0]),
+        (12.0, 22.4, True, [12.0, 14.0, 16.0, 18.0, 20.0, 22.0]),
+        (0.02, 0.9, True, [0.03, 0.1, 0.3]),
+        (0.4, 3.1, True, [0.5, 1.0, 2.0]),
+        (-1.0, 1.0, False, [-1.0, -0.5, 0.0, 0.5, 1.0]),
+        (1.01, 1.02, True, [1.01, 1.012, 1.014, 1.016, 1.018, 1.02]),
+    ],
+)
+def test_a_scale_has_few_round_numbers(low, high, is_log, wanted):
+    assert round_ticks(low, high, is_log=is_log) == wanted
 
 
 def test_numbers_that_differ_have_distinct_labels():
