@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
+CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 
 
@@ -99,6 +100,12 @@ def add_simulated_arm(parser: ArgumentParser) -> None:
         metavar="SHARE",
         help="of the simulated joints: 1 = as identified on another arm "
         f"({FRICTION:g})",
+    )
+    parser.add_argument(
+        "--cables",
+        type=number_within(*CABLES, "a resonance of 8 to 25 Hz, e.g. 15"),
+        metavar="HZ",
+        help="resonance of the simulated joints on their cables (stiff)",
     )
 
 

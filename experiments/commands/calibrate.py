@@ -77,7 +77,9 @@ def run(args: argparse.Namespace) -> int:
     args.chosen = _chosen_poses(args, settings, row)
     console = Console(color=not args.no_color)
     operator = choose_operator(args.operator_script, is_fake=args.fake)
-    fake = FakeOptions(args.fast, args.seed, friction) if args.fake else None
+    fake: FakeOptions | None = None
+    if args.fake:
+        fake = FakeOptions(args.fast, args.seed, friction, cables=args.cables)
     rig = connect_rig(settings, row, fake)
     kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
     console.say(f"traction calibrate {args.what}        {kind} · foot {row.foot}")

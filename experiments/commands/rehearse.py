@@ -70,6 +70,7 @@ def run(args: argparse.Namespace) -> int:
         friction=friction_share(args),
         jobs=args.jobs,
         is_twin=args.twin is not None,
+        cables=args.cables,
     )
     console = Console(color=not args.no_color)
     folder = _free_folder(Path(args.data), args.seed)

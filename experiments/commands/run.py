@@ -84,7 +84,9 @@ def run(args: argparse.Namespace) -> int:
     settings = load_settings(args.config)
     fake: FakeOptions | None = None
     if args.fake:
-        fake = FakeOptions(args.fast, args.seed, friction, args.pace, args.twin)
+        fake = FakeOptions(
+            args.fast, args.seed, friction, args.pace, args.twin, args.cables
+        )
     request = SessionRequest(
         data=args.data,
         settings=settings,

@@ -62,6 +62,7 @@ class SimulatedRig:
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes.
         twin: calibrations of the arm whose twin it is; None = an arm of its own.
+        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
     """
 
     rig: RigSettings
@@ -70,6 +71,7 @@ class SimulatedRig:
     friction: float
     pace: str
     twin: LawCalibrations | None = None
+    cables: float | None = None
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -93,6 +95,7 @@ class SimulatedRig:
             "tool": tool_metadata(build_tool(self.rig, self.row.foot)),
             "friction": self.friction,
             "pace": self.pace,
+            "cables": self.cables,
             "body": None if self.twin is None else self._body(self.twin),
         }
 

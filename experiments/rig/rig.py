@@ -37,6 +37,7 @@ class FakeOptions:
         friction: of the joints, as a share of what was identified on another arm.
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
         is_twin: the arm, its sensor and the containers are what calibrations say.
+        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
     """
 
     is_fast: bool
@@ -44,6 +45,7 @@ class FakeOptions:
     friction: float = FRICTION
     pace: str = "steady"
     is_twin: bool = False
+    cables: float | None = None
 
 
 @dataclass(slots=True)
@@ -169,6 +171,7 @@ def _world(
         friction=fake.friction,
         pace=fake.pace,
         twin=calibrations if fake.is_twin else None,
+        cables=fake.cables,
     )
 
 

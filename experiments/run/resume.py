@@ -2,10 +2,10 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -99,6 +99,7 @@ def _question(newest: UnfinishedSession, terrain: str) -> str:
 
 
 _FAKE = TypeAdapter(FakeOptions)
+_FRICTION_OF_THEN = 0.02  # where none is written
 _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
 
@@ -286,9 +287,16 @@ def _config_of(opening: Mapping[str, Any]) -> Path | None:
 def _fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, on stepped time if that is asked for."""
     try:
-        before = _FAKE.validate_python(opening.get("fake"))
+        before = _FAKE.validate_python(_with_friction(opening.get("fake")))
     except ValidationError:
         before = FakeOptions(is_fast=False, seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]
     is_fast = request.is_fast or before.is_fast
-    return FakeOptions(is_fast, before.seed, before.friction, pace, before.is_twin)
+    return replace(before, is_fast=is_fast, pace=pace)
+
+
+def _with_friction(fake: object) -> object:
+    """Return what was simulated; where no friction is written it was that of then."""
+    if not isinstance(fake, dict):
+        return fake
+    return {"friction": _FRICTION_OF_THEN, **cast("dict[str, object]", fake)}

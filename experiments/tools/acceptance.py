@@ -66,6 +66,7 @@ class AcceptancePlan:
         friction: of the joints, as a share of what was identified on another arm.
         jobs: processes at a time; None = one per core.
         is_twin: the simulated rig is the one that the calibrations describe.
+        cables: resonance of the joints on their cables [Hz]; None = stiff ones.
     """
 
     config: Path | None
@@ -77,6 +78,7 @@ class AcceptancePlan:
     friction: float
     jobs: int | None
     is_twin: bool = False
+    cables: float | None = None
 
 
 def gated(plan: AcceptancePlan, results: Sequence[BandResult]) -> list[BandResult]:
@@ -108,7 +110,7 @@ def calibrate_arm(plan: AcceptancePlan, data: Path) -> AcceptancePlan:
     folder, place = data / "rig", data / "calibration"
     config = folder / "rig.toml"
     simulated = ["--fake", "--fast", "--operator-script", "auto", "--no-color"]
-    simulated += ["--seed", str(plan.seed), "--friction", repr(plan.friction)]
+    simulated += ["--seed", str(plan.seed), *_arm(plan)]
     simulated += ["--config", str(config), "--data", str(place)]
     steps = (["init", str(folder)], ["calibrate", "friction", *simulated])
     for step in steps:
@@ -207,13 +209,19 @@ def _record(arguments: list[str], place: Path) -> int:
 
 def _arguments(plan: AcceptancePlan, terrain: str, data: Path) -> list[str]:
     config = [] if plan.config is None else ["--config", str(plan.config)]
-    config += ["--twin"] if plan.is_twin else ["--friction", repr(plan.friction)]
     return [
         *("run", terrain, "--fake", "--fast", "--operator-script", "auto"),
         *("--trials", str(plan.trials), "--seed", str(plan.seed)),
         *("--data", str(data), "--no-color"),
         *config,
+        *_arm(plan),
     ]
+
+
+def _arm(plan: AcceptancePlan) -> list[str]:
+    """Return the options that say which arm is simulated."""
+    kind = ["--twin"] if plan.is_twin else ["--friction", repr(plan.friction)]
+    return kind if plan.cables is None else [*kind, "--cables", repr(plan.cables)]
 
 
 def _pool(jobs: int | None) -> Executor:

@@ -57,13 +57,18 @@ def simulated_rig(
     """Return the simulation that was put into plain values.
 
     Args:
-        fields: scene, tool, share of friction, pace; "body" of the twin of an arm:
-            centres of mass of its links and, unless None, friction of its motors.
+        fields: scene, tool, share of friction, pace, cables; "body" of the twin of an
+            arm: centres of mass of its links and, unless None, friction of its motors.
         constants: of the arm by its drawings.
         clock: of the world.
     """
     scene = _scene_of(fields["scene"])
     constants, rubbing = arm_of(fields.get("body"), constants)
-    options = PlantOptions(fields["friction"], seed=scene.seed, rubbing=rubbing)
+    options = PlantOptions(
+        fields["friction"],
+        seed=scene.seed,
+        rubbing=rubbing,
+        cables=fields.get("cables"),
+    )
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

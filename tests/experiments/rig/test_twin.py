@@ -24,6 +24,7 @@ from tests.experiments.rig.test_gravity import calibration as gravity
 from wam.calibration.friction_file import friction_from_toml
 from wam.calibration.gravity_file import gravity_from_toml
 from wam.model.arm_model import ArmModel
+from wam.model.constants import load_constants
 
 TWIN = FakeOptions(is_fast=True, seed=1, is_twin=True)
 HEAVIER = np.full((7, 3), 0.01)  # kg m
@@ -66,9 +67,19 @@ def test_the_motors_of_a_twin_rub_as_calibrated(folder):
 
 
 def test_without_the_option_the_simulated_arm_is_one_of_its_own(folder):
-    plant, _ = plant_of(folder, dataclasses.replace(TWIN, is_twin=False))
+    plant, _ = plant_of(folder, dataclasses.replace(TWIN, is_twin=False, friction=0.02))
     stored = friction_from_toml((folder / "friction.toml").read_text(), "f")
     assert (plant.friction.coulomb < 0.1 * stored.fit.friction.coulomb).all()
+
+
+def test_joints_swing_on_their_cables_where_that_is_asked_for(tmp_path):
+    write_config(tmp_path)
+    plant, _ = plant_of(tmp_path, FakeOptions(is_fast=True, seed=1, cables=15.0))
+    plant.set_braking(is_braked=False, is_powered=True)
+    plant.advance(plant.t_ns + 100_000_000)
+    turns = np.array(plant.counts()) / np.array(load_constants().cts)
+    motors = np.linalg.solve(load_constants().j2mp, 2.0 * np.pi * turns)
+    assert np.abs(motors - plant.q).max() > 2e-4  # more than a count
 
 
 def test_a_twin_falls_under_gravity_that_the_drawings_do_not_have(folder):
