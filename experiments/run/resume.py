@@ -251,7 +251,7 @@ def _reopen(
     before = _last_opening(journal)
     config = request.config or _config_of(before)
     settings = load_settings(config)
-    fake = _fake_of(before, request) if folder.is_simulated else None
+    fake = fake_of(before, request) if folder.is_simulated else None
     session = SessionRequest(
         data=request.data,
         settings=settings,
@@ -284,7 +284,7 @@ def _config_of(opening: Mapping[str, Any]) -> Path | None:
     return Path(config) if isinstance(config, str) and config else None
 
 
-def _fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
+def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, on stepped time if that is asked for."""
     try:
         before = _FAKE.validate_python(_with_friction(opening.get("fake")))

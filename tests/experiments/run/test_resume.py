@@ -2,13 +2,17 @@
 
 import json
 import shutil
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from acquisition.trial_file.verify import verify_file
+from experiments.arguments import FRICTION
 from experiments.operator.prompts import Prompt
+from experiments.rig.rig import FakeOptions
+from experiments.run.resume import fake_of
 from experiments.session.reducer import replay
 from tests.experiments.program import (
     Done,
@@ -209,3 +213,16 @@ def test_a_trial_whose_sidecar_is_damaged_is_redone_and_the_old_one_kept(
     old = folder / "rejected" / "T01a.mcap"
     assert digest(old) == before["T01.mcap"] != digests(folder)["T01.mcap"]
     assert kept_and_sound(folder) == ["T01", "T02"]
+
+
+@pytest.mark.parametrize(
+    ("fake", "friction"),
+    [
+        ({"is_fast": True, "seed": 3}, 0.02),  # as it was when nobody could choose
+        ({"is_fast": True, "seed": 3, "friction": 0.7}, 0.7),
+        (asdict(FakeOptions(is_fast=True, seed=3)), FRICTION),
+    ],
+)
+def test_a_simulated_arm_rubs_on_as_it_did(fake, friction):
+    opened = fake_of({"fake": fake}, SimpleNamespace(is_fast=False))
+    assert (opened.seed, opened.friction) == (3, friction)
