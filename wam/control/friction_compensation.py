@@ -17,7 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition import ArmReading
-from wam.model import ArmConstants, Array, MotorFriction, motor_turns, plastic_share
+from wam.model import (
+    ELASTIC,
+    ArmConstants,
+    Array,
+    MotorFriction,
+    motor_turns,
+    plastic_share,
+)
 
 LARGEST_SHARE = 0.8
 SWUNG_MOTOR = "friction:swung_motor"  # in the recording
@@ -101,7 +108,8 @@ class FrictionCompensation:
         rows = np.stack((1.0 / reach, *levels, shares * known.load, known.load_at))
         self.swung_motor = 0
         self._j2mp = np.array(constants.j2mp)
-        self._of_torques = np.linalg.inv(self._j2mp).T
+        self._to_joints = np.ascontiguousarray(self._j2mp.T)
+        self._of_torques = np.linalg.inv(self._to_joints)
         self._rows: list[list[float]] = rows.T.tolist()
         self._borne = [0.0] * 7
         self._fading = np.zeros(7)
@@ -143,7 +151,7 @@ class FrictionCompensation:
             self.rest(now)
             fading = self.resting(now)
             return np.zeros(7) if fading is None else fading
-        self._borne = (self._of_torques @ borne).tolist()
+        self._borne = self._of_torques.dot(borne).tolist()
         return self._push(depth)
 
     def _begin(self, counts: list[int]) -> None:
@@ -158,9 +166,11 @@ class FrictionCompensation:
             return
         state = zip(counts, self._counts, self._z, self._rows, strict=True)
         for motor, (now, before, z, row) in enumerate(state):
+            if now == before:
+                continue
             step = (now - before) * row[0]
-            if z * step > 0.0:
-                step *= 1.0 - plastic_share(abs(z)) * abs(z)
+            if z * step > 0.0 and (bent := abs(z)) > ELASTIC:
+                step *= 1.0 - plastic_share(bent) * bent
             self._z[motor] = min(max(z + step, -1.0), 1.0)
             self._counts[motor] = now
 
@@ -178,14 +188,17 @@ class FrictionCompensation:
                 return
 
     def _push(self, depth: Array | None = None) -> Array:
-        tau = np.zeros(7)
+        # Plain numbers: seven of them are done before numpy has looked at an array.
+        push: list[float] = []
         state = zip(self._z, self._borne, self._rows, strict=True)
-        for motor, (z, borne, row) in enumerate(state):
-            _, forward, backward, load, load_at = row
-            less = load * max(load_at - abs(borne), 0.0)
-            tau[motor] = z * max((forward if z > 0.0 else backward) - less, 0.0)
-        if depth is not None and depth.any():
+        for z, borne, (_, forward, backward, load, load_at) in state:
+            level = forward if z > 0.0 else backward
+            if load and (less := load_at - abs(borne)) > 0.0:
+                level = max(level - load * less, 0.0)
+            push.append(z * level)
+        tau = np.array(push)
+        if depth is not None:
             # Both motors of a differential let go where either of its joints stops.
             free = 1.0 - np.minimum(np.abs(depth) / _AT_WALL, 1.0)
             tau *= np.where(self._j2mp != 0.0, free, 1.0).min(axis=1)
-        return self._j2mp.T @ tau
+        return self._to_joints.dot(tau)

@@ -50,8 +50,16 @@ class SoftWalls:
         """The torque limits of the joints [N m], seven."""
         return self._walls.torque
 
-    def depth(self, q: Vector) -> Vector:
-        """Return how far joints are inside walls [rad], (7,), above 0 at a lower."""
+    def depth(self, q: Vector) -> Vector | None:
+        """Return how far joints are inside walls [rad], (7,), above 0 at a lower.
+
+        None where no joint is.
+        """
+        for angle, (low, high) in zip(q.tolist(), self._free, strict=True):
+            if not low <= angle <= high:
+                break
+        else:
+            return None
         lower, upper = self._bounds
         return np.maximum(lower - q, 0.0) - np.maximum(q - upper, 0.0)
 
