@@ -8,6 +8,7 @@ from string import Formatter
 
 from acquisition import BusCondition, PreflightError, SafetyMode
 from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
+from experiments.operator import AFTER_FAULT, Prompt
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,7 @@ class Message:
         more: explanation for `traction check --explain`.
         arm: what the arm is doing now; empty where no arm is involved.
         example: of a `what` that a driver words; empty where it stands for itself.
+        prompt: the one whose keys `do` names; empty where it names none.
     """
 
     what: str
@@ -29,6 +31,7 @@ class Message:
     more: str
     arm: str = ""
     example: str = ""
+    prompt: str = ""
 
     def text(self, fields: Mapping[str, object], saved: str = "") -> str:
         """Return the message in one line."""
@@ -38,7 +41,8 @@ class Message:
 
     def sample(self) -> tuple[str, str]:
         """Return what happened and what to do, numbers and names left open."""
-        return _left_open(self.example or self.what), _left_open(self.do)
+        do = self.do.replace("{then}", AFTER_FAULT[Prompt.READY])
+        return _left_open(self.example or self.what), _left_open(do)
 
 
 def _load() -> dict[str, Message]:
@@ -109,11 +113,13 @@ class FaultContext:
         trial: name of the trial, or "The session".
         seconds: since the start of the recording [s], None outside of one.
         bus: what is known of the CAN bus.
+        prompt: what is asked for after it; None = it ends the session.
     """
 
     trial: str = "The session"
     seconds: float | None = None
     bus: BusCondition = BusCondition.SOUND
+    prompt: Prompt | None = Prompt.READY
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -141,6 +147,7 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
         "seconds": context.seconds or 0.0,
         "when": "" if context.seconds is None else f" at {context.seconds:.2f} s",
         "pucks": _who(silent),
+        "then": AFTER_FAULT[context.prompt],
     }
     return CATALOGUE[name].text({**values, **asdict(detail), "causes": causes}, saved)
 

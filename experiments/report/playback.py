@@ -1,13 +1,16 @@
 """A recorded trial shown again: the live screen, from the file; nothing moves."""
 
 from collections.abc import Iterator
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag
+from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag, parse_toml
+from acquisition.trial_file import TrialReader
 from analysis.data import RecordedTrial, load_trial
-from experiments.operator import Console, RecordingView, recording_lines
+from experiments.operator import Console, LiveScales, RecordingView, recording_lines
 
 _PICTURES = 8  # per second of the person's time
 _LINES = 1.0  # seconds of the trial between two lines without a terminal
@@ -23,13 +26,15 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
     """
     trial = load_trial(path)
     start_ns = clock.now_ns()
+    scales = _scales_of(path)
     step = speed / _PICTURES if console.is_live else _LINES
     for row in _rows(trial, step):
         due_ns = start_ns + round(float(trial.t[row]) / speed * NS_PER_S)
         clock.sleep_until(due_ns)
         if console.is_lost:
             return
-        lines = recording_lines(_view(trial, row), console.width)[:-1]
+        view = replace(_view(trial, row), scales=scales)
+        lines = recording_lines(view, console.width)[:-2]
         if console.is_live:
             console.panel(lines)
         else:
@@ -37,6 +42,21 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
     console.end_panel()
     if console.is_live:
         console.say(_line(trial, len(trial.t) - 1))
+
+
+def _scales_of(path: Path) -> LiveScales:
+    """Return the scales of the limits that were set when it was recorded."""
+    config = TrialReader(path).attachments.get("config.toml", b"")
+    try:
+        limits: Any = parse_toml(config.decode()).get("limits", {})
+    except ValueError:
+        return LiveScales()
+    known = {
+        field.name: float(limits[field.name])
+        for field in fields(LiveScales)
+        if isinstance(limits.get(field.name), float | int) and limits[field.name] > 0
+    }
+    return LiveScales(**known)
 
 
 def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:

@@ -79,8 +79,8 @@ class SessionRequest:
 
     @property
     def who(self) -> str:
-        """Name of the operator, "auto" in a simulation without one."""
-        return self.operator_name or ("auto" if self.fake is not None else "")
+        """Name of the operator: as given, else of whoever presses the keys."""
+        return self.operator_name or self.operator.who
 
 
 @dataclass(frozen=True, slots=True)

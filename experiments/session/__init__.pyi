@@ -36,7 +36,7 @@ from .matrix_board import (
     next_steps,
     parse_where,
 )
-from .reducer import KEEP, refusal, replay
+from .reducer import KEEP, REJECT, refusal, replay
 from .sidecar import TrialOutcome, sidecar_of
 from .states import Event, SessionPhase, table_lines
 from .store import (
@@ -60,6 +60,7 @@ __all__ = [
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
+    "REJECT",
     "Deviation",
     "DigestCache",
     "Event",

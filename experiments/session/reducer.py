@@ -279,9 +279,12 @@ def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
     is_kept = state.kept_attempt(number) == attempt
     if is_kept == (event.get("verdict") == KEEP):
         return state
+    is_redone = state.is_redo and state.phase is SessionPhase.READY
     if is_kept:
+        state = replace(state, redoing=number) if is_redone else state
         return _set_aside(state, event)
     kept = (*state.kept_attempts, (number, attempt))
+    state = replace(state, redoing=None) if is_redone else state
     return replace(state, kept_attempts=kept, rejected=state.rejected - 1)
 
 

@@ -53,6 +53,7 @@ class Keys:
     """An operator who presses the given keys, one per look, then nothing."""
 
     draft = ""
+    who = "mk"
 
     def __init__(self, *keys, lines=()):
         self.keys, self.lines = list(keys), list(lines)
