@@ -1,8 +1,10 @@
 """The message catalogue: what happened, what the arm does, what to do."""
 
+import os
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
 from string import Formatter
 
@@ -101,8 +103,50 @@ BUS_WORDS = {  # of a bus on which nothing can be asked
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
     BusCondition.UNHEARD: "Nobody on the CAN bus acknowledges.",
 }
+_HEARTBEAT = "heartbeat"  # the monitor of the loop's traffic
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows
 _PUCKS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class ComputerLoad:
+    """How busy a computer is.
+
+    Attributes:
+        load: programs that ran or waited for a core, mean of the last minute.
+        cores: that this program may use.
+    """
+
+    load: float
+    cores: int
+
+    @classmethod
+    def now(cls) -> "ComputerLoad":
+        """Return the load of this computer."""
+        return cls(os.getloadavg()[0], len(os.sched_getaffinity(0)))
+
+    def blamed(self, error: PreflightError) -> PreflightError:
+        """Return a refusal that says first that the computer is too busy."""
+        message = CATALOGUE["too-busy"]
+        fields = {**asdict(self), "what": error.message, "then": "then try again"}
+        return PreflightError(
+            message.what.format_map(fields),
+            hint=message.do.format_map(fields),
+            arm_state=error.arm_state,
+        )
+
+
+# What a computer that comes too late looks like, and what such messages blame.
+_OF_TIME = {
+    *(Fault.LOOP_LATE, Fault.CONSOLE_SILENT, Fault.RECORDER_SILENT, Fault.FT_STALE),
+    *(Fault.CAN_SILENCE, Fault.SAFETY_SILENT),
+}
+_HARDWARE = re.compile(r"cable|adapter|power|puck|traction check", re.IGNORECASE)
+
+
+def blames_hardware(error: PreflightError) -> bool:
+    """Return whether a refusal sends people to cables and devices."""
+    return _HARDWARE.search(f"{error.message} {error.hint}") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +158,15 @@ class FaultContext:
         seconds: since the start of the recording [s], None outside of one.
         bus: what is known of the CAN bus.
         prompt: what is asked for after it; None = it ends the session.
+        load: of a computer that simulates on the wall clock; None = it does not, or a
+            fault was asked for.
     """
 
     trial: str = "The session"
     seconds: float | None = None
     bus: BusCondition = BusCondition.SOUND
     prompt: Prompt | None = Prompt.READY
+    load: ComputerLoad | None = None
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -149,7 +196,13 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
         "pucks": _who(silent),
         "then": AFTER_FAULT[context.prompt],
     }
-    return CATALOGUE[name].text({**values, **asdict(detail), "causes": causes}, saved)
+    values |= {**asdict(detail), "causes": causes}
+    message = CATALOGUE[name]
+    is_of_time = verdict.fault in _OF_TIME or _HEARTBEAT in causes
+    if context.load is not None and is_of_time:
+        values |= {**asdict(context.load), "what": message.what.format_map(values)}
+        message = replace(CATALOGUE["too-busy"], arm=message.arm)
+    return message.text(values, saved)
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:

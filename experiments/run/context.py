@@ -7,7 +7,7 @@ from acquisition import TractionError
 from acquisition.control_loop import GuardVerdict
 from acquisition.ipc import LoopClient
 from analysis.next_push import Aim
-from experiments.messages import FaultContext, fault_text
+from experiments.messages import ComputerLoad, FaultContext, fault_text
 from experiments.operator import (
     Console,
     FootKeys,
@@ -21,7 +21,7 @@ from experiments.operator import (
 from experiments.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session import KEEP, REJECT, Event, Journal, TrialName
+from experiments.session import KEEP, REJECT, Camera, Event, Journal, TrialName
 from experiments.trial import SessionMetadata, TrialArchive
 
 UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
@@ -66,6 +66,8 @@ class RunContext:
         aim: of the push that was suggested last; None where there was none.
         given: the newest verdict; None before the first, or after it was taken back.
         ticked: numbers of the steps of the reset that were ticked.
+        camera: where photos of the bed come from.
+        trial_began_utc_ns: when the newest trial began [UTC ns], by this computer.
     """
 
     console_loop: ConsoleLoop
@@ -87,6 +89,8 @@ class RunContext:
     aim: Aim | None = None
     given: GivenVerdict | None = None
     ticked: set[int] = field(default_factory=set[int])
+    camera: Camera = field(default_factory=lambda: Camera("", None, 0.0))
+    trial_began_utc_ns: int = 0
 
     @property
     def loop_client(self) -> LoopClient:
@@ -135,7 +139,10 @@ class RunContext:
     def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""
         bus = self.loop_client.loop.bus_condition
-        context = replace(self.fault_context, bus=bus)
+        faults = self.console_loop.faults
+        is_rehearsed = faults is not None and faults.are_any
+        load = busy_load(self.rig, is_rehearsed=is_rehearsed)
+        context = replace(self.fault_context, bus=bus, load=load)
         return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:
@@ -220,6 +227,15 @@ class RunContext:
         return given
 
 
+def busy_load(rig: Rig, *, is_rehearsed: bool) -> ComputerLoad | None:
+    """Return the computer's load where lateness can only be its own, else None.
+
+    That is in a simulation on the wall clock for which no fault was asked.
+    """
+    is_own = rig.is_simulated and not rig.is_stepped and not is_rehearsed
+    return ComputerLoad.now() if is_own else None
+
+
 def open_context(
     console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
 ) -> RunContext:
@@ -237,4 +253,12 @@ def open_context(
         feedback=build_feedback(rig.settings.rig.operator, console),
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
+        camera=camera_of(rig),
     )
+
+
+def camera_of(rig: Rig) -> Camera:
+    """Return the camera of rig.toml; its folder is one below that of rig.toml."""
+    wanted = rig.settings.rig.camera
+    folder = rig.settings.folder / wanted.folder if wanted.folder else None
+    return Camera(wanted.command, folder, wanted.seconds)

@@ -4,7 +4,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from acquisition import MOTOR_FRESH_SHIFT, RATE_HZ, Flag, TractionError, TrialFileError
+from acquisition import (
+    MOTOR_FRESH_SHIFT,
+    RATE_HZ,
+    Flag,
+    SystemClock,
+    TractionError,
+    TrialFileError,
+)
 from acquisition.control_loop import Action, ArmState
 from acquisition.ipc import ProcessLostError
 from acquisition.trial_file import TrialHeader
@@ -23,6 +30,7 @@ from experiments.operator import (
 from experiments.rig import Rig, foresight_view
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
+from experiments.run.photo import take_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import Event, TrialName, TrialOutcome
 from experiments.trial import (
@@ -138,6 +146,7 @@ def _record(
         details["reset"] = [step for n, step in steps if n in context.ticked]
         context.ticked.clear()
     context.append(Event.TRIAL_STARTED, **details)
+    context.trial_began_utc_ns = SystemClock().utc_ns()
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
     context.loop_client.watch_trial(is_recording=True)
@@ -221,6 +230,7 @@ def _end(
         traces = review.trace_lines(kept, name.kept, context.console.width)
         context.say_page([written, *lines, *warnings, *traces])
         archive.write_sidecar(name, verified, outcome, review)
+        take_photo(context, name)
         return
     context.say(written)
     context.reject(name, f"interrupted: {outcome.reason}")

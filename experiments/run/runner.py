@@ -21,6 +21,7 @@ from experiments.operator import (
 )
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, open_context
+from experiments.run.photo import collect_photo
 from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
@@ -219,11 +220,13 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
     """
     action = key_action(Prompt.REVIEW, key)
     if action is KeyAction.KEEP:
+        collect_photo(context, name)
         context.record_verdict(Event.TRIAL_KEPT, name, "")
         context.open_undo(name, "", is_kept=True)
         return True
     if action is KeyAction.REDO:
         reason = REJECT_REASONS[key[1:]]
+        collect_photo(context, name)
         context.reject(name, reason)
         context.open_undo(name, reason, is_kept=False)
         return True

@@ -90,6 +90,7 @@ def make_loop(operator, *, is_stepped=True, console=None, **more):
         backend=StubBackend(StubClient(clock)),
         simulation=None,
         is_stepped=is_stepped,
+        is_simulated=True,
         settings=SimpleNamespace(
             rig=SimpleNamespace(operator=SimpleNamespace(double_tap=False))
         ),
