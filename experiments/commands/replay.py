@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
-  traction replay S012 T04 --serve          to a viewer that speaks Foxglove's protocol
   traction replay --can bus.log --summary   a bus log, the sums only"""
 WATCH_EXAMPLES = """\
   traction watch                the session that is recorded, at ws://127.0.0.1:8765

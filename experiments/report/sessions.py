@@ -106,9 +106,8 @@ def choose_sessions(
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
         message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
-        raise SessionError(
-            message.what.format_map(values), hint=message.do.format_map(values)
-        )
+        what, hint = (t.format_map(values) for t in (message.what, message.do))
+        raise SessionError(what, hint=hint)
     return sessions
 
 

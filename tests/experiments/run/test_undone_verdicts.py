@@ -5,7 +5,7 @@ import json
 import pytest
 
 from experiments.operator.keys import REJECT_REASONS
-from experiments.operator.prompts import Prompt
+from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run.console_loop import TICK
 from experiments.run.context import UNDO_NS
 from experiments.run.ready import wait_ready
@@ -15,7 +15,13 @@ from experiments.session.reducer import replay
 from experiments.session.sidecar import TrialOutcome
 from experiments.session.states import Event
 from experiments.session.trial_name import TrialName
-from tests.experiments.program import journal, only_session, run_short, sidecar
+from tests.experiments.program import (
+    journal,
+    only_session,
+    run_short,
+    run_watched,
+    sidecar,
+)
 from tests.experiments.run.bench import Keys, make_context
 
 FIRST = TrialName(1, 1)
@@ -132,6 +138,7 @@ def test_before_the_first_verdict_the_key_means_nothing(tmp_path, capsys):
     assert "No verdict to take back" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_script_takes_a_verdict_back_in_a_whole_session(tmp_path, config):
     script = tmp_path / "script.txt"
     script.write_text("keep\nundo\nredo 2\nkeep\n")
@@ -150,3 +157,28 @@ def test_a_script_takes_a_verdict_back_in_a_whole_session(tmp_path, config):
     assert sorted(p.name for p in (folder / "trials").glob("*.mcap"))[0] == "T01.mcap"
     assert (folder / "rejected" / "T01a.mcap").exists()
     assert "T01 kept: this stands until you give another verdict." in done.out
+
+
+@pytest.mark.slow
+def test_a_person_can_take_the_last_verdict_back(tmp_path, config, monkeypatch):
+    monkeypatch.setattr(AutoOperator, "who", "mk")
+    pressed = []
+
+    def press(asked, _):
+        if asked.prompt is Prompt.UNDO:
+            pressed.append("u" if len(pressed) < 1 else " ")
+            return pressed[-1]
+        is_again = asked.prompt is Prompt.REVIEW and len(pressed) == 1
+        return "r2" if is_again and asked.attempt == 1 else None
+
+    watched = run_watched(config, tmp_path / "data", 1, press=press)
+    assert watched.done.code == 0, watched.done.err
+    told = [
+        e for e in journal(watched.folder) if "verdict" in e or "kept" in e["event"]
+    ]
+    assert [(e["event"], e["attempt"], e["who"]) for e in told] == [
+        ("trial-kept", 1, "mk"),
+        ("verdict-changed", 1, "mk"),
+        ("trial-kept", 2, "mk"),
+    ]
+    assert pressed == ["u", " "]
