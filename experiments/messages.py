@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib import resources
+from pathlib import Path
 from string import Formatter
 
 from acquisition import BusCondition, PreflightError, SafetyMode
@@ -113,7 +114,8 @@ class ComputerLoad:
     """How busy a computer is.
 
     Attributes:
-        load: programs that ran or waited for a core, mean of the last minute.
+        load: programs that run or wait for a core: the mean of the last minute, or
+            those of this moment where they are more.
         cores: that this program may use.
     """
 
@@ -123,7 +125,14 @@ class ComputerLoad:
     @classmethod
     def now(cls) -> "ComputerLoad":
         """Return the load of this computer."""
-        return cls(os.getloadavg()[0], len(os.sched_getaffinity(0)))
+        words = Path("/proc/loadavg").read_text().split()
+        running = int(words[3].partition("/")[0])
+        return cls(max(float(words[0]), running), len(os.sched_getaffinity(0)))
+
+    @property
+    def is_too_much(self) -> bool:
+        """Whether programs have to wait for a core."""
+        return self.load > self.cores
 
     def blamed(self, error: PreflightError) -> PreflightError:
         """Return a refusal that says first that the computer is too busy."""

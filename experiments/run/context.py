@@ -228,12 +228,14 @@ class RunContext:
 
 
 def busy_load(rig: Rig, *, is_rehearsed: bool) -> ComputerLoad | None:
-    """Return the computer's load where lateness can only be its own, else None.
+    """Return the computer's load where it makes a simulation late, else None.
 
-    That is in a simulation on the wall clock for which no fault was asked.
+    That is on the wall clock, where no fault was asked for and programs wait for cores.
     """
-    is_own = rig.is_simulated and not rig.is_stepped and not is_rehearsed
-    return ComputerLoad.now() if is_own else None
+    if not rig.is_simulated or rig.is_stepped or is_rehearsed:
+        return None
+    load = ComputerLoad.now()
+    return load if load.is_too_much else None
 
 
 def open_context(

@@ -130,3 +130,11 @@ def test_a_refusal_that_blames_cables_says_the_computer_first():
     assert "Puck 5 does not answer." in told.message
     assert "cable" not in told.hint
     assert not blames_hardware(PreflightError("2 GB free.", hint="Make room."))
+
+
+def test_a_computer_is_too_busy_where_programs_wait_for_a_core():
+    assert LOAD.is_too_much
+    assert not ComputerLoad(2.0, 2).is_too_much
+    now = ComputerLoad.now()
+    assert now.load >= 1.0  # this one runs
+    assert now.cores >= 1
