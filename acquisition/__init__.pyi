@@ -1,4 +1,5 @@
 from . import control_loop, ipc, recording, trial_file
+from .cdr import CdrWriter, encode_log, encode_string
 from .clock import (
     NS_PER_S,
     PERIOD_NS,
@@ -30,7 +31,7 @@ from .errors import (
     TrialFileError,
 )
 from .sample import MOTOR_FRESH_SHIFT, Flag, Record, Sample
-from .schema import FORESIGHT, MOST_TERRAINS, TRUTH
+from .schema import CYCLE, FORESIGHT, MOST_TERRAINS, TRUTH, schema_text
 from .settings import (
     File,
     Mass,
@@ -48,6 +49,7 @@ from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSou
 from .temporary_folders import remove_abandoned, temporary_folder
 
 __all__ = [
+    "CYCLE",
     "FORESIGHT",
     "MOST_TERRAINS",
     "MOTOR_FRESH_SHIFT",
@@ -57,6 +59,7 @@ __all__ = [
     "TRUTH",
     "ArmReading",
     "BusCondition",
+    "CdrWriter",
     "Clock",
     "DeviceFaultError",
     "DeviceServer",
@@ -92,11 +95,14 @@ __all__ = [
     "WrenchSample",
     "WrenchSensor",
     "control_loop",
+    "encode_log",
+    "encode_string",
     "ipc",
     "parse_toml",
     "read_text",
     "recording",
     "remove_abandoned",
+    "schema_text",
     "temporary_folder",
     "trial_file",
     "utc_offset_ns",

@@ -105,8 +105,8 @@ FORESIGHT_CHANNELS = (
         "foresight.traction", "N", "terrain", "F_t to expect of a sliding foot"
     ),
     ChannelMeaning("foresight.v_t", "m/s", "terrain", "14 ms later than the sample"),
-    ChannelMeaning("foresight.F_t", "N", "terrain", "8 ms later than the sample"),
-    ChannelMeaning("foresight.F_n", "N", "terrain", "8 ms later than the sample"),
+    ChannelMeaning("foresight.f_t", "N", "terrain", "F_t, 8 ms later than the sample"),
+    ChannelMeaning("foresight.f_n", "N", "terrain", "F_n, 8 ms later than the sample"),
     ChannelMeaning("foresight.none", "1", "terrain", "none of the known terrains"),
     ChannelMeaning(
         "foresight.terrains", "1", "terrain", "probability of each, named in foresight"

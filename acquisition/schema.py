@@ -50,8 +50,8 @@ float64 slip_probability  # that a slip begins within 200 ms; NaN = not known
 float64 break_away_risk  # that a push from rest slips below this F_t at this F_n
 float64 traction  # N, F_t to expect of a sliding foot
 float64 v_t  # m/s, causal filter, 14 ms late
-float64 F_t  # N, causal filter, 8 ms late
-float64 F_n  # N, causal filter, 8 ms late
+float64 f_t  # N, F_t, causal filter, 8 ms late
+float64 f_n  # N, F_n, causal filter, 8 ms late
 float64 none  # that the ground is none of the known terrains
 float64[{MOST_TERRAINS}] terrains  # probability of each, named in metadata foresight"""
 
@@ -93,6 +93,13 @@ _DEPENDENCIES = {
     "geometry_msgs/Twist": (
         "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular"
     ),
+    "geometry_msgs/Transform": (
+        "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation"
+    ),
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header\nstring child_frame_id\n"
+        "geometry_msgs/Transform transform"
+    ),
     "geometry_msgs/Pose": (
         "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation"
     ),
@@ -117,6 +124,7 @@ _TEXTS = {
         "std_msgs/Header header\ngeometry_msgs/Twist twist"
     ),
     "std_msgs/msg/String": "string data",
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms",
 }
 
 _SCALARS = {
@@ -164,7 +172,8 @@ def _fields(text: str) -> list[tuple[str, int, str]]:
 
 
 def _used_types(text: str) -> list[str]:
-    return [line.split()[0] for line in text.splitlines() if "/" in line.split()[0]]
+    types = [line.split()[0].removesuffix("[]") for line in text.splitlines()]
+    return [name for name in types if "/" in name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,3 +241,11 @@ EARLIER_CYCLES = (
 )
 TRUTH = fixed_layout("traction_msgs/msg/Truth", "wam_base")
 FORESIGHT = fixed_layout("traction_msgs/msg/Foresight", "terrain")
+# Before ROS 2's rule of lower case was kept: viewers refuse that definition.
+EARLIER_FORESIGHTS = (
+    fixed_layout(
+        FORESIGHT.type_name,
+        "terrain",
+        FORESIGHT_TEXT.replace("64 f_t", "64 F_t").replace("64 f_n", "64 F_n"),
+    ),
+)

@@ -26,6 +26,7 @@ COMMANDS = {
     "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
     "replay": "show a trial again, or a bus log in words",
+    "watch": "serve the running session to a second screen, read only",
     "export": "trials as CSV or Parquet tables with units and checksums",
     "publish": "recordings, tables and results as an RO-Crate to be archived",
     "init": "write rig.toml and matrix.toml to be edited",
@@ -36,7 +37,10 @@ COMMANDS = {
     "identify": "which terrain is this? probabilities over time",
     "fit": "the same for external data, npz or CSV",
 }
-_JOINED = {"publish": "export"}  # commands that share a file with another
+_JOINED = {
+    "publish": "export",
+    "watch": "replay",
+}  # commands that share a file with another
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,

@@ -1,13 +1,17 @@
 """The message catalogue: what happened, what the arm does, what to do."""
 
+import os
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import resources
+from pathlib import Path
 from string import Formatter
 
 from acquisition import BusCondition, PreflightError, SafetyMode
 from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
+from experiments.operator import AFTER_FAULT, Prompt
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +25,7 @@ class Message:
         more: explanation for `traction check --explain`.
         arm: what the arm is doing now; empty where no arm is involved.
         example: of a `what` that a driver words; empty where it stands for itself.
+        prompt: the one whose keys `do` names; empty where it names none.
     """
 
     what: str
@@ -29,6 +34,7 @@ class Message:
     more: str
     arm: str = ""
     example: str = ""
+    prompt: str = ""
 
     def text(self, fields: Mapping[str, object], saved: str = "") -> str:
         """Return the message in one line."""
@@ -38,7 +44,8 @@ class Message:
 
     def sample(self) -> tuple[str, str]:
         """Return what happened and what to do, numbers and names left open."""
-        return _left_open(self.example or self.what), _left_open(self.do)
+        do = self.do.replace("{then}", AFTER_FAULT[Prompt.READY])
+        return _left_open(self.example or self.what), _left_open(do)
 
 
 def _load() -> dict[str, Message]:
@@ -97,8 +104,58 @@ BUS_WORDS = {  # of a bus on which nothing can be asked
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
     BusCondition.UNHEARD: "Nobody on the CAN bus acknowledges.",
 }
+_HEARTBEAT = "heartbeat"  # the monitor of the loop's traffic
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows
 _PUCKS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class ComputerLoad:
+    """How busy a computer is.
+
+    Attributes:
+        load: programs that run or wait for a core: the mean of the last minute, or
+            those of this moment where they are more.
+        cores: that this program may use.
+    """
+
+    load: float
+    cores: int
+
+    @classmethod
+    def now(cls) -> "ComputerLoad":
+        """Return the load of this computer."""
+        words = Path("/proc/loadavg").read_text().split()
+        running = int(words[3].partition("/")[0])
+        return cls(max(float(words[0]), running), len(os.sched_getaffinity(0)))
+
+    @property
+    def is_too_much(self) -> bool:
+        """Whether programs have to wait for a core."""
+        return self.load > self.cores
+
+    def blamed(self, error: PreflightError) -> PreflightError:
+        """Return a refusal that says first that the computer is too busy."""
+        message = CATALOGUE["too-busy"]
+        fields = {**asdict(self), "what": error.message, "then": "then try again"}
+        return PreflightError(
+            message.what.format_map(fields),
+            hint=message.do.format_map(fields),
+            arm_state=error.arm_state,
+        )
+
+
+# What a computer that comes too late looks like, and what such messages blame.
+_OF_TIME = {
+    *(Fault.LOOP_LATE, Fault.CONSOLE_SILENT, Fault.RECORDER_SILENT, Fault.FT_STALE),
+    *(Fault.CAN_SILENCE, Fault.SAFETY_SILENT),
+}
+_HARDWARE = re.compile(r"cable|adapter|power|puck|traction check", re.IGNORECASE)
+
+
+def blames_hardware(error: PreflightError) -> bool:
+    """Return whether a refusal sends people to cables and devices."""
+    return _HARDWARE.search(f"{error.message} {error.hint}") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,11 +166,16 @@ class FaultContext:
         trial: name of the trial, or "The session".
         seconds: since the start of the recording [s], None outside of one.
         bus: what is known of the CAN bus.
+        prompt: what is asked for after it; None = it ends the session.
+        load: of a computer that simulates on the wall clock; None = it does not, or a
+            fault was asked for.
     """
 
     trial: str = "The session"
     seconds: float | None = None
     bus: BusCondition = BusCondition.SOUND
+    prompt: Prompt | None = Prompt.READY
+    load: ComputerLoad | None = None
 
 
 def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") -> str:
@@ -141,8 +203,15 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
         "seconds": context.seconds or 0.0,
         "when": "" if context.seconds is None else f" at {context.seconds:.2f} s",
         "pucks": _who(silent),
+        "then": AFTER_FAULT[context.prompt],
     }
-    return CATALOGUE[name].text({**values, **asdict(detail), "causes": causes}, saved)
+    values |= {**asdict(detail), "causes": causes}
+    message = CATALOGUE[name]
+    is_of_time = verdict.fault in _OF_TIME or _HEARTBEAT in causes
+    if context.load is not None and is_of_time:
+        values |= {**asdict(context.load), "what": message.what.format_map(values)}
+        message = replace(CATALOGUE["too-busy"], arm=message.arm)
+    return message.text(values, saved)
 
 
 def rest_text(mode: SafetyMode, *, is_confirmed: bool) -> str:

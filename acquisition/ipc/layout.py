@@ -5,12 +5,14 @@ everything in it. Each area has one writer.
 """
 
 import struct
+import zlib
 from enum import IntEnum
 from typing import Final
 
 import numpy as np
 
 from acquisition.devices import WrenchSample
+from acquisition.errors import LinkError
 from acquisition.ipc.rings import LINE, Ring, SharedMemory, Slot, lines
 from acquisition.sample import Record
 from acquisition.schema import CYCLE, FORESIGHT
@@ -106,6 +108,7 @@ class SharedLayout:
     def __init__(self, memory: SharedMemory) -> None:
         self.memory = memory
         self._end = 0
+        self._identity = self._take(LINE)[:8].cast("Q")
         self.heartbeats = Heartbeats(self._take(lines(8 * len(ProcessRole))))
         self.status = Slot(self._take(LINE + _SLOT_BYTES))
         self.recorder = Slot(self._take(LINE + _SLOT_BYTES))
@@ -121,7 +124,28 @@ class SharedLayout:
     @classmethod
     def create(cls) -> "SharedLayout":
         """Return a new, empty board."""
-        return cls(SharedMemory.create(_SIZE))
+        layout = cls(SharedMemory.create(_SIZE))
+        layout._identity[0] = _IDENTITY
+        return layout
+
+    @classmethod
+    def of_process(cls, pid: int) -> "SharedLayout | None":
+        """Return the board of a running process, to be read only; None for none.
+
+        Raises:
+            PermissionError: the process belongs to somebody else.
+            LinkError: it runs another version of this program.
+        """
+        memory = SharedMemory.of_process(pid)
+        if memory is None:
+            return None
+        if len(memory.view) != _SIZE or memory.view[:8].cast("Q")[0] != _IDENTITY:
+            memory.close()
+            raise LinkError(
+                f"Process {pid} runs another version of this program.",
+                hint="Look on with the version that records.",
+            )
+        return cls(memory)
 
     def close(self) -> None:
         """Give the descriptor back."""
@@ -135,23 +159,23 @@ class SharedLayout:
         return Ring(self._take(lines(Ring.size_of(dtype, slots))), dtype, slots)
 
 
-_SIZE = (
-    lines(8 * len(ProcessRole))
-    + 3 * (LINE + _SLOT_BYTES)
-    + LINE
-    + _MARK_BYTES
-    + sum(
-        lines(Ring.size_of(dtype, slots))
-        for dtype, slots in (
-            (COMMAND_DTYPE, COMMAND_SLOTS),
-            (CYCLE.dtype, CYCLE_SLOTS),
-            (WRENCH_DTYPE, WRENCH_SLOTS),
-            (FRAME_DTYPE, FRAME_SLOTS),
-            (TIMING_DTYPE, TIMING_SLOTS),
-            (FORESIGHT.dtype, FORESIGHT_SLOTS),
-        )
-    )
+_RINGS = (
+    (COMMAND_DTYPE, COMMAND_SLOTS),
+    (CYCLE.dtype, CYCLE_SLOTS),
+    (WRENCH_DTYPE, WRENCH_SLOTS),
+    (FRAME_DTYPE, FRAME_SLOTS),
+    (TIMING_DTYPE, TIMING_SLOTS),
+    (FORESIGHT.dtype, FORESIGHT_SLOTS),
 )
+_SIZE = (
+    2 * LINE
+    + lines(8 * len(ProcessRole))
+    + 3 * (LINE + _SLOT_BYTES)
+    + _MARK_BYTES
+    + sum(lines(Ring.size_of(dtype, slots)) for dtype, slots in _RINGS)
+)
+# What tells one layout from another; it is never 0, which new memory is.
+_IDENTITY = 1 + zlib.crc32(repr([(d.descr, n) for d, n in _RINGS]).encode())
 
 
 def pack_wrench(sample: WrenchSample) -> bytes:

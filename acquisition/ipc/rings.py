@@ -14,12 +14,16 @@ import os
 import platform
 import struct
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 
 from acquisition.errors import PreflightError
 from acquisition.sample import Record
 
+_MEMORY_NAME = "traction"
+_MEMORY_LINK = f"/memfd:{_MEMORY_NAME}"
 ORDERED_MACHINES = frozenset({"x86_64", "AMD64", "i386", "i686"})
 
 
@@ -47,21 +51,45 @@ class SharedMemory:
 
     Attributes:
         descriptor: of the file, to be inherited by a child.
-        view: the memory itself, writable.
+        view: the memory itself, writable unless it was only looked up.
     """
 
-    def __init__(self, descriptor: int) -> None:
+    def __init__(self, descriptor: int, *, is_writable: bool = True) -> None:
         """Map the file behind `descriptor`, which belongs to this object now."""
         self.descriptor = descriptor
-        self._map = mmap.mmap(descriptor, os.fstat(descriptor).st_size)
+        access = mmap.ACCESS_WRITE if is_writable else mmap.ACCESS_READ
+        size = os.fstat(descriptor).st_size
+        self._map = mmap.mmap(descriptor, size, access=access)
         self.view = memoryview(self._map)
 
     @classmethod
     def create(cls, size: int) -> "SharedMemory":
         """Return new memory of `size` bytes, all zero."""
-        descriptor = os.memfd_create("traction", os.MFD_CLOEXEC)
+        descriptor = os.memfd_create(_MEMORY_NAME, os.MFD_CLOEXEC)
         os.truncate(descriptor, size)
         return cls(descriptor)
+
+    @classmethod
+    def of_process(cls, pid: int) -> "SharedMemory | None":
+        """Return the memory of another process of the same user, to be read only.
+
+        It is opened anew, for reading, through /proc: nothing is asked of its owner,
+        and nothing can be written. None where the process has none, or has gone.
+
+        Raises:
+            PermissionError: the process belongs to somebody else.
+        """
+        folder = Path(f"/proc/{pid}/fd")
+        try:
+            names = sorted(os.listdir(folder), key=int)  # noqa: PTH208
+            for name in names:
+                with suppress(FileNotFoundError):
+                    if os.readlink(folder / name).startswith(_MEMORY_LINK):  # noqa: PTH115
+                        flags = os.O_RDONLY | os.O_CLOEXEC
+                        return cls(os.open(folder / name, flags), is_writable=False)
+        except (FileNotFoundError, ProcessLookupError):
+            pass
+        return None
 
     def touch(self) -> None:
         """Look at every page, so that none has to be waited for later."""

@@ -12,10 +12,11 @@ from .data_files import (
 )
 from .header import TrialHeader
 from .publishing import make_directories, sync_directory
-from .reader import TrialReader
+from .reader import TopicRows, TrialReader
 from .recover import ROOM, Recovery, recover_file, recovered_path
 from .salvage import recorded_seconds
 from .verify import VerifiedFile, verify_file
+from .views import VIEW_TOPICS, encode_views
 from .writer import (
     FLIGHT_TOPICS,
     FORESIGHT_TOPICS,
@@ -31,7 +32,9 @@ __all__ = [
     "ROOM",
     "TRIAL_TOPICS",
     "TRUTH_TOPICS",
+    "VIEW_TOPICS",
     "Recovery",
+    "TopicRows",
     "TrialHeader",
     "TrialReader",
     "TrialWriter",
@@ -39,6 +42,7 @@ __all__ = [
     "check_absent",
     "check_folders",
     "claimed_folder",
+    "encode_views",
     "is_claimed",
     "is_there",
     "list_folder",

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 
 from acquisition.errors import TrialFileError
 from acquisition.sample import Record
-from acquisition.schema import CYCLE, EARLIER_CYCLES, FORESIGHT, TRUTH, Layout
+from acquisition.schema import (
+    CYCLE,
+    EARLIER_CYCLES,
+    EARLIER_FORESIGHTS,
+    FORESIGHT,
+    TRUTH,
+    Layout,
+)
 from acquisition.trial_file.chunks import Unpacker, as_trial_file_error, parse_chunk
 from acquisition.trial_file.contents import read_contents
 
@@ -101,7 +108,7 @@ class TrialReader:
         if not self.has_foresight:
             empty = np.zeros(0, FORESIGHT.dtype)
             return TopicRows(empty, np.zeros(0, np.uint64), np.zeros(0, np.uint32))
-        return self._rows("/foresight", FORESIGHT)
+        return self._rows("/foresight", FORESIGHT, *EARLIER_FORESIGHTS)
 
     def topic_counts(self) -> dict[str, int]:
         """Return the number of messages per topic, from the statistics."""
@@ -201,10 +208,13 @@ class TrialReader:
 
 
 def _widened(data: Record, newest: Layout) -> Record:
-    """Return messages of an earlier layout in the newest, zero where they lack it."""
+    """Return messages of an earlier layout in the newest, zero where they lack it.
+
+    Names of an earlier layout may have capital letters, those of the newest have none.
+    """
     out = np.zeros(len(data), newest.dtype)
     for name in data.dtype.names or ():
-        out[name] = data[name]
+        out[name.lower()] = data[name]
     return out
 
 

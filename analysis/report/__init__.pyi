@@ -5,12 +5,13 @@ from .friction_page import (
     friction_rows,
 )
 from .page import ReportContext, write_report
-from .page_model import ReportTable
+from .page_model import BedPhoto, ReportTable
 from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
 __all__ = [
     "FRICTION_HEADER",
+    "BedPhoto",
     "FrictionPage",
     "ReportContext",
     "ReportTable",

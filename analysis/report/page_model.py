@@ -71,6 +71,21 @@ class ReportFigure:
 
 
 @dataclass(frozen=True, slots=True)
+class BedPhoto:
+    """A photo of the bed after a trial, small.
+
+    Attributes:
+        title: session and trial.
+        caption: when it was taken, its file and checksum.
+        jpeg: the picture.
+    """
+
+    title: str
+    caption: str
+    jpeg: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class PageSection:
     """One section of the page with everything in it.
 
@@ -102,6 +117,7 @@ class ReportContext:
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
         foresight: for a terrain database beside the report; None = none is written.
+        photos: of the bed after the trials.
     """
 
     title: str
@@ -114,6 +130,7 @@ class ReportContext:
     rig: Sequence[RigTrial] = field(default=())
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
     foresight: ForesightModel | None = None
+    photos: Sequence[BedPhoto] = field(default=())
 
     @property
     def kind(self) -> str:

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from acquisition import SettingsError, SimulationControl
@@ -62,11 +62,16 @@ class PlannedFaults:
         plans: those that have not come yet.
         devices: what fails in the simulated rig.
         host_faults: what fails in the computer.
+        are_any: whether any was asked for, come or not.
     """
 
     plans: list[FaultPlan]
     devices: SimulationControl
     host_faults: HostFaults
+    are_any: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.are_any = bool(self.plans)
 
     def inject_due(self, moment: FaultTrigger, trial: int, seconds: float) -> None:
         """Inject what is due `seconds` after the beginning of a moment in `trial`."""

@@ -1,6 +1,8 @@
 from .console import BAD, GOOD, WARNING, Console, PageRecorder
 from .feedback import FeedbackSignal, OperatorFeedback, build_feedback
+from .graphs import KeptRow, LiveScales, WayTrace, packed, trace_lines
 from .keys import (
+    AFTER_FAULT,
     NOTE_KEYS,
     REJECT_REASONS,
     FootKeys,
@@ -20,13 +22,15 @@ from .screens import (
     ready_lines,
     recording_lines,
 )
-from .scripted import choose_operator
-from .terminal import TerminalInput, keyboard, wait_for_key
+from .scripted import NO_PERSONS, choose_operator
+from .terminal import TerminalInput, keyboard, login_name, wait_for_key
 
 __all__ = [
+    "AFTER_FAULT",
     "BAD",
     "GOOD",
     "NOTE_KEYS",
+    "NO_PERSONS",
     "OTHER_RIG_TEXT",
     "REJECT_REASONS",
     "WARNING",
@@ -35,7 +39,9 @@ __all__ = [
     "FeedbackSignal",
     "FootKeys",
     "ForesightView",
+    "KeptRow",
     "KeyAction",
+    "LiveScales",
     "OperatorFeedback",
     "OperatorInput",
     "PageRecorder",
@@ -44,14 +50,18 @@ __all__ = [
     "ReadyView",
     "RecordingView",
     "TerminalInput",
+    "WayTrace",
     "build_feedback",
     "choose_operator",
     "end_lines",
     "key_action",
     "keyboard",
     "live_line",
+    "login_name",
+    "packed",
     "ready_lines",
     "recording_lines",
     "screen_keys",
+    "trace_lines",
     "wait_for_key",
 ]

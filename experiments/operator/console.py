@@ -8,6 +8,8 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from experiments.operator.graphs import fitted
+
 if TYPE_CHECKING:
     from rich.live import Live
 
@@ -76,7 +78,9 @@ class Console:
             return
         from rich.text import Text
 
-        text = Text("\n".join(lines), no_wrap=True, overflow="ellipsis")
+        size = shutil.get_terminal_size((80, 24))
+        shown = fitted(lines, size.columns, size.lines - 1)
+        text = Text("\n".join(shown), no_wrap=True, overflow="ellipsis")
         try:
             if self._live is None:
                 self._live = self._begin_live()

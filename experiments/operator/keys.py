@@ -1,7 +1,7 @@
 """The one table of the operator's keys: what each does, on screen and in a script."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -30,6 +30,8 @@ class KeyAction(Enum):
     PAUSE = "pause"
     KEEP = "keep"
     REDO = "redo"
+    UNDO = "undo"
+    TICK = "tick"
     RESUME = "resume"
     CLOSE = "close"
     FINISH = "finish"
@@ -72,8 +74,10 @@ class OperatorKey:
         return label + reasons if self.operand is Operand.REASON else label
 
 
+MOST_STEPS = 9  # of a reset, each ticked by its digit
 _CONFIRM = OperatorKey(" ", KeyAction.CONFIRM)
 _QUIT = OperatorKey("q", KeyAction.QUIT, "quit")
+_UNDO = OperatorKey("u", KeyAction.UNDO, "take the newest verdict back, for 10 s")
 _SHORT = {"1": "off the bed", "3": "frame", "4": "sensor"}  # a line has 80 columns
 _REASONS = "  ".join(
     f"{key} {_SHORT.get(key, reason)}" for key, reason in REJECT_REASONS.items()
@@ -95,7 +99,8 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
     Prompt.CLEAR: (_CONFIRM, _QUIT),
     Prompt.MOVING: (_QUIT,),
     Prompt.TOUCH: (_CONFIRM, OperatorKey("d", KeyAction.FINISH), _QUIT),
-    Prompt.LIFT: (_QUIT,),
+    Prompt.LIFT: (replace(_UNDO, word="undo"), _QUIT),
+    Prompt.UNDO: (_CONFIRM, _UNDO, _QUIT),
     Prompt.READY: (
         OperatorKey(" ", KeyAction.RECORD, "record", "[space] record"),
         OperatorKey("n", KeyAction.NOTE, "note", "[n]ote", "note", Operand.TEXT),
@@ -112,6 +117,9 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
             "[q]uit after this",
             "last",
         ),
+        _UNDO,
+        OperatorKey("1", KeyAction.TICK, "to `9` tick a step of the reset"),
+        *(OperatorKey(str(n), KeyAction.TICK) for n in range(2, MOST_STEPS + 1)),
     ),
     Prompt.PAUSED: (_CONFIRM, _QUIT),
     Prompt.RECORDING: (
@@ -133,6 +141,13 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         ),
         OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
     ),
+}
+# How a session goes on after a fault, by what is asked for then; None: it has ended.
+AFTER_FAULT: Mapping[Prompt | None, str] = {
+    None: "run: traction resume",
+    Prompt.READY: "lift the foot for the tare; [space] records again",
+    Prompt.PAUSED: "[space] goes on",
+    Prompt.REVIEW: "give the verdict: [k]eep, or [r]edo and the digit of a reason",
 }
 NOTE_KEYS = "Type the note: Enter ends it, Esc cancels it."
 STOP_KEYS = "Ctrl-C finish safely, twice = stop now"

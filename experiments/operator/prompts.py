@@ -28,6 +28,7 @@ class Prompt(Enum):
     REVIEW = "review"
     NOTE = "note"
     FOOT = "foot"
+    UNDO = "undo"
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,11 @@ class OperatorInput(Protocol):
         """What has been typed of a line so far."""
         ...
 
+    @property
+    def who(self) -> str:
+        """Who presses the keys, in the records of a session without --operator."""
+        ...
+
     def answer(self, state: PromptState) -> str:
         """Return the keys pressed since the last call, "" for none."""
         ...
@@ -73,6 +79,7 @@ class AutoOperator:
     """
 
     draft = ""
+    who = "auto"
 
     def answer(self, state: PromptState) -> str:
         """Return a key as soon as it makes sense."""
@@ -115,4 +122,5 @@ _AUTOMATIC: dict[Prompt, Callable[[PromptState], str]] = {
     Prompt.TOUCH: _touch_key,
     Prompt.REVIEW: _review_key,
     Prompt.FOOT: lambda _: " ",
+    Prompt.UNDO: lambda _: " ",
 }

@@ -1,18 +1,25 @@
 """What the live part of the screen shows, as lines of text; pure."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.operator.graphs import (
+    BarScale,
+    KeptRow,
+    LiveScales,
+    kept_table,
+    sparkline,
+)
 from experiments.operator.keys import STOP_KEYS, screen_keys
 from experiments.operator.prompts import Prompt
 
-_BARS = "▁▂▃▄▅▆▇█"
-_ABSURD = 1e9  # nothing a sensor or an encoder can mean
-_NARROW, _WIDE = 10, 40  # characters of a sparkline
+_FORESEEN, _WIDEST = 10, 60  # characters of a sparkline
+_PROBABILITY = BarScale(1.0, 0.0, 1.0, "", ".2f")
+_TABLE_ROWS = 10  # of the running table
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +57,7 @@ def foresight_line(view: ForesightView) -> str:
     if view.state == OTHER_RIG_TEXT:
         return "foresight: learnt on another foot or rig, nothing is foreseen"
     newest = float(view.slip_probability[-1]) if len(view.slip_probability) else np.nan
-    bars = sparkline(np.nan_to_num(view.slip_probability), _NARROW)
+    bars = sparkline(view.slip_probability, _FORESEEN, _PROBABILITY)
     slip = view.state or f"{newest:.2f}"
     likeliest = sorted(view.terrains.items(), key=lambda one: -one[1])[:_NAMED]
     named = [f"{n} {p:.2f}" for n, p in likeliest if p >= _SHOWN_SHARE]
@@ -81,6 +88,7 @@ class RecordingView:
         is_sensor_fine: the last force sample was fresh and within its range.
         traction: v_t, F_t, F_n of the last seconds [m/s, N, N], shape (n, 3).
         foresight: what is foreseen; None = nothing is.
+        scales: of the bars.
     """
 
     trial: str
@@ -93,47 +101,44 @@ class RecordingView:
     is_sensor_fine: bool
     traction: NDArray[np.float64]
     foresight: ForesightView | None = None
-
-
-def sparkline(values: Sequence[float] | NDArray[np.float64], width: int) -> str:
-    """Return `values` as `width` bars between their smallest and largest.
-
-    Each bar is the largest magnitude of its share, so that a short slip shows.
-    """
-    data = np.asarray(values, dtype=np.float64)
-    data = data[np.abs(data) < _ABSURD]  # no NaN is
-    if not len(data):
-        return " " * width
-    parts = [part for part in np.array_split(data, width) if len(part)]
-    peaks = np.array([part[np.argmax(np.abs(part))] for part in parts])
-    low, high = float(min(peaks.min(), 0.0)), float(peaks.max())
-    span = high - low
-    if span <= 0.0:
-        return (_BARS[0] * len(peaks)).rjust(width)
-    steps = (peaks - low) / span * (len(_BARS) - 1)
-    return "".join(_BARS[round(float(step))] for step in steps).rjust(width)
+    scales: LiveScales = field(default_factory=LiveScales)
 
 
 def recording_lines(view: RecordingView, width: int) -> list[str]:
     """Return the screen of a running trial for a terminal of `width` characters."""
-    bars = _WIDE if width >= 3 * (_WIDE + 14) else _NARROW
     newest = view.traction[-1] if len(view.traction) else np.zeros(3)
-    v_t, F_t, F_n = (float(value) for value in newest)
-    columns = (
-        ("F_n", view.traction[:, 2], f"{F_n:.1f} N"),
-        ("F_t", view.traction[:, 1], f"{F_t:.1f} N"),
-        ("v_t", view.traction[:, 0], f"{v_t:.3f} m/s"),
+    rows = (
+        ("F_n", 2, view.scales.F_n),
+        ("F_t", 1, view.scales.F_t),
+        ("v_t", 0, view.scales.v_t),
     )
     return [
         f"● REC {view.trial}  {view.seconds:04.1f} s  {view.displacement:.2f} of "
-        f"{view.travel:.2f} m  {view.rate:.1f} Hz  missed {view.missed}   "
-        f"CAN {_fine(view.is_arm_fine)}   F/T {_fine(view.is_sensor_fine)}",
-        "   ".join(
-            f"{name} {sparkline(values, bars)} {text}" for name, values, text in columns
+        f"{view.travel:.2f} m  {view.rate:.1f} Hz  missed {view.missed}  "
+        f"CAN {_fine(view.is_arm_fine)}  F/T {_fine(view.is_sensor_fine)}",
+        *(
+            _bar_line(name, view.traction[:, column], float(newest[column]), width, s)
+            for name, column, s in rows
         ),
         *([] if view.foresight is None else [foresight_line(view.foresight)]),
-        f"{screen_keys(Prompt.RECORDING)}    {STOP_KEYS}",
+        screen_keys(Prompt.RECORDING),
+        STOP_KEYS,
     ]
+
+
+def _bar_line(
+    name: str,
+    values: NDArray[np.float64],
+    newest: float,
+    width: int,
+    scale: BarScale,
+) -> str:
+    """Return the bars from 0 to the limit, the newest value and its band."""
+    limit, number = f"{scale.limit:g}", scale.number(newest)
+    words = f"{number:>10}  {scale.band_words(newest)}"
+    room = width - len(name) - len(limit) - len(words) - 5
+    bars = sparkline(values, max(1, min(room, _WIDEST)), scale)
+    return f"{name} 0{bars}{limit}  {words}"
 
 
 def live_line(
@@ -172,8 +177,12 @@ class ReadyView:
         elapsed: since the session was opened [s].
         left: how long the missing ones will take [s]; None = not known yet.
         reset: what is to be done to the terrain before each trial.
+        ticked: numbers of the steps of `reset` that are done, from 1.
         suggestion: of the next push; empty if there is none.
         enough: why there are enough trials; empty if there are not.
+        table: the kept trials, oldest first.
+        given: the newest verdict while it can be taken back; empty afterwards.
+        undo_left: how long that is [s].
     """
 
     session: str
@@ -187,22 +196,31 @@ class ReadyView:
     reset: tuple[str, ...]
     suggestion: str
     enough: str = ""
+    ticked: frozenset[int] = frozenset()
+    table: tuple[KeptRow, ...] = ()
+    given: str = ""
+    undo_left: float = 0.0
 
 
-def ready_lines(view: ReadyView) -> list[str]:
-    """Return the screen between two trials."""
+def ready_lines(view: ReadyView, width: int = 80) -> list[str]:
+    """Return the screen between two trials for a terminal of `width` characters."""
     left = "" if view.left is None else f" · left about {ceil(view.left / 60)} min"
     lines = [
-        f"{view.session} {view.terrain} · trial {view.trial} of {view.wanted} · kept "
-        f"{view.kept} · rejected {view.rejected}    ARM: floating",
+        f"ARM: floating  {view.session} {view.terrain} · trial {view.trial} of "
+        f"{view.wanted} · kept {view.kept} · rejected {view.rejected}",
         f"Elapsed {_clock(view.elapsed)}{left}",
+        *kept_table(view.table, width, _TABLE_ROWS),
     ]
     if view.reset:
-        lines.append("Reset: " + " ".join(f"☐ {step}" for step in view.reset))
+        boxes = enumerate(view.reset, 1)
+        steps = (f"{n} {'☑' if n in view.ticked else '☐'} {s}" for n, s in boxes)
+        lines.append("Reset (its digit ticks a step):  " + "  ".join(steps))
     if view.suggestion:
         lines.append(f"Suggested next: {view.suggestion}")
     if view.enough:
         lines.append(f"Enough: {view.enough}")
+    if view.given and view.undo_left > 0.0:
+        lines.append(f"{view.given}.  [u]ndo ({ceil(view.undo_left)} s)")
     return lines
 
 

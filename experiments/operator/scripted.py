@@ -15,7 +15,9 @@ from experiments.operator.prompts import (
 )
 from experiments.operator.terminal import TerminalInput
 
-_WORDS = script_keys(Prompt.READY) | script_keys(Prompt.REVIEW)
+_PROMPTS = (Prompt.LIFT, Prompt.READY, Prompt.REVIEW)
+_WORDS = {word: key for prompt in _PROMPTS for word, key in script_keys(prompt).items()}
+NO_PERSONS = frozenset({AutoOperator.who, "script"})  # that answer prompts
 
 
 def choose_operator(script: str | None, *, is_fake: bool) -> OperatorInput:
@@ -41,14 +43,15 @@ class ScriptedOperator:
 
     At a review: `keep`, `redo REASON` (1-5), `remark TEXT` (a note on the trial),
     `quit`. Between trials, before the next one begins: `pause`, `note TEXT`, `view`,
-    `last` (quit after the next trial). `#` begins a comment. After the last line
-    everything that is complete is kept.
+    `last` (quit after the next trial), `undo` (take the verdict before it back). `#`
+    begins a comment. After the last line everything that is complete is kept.
 
     Raises:
         SettingsError: the file cannot be read or a line is none of these.
     """
 
     draft = ""
+    who = "script"  # one of NO_PERSONS
 
     def __init__(self, path: Path) -> None:
         self._auto = AutoOperator()
@@ -93,7 +96,7 @@ def _parse(path: Path, number: int, words: list[str]) -> tuple[str, str]:
         return word, rest
     raise SettingsError(
         f"{path}, line {number}: {' '.join(words)!r} - expected keep, redo 1..5 or "
-        "quit; remark TEXT; or between trials pause, note TEXT, view or last.",
+        "quit; remark TEXT; or between trials pause, note TEXT, view, last or undo.",
         hint="Nothing was started.",
     )
 

@@ -4,6 +4,7 @@ import atexit
 import codecs
 import contextlib
 import os
+import pwd
 import select
 import termios
 import tty
@@ -69,6 +70,14 @@ def keyboard(operator: OperatorInput) -> contextlib.AbstractContextManager[objec
     return contextlib.nullcontext()
 
 
+def login_name() -> str:
+    """Return the name of the person who is logged in."""
+    try:
+        return pwd.getpwuid(os.getuid()).pw_name
+    except KeyError:
+        return f"user {os.getuid()}"
+
+
 def wait_for_key(operator: OperatorInput, prompt: Prompt) -> KeyAction:
     """Wait for a key of `prompt` while no loop runs; return what it does."""
     clock = SystemClock()
@@ -98,6 +107,11 @@ class TerminalInput:
         self._is_end = False
         self._is_rejecting = False
         self._prompt: Prompt | None = None
+
+    @property
+    def who(self) -> str:
+        """The person who is logged in."""
+        return login_name()
 
     def answer(self, state: PromptState) -> str:
         """Return the next key that was pressed, "" for none, q when all have gone.

@@ -7,7 +7,7 @@ from .foresight import (
     replay_foresight,
     study_foresight,
 )
-from .playback import play
+from .playback import play, serve
 from .progress import fitting
 from .publication import PublishRequest, publish_sessions
 from .quantities import KEPT, QUANTITIES
@@ -54,6 +54,7 @@ __all__ = [
     "replay_foresight",
     "report_sessions",
     "require_samples",
+    "serve",
     "study_foresight",
     "tell_missing",
     "z_scores",

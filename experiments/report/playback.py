@@ -1,17 +1,35 @@
-"""A recorded trial shown again: the live screen, from the file; nothing moves."""
+"""A recorded trial shown again, on the screen or to viewers; nothing moves."""
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag
+from acquisition import MOTOR_FRESH_SHIFT, NS_PER_S, RATE_HZ, Clock, Flag, parse_toml
+from acquisition.trial_file import TopicRows, TrialReader
 from analysis.data import RecordedTrial, load_trial
-from experiments.operator import Console, RecordingView, recording_lines
+from experiments.live import (
+    DESCRIPTION_TOPIC,
+    FORESIGHT_TOPIC,
+    HOST,
+    LIVE_TOPICS,
+    LiveEncoder,
+    LiveServer,
+    PlaybackWish,
+    layout_path,
+    stamped_foresight,
+)
+from experiments.operator import Console, LiveScales, RecordingView, recording_lines
 
 _PICTURES = 8  # per second of the person's time
 _LINES = 1.0  # seconds of the trial between two lines without a terminal
 _HISTORY = 5.0  # s of traction in the sparklines
+_SERVE_NS = 20_000_000  # 50 Hz
+_DESCRIBE_EVERY = 50  # sendings between two of the arm's URDF
 _ALL_MOTORS = 0x7F << MOTOR_FRESH_SHIFT
 
 
@@ -23,13 +41,15 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
     """
     trial = load_trial(path)
     start_ns = clock.now_ns()
+    scales = _scales_of(path)
     step = speed / _PICTURES if console.is_live else _LINES
     for row in _rows(trial, step):
         due_ns = start_ns + round(float(trial.t[row]) / speed * NS_PER_S)
         clock.sleep_until(due_ns)
         if console.is_lost:
             return
-        lines = recording_lines(_view(trial, row), console.width)[:-1]
+        view = replace(_view(trial, row), scales=scales)
+        lines = recording_lines(view, console.width)[:-2]
         if console.is_live:
             console.panel(lines)
         else:
@@ -37,6 +57,21 @@ def play(path: Path, speed: float, clock: Clock, console: Console) -> None:
     console.end_panel()
     if console.is_live:
         console.say(_line(trial, len(trial.t) - 1))
+
+
+def _scales_of(path: Path) -> LiveScales:
+    """Return the scales of the limits that were set when it was recorded."""
+    config = TrialReader(path).attachments.get("config.toml", b"")
+    try:
+        limits: Any = parse_toml(config.decode()).get("limits", {})
+    except ValueError:
+        return LiveScales()
+    known = {
+        field.name: float(limits[field.name])
+        for field in fields(LiveScales)
+        if isinstance(limits.get(field.name), float | int) and limits[field.name] > 0
+    }
+    return LiveScales(**known)
 
 
 def _rows(trial: RecordedTrial, step: float) -> Iterator[int]:
@@ -75,3 +110,113 @@ def _line(trial: RecordedTrial, row: int) -> str:
         f"{trial.frame.travel:.2f} m  F_n {F_n:.1f} N  F_t {F_t:.1f} N  "
         f"v_t {v_t:.3f} m/s"
     )
+
+
+@dataclass(slots=True)
+class _Player:
+    """Where a served playback stands.
+
+    Attributes:
+        t_ns: log times of the cycles [UTC ns], shape (n,).
+        wish: how it runs now.
+        row: of the newest cycle that was sent.
+    """
+
+    t_ns: NDArray[np.int64]
+    wish: PlaybackWish
+    row: int = -1
+    _from: tuple[int, int] = (0, 0)  # when [ns] it was at which UTC [ns]
+
+    def follow(self, wish: PlaybackWish, now_ns: int) -> None:
+        """Run as wished from now on."""
+        at = self.position(now_ns) if wish.seek_ns is None else wish.seek_ns
+        at = min(max(at, int(self.t_ns[0])), int(self.t_ns[-1]))
+        if wish.seek_ns is not None:
+            self.row = int(np.searchsorted(self.t_ns, at)) - 1
+        self.wish, self._from = wish, (now_ns, at)
+
+    def position(self, now_ns: int) -> int:
+        """Return where it stands [UTC ns]."""
+        began_ns, at = self._from
+        is_moving = self.wish.is_playing
+        passed = round((now_ns - began_ns) * self.wish.speed) if is_moving else 0
+        return min(at + passed, int(self.t_ns[-1]))
+
+    def is_at_end(self) -> bool:
+        """Whether the last cycle was sent."""
+        return self.row >= len(self.t_ns) - 1
+
+
+def serve(
+    path: Path,
+    speed: float,
+    port: int,
+    clock: Clock,
+    console: Console,
+    is_over: Callable[[], bool],
+) -> None:
+    """Serve the trial in `path` to viewers, which may pause and seek, until it is over.
+
+    Raises:
+        TrialFileError: the file is no sound trial.
+        MissingLibraryError: foxglove-sdk is not installed.
+        SettingsError: the port is taken.
+    """
+    reader = TrialReader(path)
+    rows, foresight = reader.cycles(), reader.foresight()
+    t_ns = rows.log_time.astype(np.int64)
+    encoder = LiveEncoder(
+        reader.attachments.get("robot.urdf", b"<robot/>").decode(errors="replace"),
+        reader.attachments.get("config.toml", b"").decode(errors="replace"),
+    )
+    wishes: deque[PlaybackWish] = deque()
+    span = (int(t_ns[0]), int(t_ns[-1]))
+    player = _Player(t_ns, PlaybackWish(True, speed, None, None))
+    server = LiveServer(port, LIVE_TOPICS, span_ns=span, hear=wishes.append)
+    console.say(f"Serving {path.stem} at ws://{HOST}:{server.port}. Ctrl-C ends this.")
+    console.say(f"Layout for the viewer: {layout_path()}")
+    try:
+        player.follow(replace(player.wish, seek_ns=span[0]), clock.now_ns())
+        tick = 0
+        while not is_over():
+            now_ns = clock.now_ns()
+            while wishes:
+                player.follow(wishes.popleft(), now_ns)
+                server.tell_playback(
+                    player.wish, player.position(now_ns), is_over=False
+                )
+            if tick % _DESCRIBE_EVERY == 0:
+                described = {DESCRIPTION_TOPIC: encoder.description}
+                server.publish(described, player.position(now_ns))
+            tick += 1
+            _send(server, player, (rows, foresight, encoder), now_ns)
+            clock.sleep_until(now_ns + _SERVE_NS)
+    finally:
+        server.close()
+
+
+def _send(
+    server: LiveServer,
+    player: _Player,
+    content: tuple[TopicRows, TopicRows, LiveEncoder],
+    now_ns: int,
+) -> None:
+    """Send what lies between the newest message and where the playback stands.
+
+    Cycles go out at 50 Hz of the person's time, the newest of each share.
+    """
+    rows, foresight, encoder = content
+    at = player.position(now_ns)
+    row = int(np.searchsorted(player.t_ns, at, side="right")) - 1
+    if row <= player.row:
+        return
+    t_ns = int(player.t_ns[row])
+    messages = encoder.messages(rows.data[row], t_ns)
+    foreseen = int(np.searchsorted(foresight.log_time, t_ns, side="right")) - 1
+    if foreseen >= 0:
+        messages[FORESIGHT_TOPIC] = stamped_foresight(foresight.data[foreseen], t_ns)
+    server.publish(messages, t_ns)
+    server.tell_time(t_ns)
+    player.row = row
+    if player.is_at_end():
+        server.tell_playback(player.wish, t_ns, is_over=True)

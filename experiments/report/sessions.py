@@ -14,6 +14,7 @@ from analysis.data import (
 from analysis.findings import summarise_rig
 from analysis.foresight import fit_foresight, watch_all
 from analysis.report import (
+    BedPhoto,
     ReportContext,
     plain_choice,
     side_by_side,
@@ -44,6 +45,7 @@ from experiments.session import (
     find_session,
     iso_utc,
     list_sessions,
+    photos_of,
     replay,
     write_new_text,
 )
@@ -104,9 +106,8 @@ def choose_sessions(
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
         message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
-        raise SessionError(
-            message.what.format_map(values), hint=message.do.format_map(values)
-        )
+        what, hint = (t.format_map(values) for t in (message.what, message.do))
+        raise SessionError(what, hint=hint)
     return sessions
 
 
@@ -186,9 +187,8 @@ def study_sessions(
     trials, problems = _load_trials(sessions, console)
     count = sum(len(group) for group in trials.values())
     if not count:
-        raise SessionError(
-            f"{', '.join(s.id for s in sessions)}: no kept trials to report."
-        )
+        ids = ", ".join(s.id for s in sessions)
+        raise SessionError(f"{ids}: no kept trials to report.")
     trials = {name: trials[name] for name in order.sorted(trials)}
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     is_simulated = sessions[0].is_simulated
@@ -266,13 +266,12 @@ def report_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    bounds = order.choices.bounds
-    fit = FitOptions(bounds=bounds, seed=order.seed, models=REPORTED)
+    fit = FitOptions(order.choices.bounds, seed=order.seed, models=REPORTED)
     analysed = study_sessions(sessions, data, order, console, fit)
     study, trials = analysed.study, analysed.trials
     store = ResultStore(data / FOLDS)
     others = repeat_study(study, trials, order.choices.variants, console, store)
-    foresight = study_foresight(study, trials)
+    foresight, (photos, unsound) = study_foresight(study, trials), photos_of(sessions)
     count = sum(len(group) for group in trials.values())
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
@@ -291,7 +290,8 @@ def report_sessions(
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
         },
-        warnings=[*order.missing, *analysed.problems],
+        warnings=[*order.missing, *analysed.problems, *unsound],
+        photos=[BedPhoto(*photo) for photo in photos],
         rig=summarise_rig([trial for group in trials.values() for trial in group]),
         foresight=foresight.model if len(sessions) > 1 else None,
     )

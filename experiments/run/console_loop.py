@@ -8,9 +8,21 @@ from typing import TypeVar
 from acquisition.control_loop import ArmState, GuardVerdict
 from acquisition.ipc import LoopClient
 from experiments.fault_injection import FaultTrigger, PlannedFaults
-from experiments.operator import Console, OperatorInput, Prompt, PromptState
+from experiments.operator import (
+    Console,
+    KeyAction,
+    OperatorInput,
+    Prompt,
+    PromptState,
+    key_action,
+)
 from experiments.rig import Rig, SimulatedHand
-from experiments.run.stop import ArmFaultError, StopFlag, StopRequestedError
+from experiments.run.stop import (
+    ArmFaultError,
+    StopFlag,
+    StopRequestedError,
+    UndoRequestedError,
+)
 from experiments.session import TrialName
 
 TICK = 0.02  # period of the console [s]
@@ -18,6 +30,7 @@ REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
 _AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED})  # nothing is wanted of the arm
+_TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
 View = Callable[[int], list[str]]
 
@@ -33,6 +46,7 @@ class ConsoleLoop:
         stop: requests to stop.
         hand: of a simulated operator; None where a person moves the arm.
         faults: to be injected into a rehearsal; None on a real rig.
+        undo_until_ns: until when the newest verdict can be taken back [ns].
     """
 
     rig: Rig
@@ -41,6 +55,7 @@ class ConsoleLoop:
     stop: StopFlag
     hand: SimulatedHand | None = None
     faults: PlannedFaults | None = None
+    undo_until_ns: int = 0
     _view: View | None = field(default=None, init=False)
     _shown_ns: int = field(default=0, init=False)
     _prompt: tuple[Prompt, int, int] | None = field(default=None, init=False)
@@ -66,6 +81,7 @@ class ConsoleLoop:
             ArmFaultError: the guard stopped the arm. Where nothing is wanted of the
                 arm, a fault that persists is raised once: keys are read again.
             StopRequestedError: a stop was requested; at the review `StopFlag` says so.
+            UndoRequestedError: the newest verdict is taken back, in time.
             TractionError: a process or the disk failed.
         """
         state = self._advance(prompt, name, is_complete=is_complete)
@@ -74,7 +90,17 @@ class ConsoleLoop:
         key = self.operator.answer(state)
         if key == "q" and prompt not in _OWN_QUIT:
             raise StopRequestedError
+        if key_action(prompt, key) is KeyAction.UNDO:
+            if self.undo_left > 0.0:
+                raise UndoRequestedError
+            self.console.say(_TOO_LATE)
+            return ""
         return key
+
+    @property
+    def undo_left(self) -> float:
+        """How long the newest verdict can still be taken back [s], 0 = not any more."""
+        return max(0.0, (self.undo_until_ns - self.rig.clock.now_ns()) * 1e-9)
 
     def line(self, name: TrialName) -> str | None:
         """Let 20 ms pass; return a note once typed, "" if given up, None before.

@@ -7,19 +7,39 @@ from acquisition import TractionError
 from acquisition.control_loop import GuardVerdict
 from acquisition.ipc import LoopClient
 from analysis.next_push import Aim
-from experiments.messages import FaultContext, fault_text
+from experiments.messages import ComputerLoad, FaultContext, fault_text
 from experiments.operator import (
     Console,
     FootKeys,
     OperatorFeedback,
     OperatorInput,
+    Prompt,
     build_feedback,
+    packed,
+    screen_keys,
 )
 from experiments.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session import Event, Journal, TrialName
+from experiments.session import KEEP, REJECT, Camera, Event, Journal, TrialName
 from experiments.trial import SessionMetadata, TrialArchive
+
+UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
+
+
+@dataclass(frozen=True, slots=True)
+class GivenVerdict:
+    """A verdict that was just given.
+
+    Attributes:
+        name: of the attempt.
+        is_kept: it was kept, not rejected.
+        text: the verdict in words.
+    """
+
+    name: TrialName
+    is_kept: bool
+    text: str
 
 
 @dataclass(slots=True)
@@ -44,6 +64,10 @@ class RunContext:
         is_last: no trial begins after this one.
         estimate: expected duration, as of the first kept trial [s].
         aim: of the push that was suggested last; None where there was none.
+        given: the newest verdict; None before the first, or after it was taken back.
+        ticked: numbers of the steps of the reset that were ticked.
+        camera: where photos of the bed come from.
+        trial_began_utc_ns: when the newest trial began [UTC ns], by this computer.
     """
 
     console_loop: ConsoleLoop
@@ -63,6 +87,10 @@ class RunContext:
     is_last: bool = False
     estimate: float | None = None
     aim: Aim | None = None
+    given: GivenVerdict | None = None
+    ticked: set[int] = field(default_factory=set[int])
+    camera: Camera = field(default_factory=lambda: Camera("", None, 0.0))
+    trial_began_utc_ns: int = 0
 
     @property
     def loop_client(self) -> LoopClient:
@@ -84,6 +112,10 @@ class RunContext:
     def say(self, text: str) -> None:
         """Print one line."""
         self.console.say(text)
+
+    def say_keys(self, prompt: Prompt) -> None:
+        """Print the keys of `prompt`, none of them broken."""
+        self.say(packed(screen_keys(prompt), self.console.width))
 
     def say_page(self, lines: Iterable[str]) -> None:
         """Print lines that can be viewed again."""
@@ -107,7 +139,10 @@ class RunContext:
     def fault_text(self, verdict: GuardVerdict) -> str:
         """Return why the guard stopped the arm, and what is safe."""
         bus = self.loop_client.loop.bus_condition
-        context = replace(self.fault_context, bus=bus)
+        faults = self.console_loop.faults
+        is_rehearsed = faults is not None and faults.are_any
+        load = busy_load(self.rig, is_rehearsed=is_rehearsed)
+        context = replace(self.fault_context, bus=bus, load=load)
         return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:
@@ -152,6 +187,56 @@ class RunContext:
         """Reject a trial."""
         self.record_verdict(Event.TRIAL_REJECTED, name, reason)
 
+    def open_undo(self, name: TrialName, reason: str, *, is_kept: bool) -> None:
+        """Say which verdict was given; from now on it can be taken back for 10 s."""
+        text = f"{name.kept} kept" if is_kept else f"{name.kept} rejected: {reason}"
+        if self.is_last:  # the session ends now
+            self.given = None
+            self.say(f"{text}.")
+            return
+        self.given = GivenVerdict(name, is_kept, text)
+        self.console_loop.undo_until_ns = self.rig.clock.now_ns() + UNDO_NS
+        self.say(f"{text}. [u] within {UNDO_NS * 1e-9:.0f} s takes this back.")
+
+    def change_verdict(
+        self, given: GivenVerdict, *, is_kept: bool, reason: str
+    ) -> None:
+        """Put another verdict in the place of a given one; the same changes nothing.
+
+        It is one entry of the journal: where the program dies before it, what was
+        given stands, and no kept trial is lost.
+        """
+        name = given.name
+        if is_kept and given.is_kept:
+            self.say(f"{name.kept} stays kept.")
+            return
+        self.append(
+            Event.VERDICT,
+            trial=name.number,
+            attempt=name.attempt,
+            verdict=KEEP if is_kept else REJECT,
+            reason=reason or "taken back within seconds",
+            who=self.metadata.operator,
+        )
+        self.open_undo(name, reason, is_kept=is_kept)
+
+    def close_undo(self) -> GivenVerdict | None:
+        """Return the newest verdict; it cannot be taken back any more."""
+        given, self.given = self.given, None
+        self.console_loop.undo_until_ns = 0
+        return given
+
+
+def busy_load(rig: Rig, *, is_rehearsed: bool) -> ComputerLoad | None:
+    """Return the computer's load where it makes a simulation late, else None.
+
+    That is on the wall clock, where no fault was asked for and programs wait for cores.
+    """
+    if not rig.is_simulated or rig.is_stepped or is_rehearsed:
+        return None
+    load = ComputerLoad.now()
+    return load if load.is_too_much else None
+
 
 def open_context(
     console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
@@ -170,4 +255,12 @@ def open_context(
         feedback=build_feedback(rig.settings.rig.operator, console),
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
+        camera=camera_of(rig),
     )
+
+
+def camera_of(rig: Rig) -> Camera:
+    """Return the camera of rig.toml; its folder is one below that of rig.toml."""
+    wanted = rig.settings.rig.camera
+    folder = rig.settings.folder / wanted.folder if wanted.folder else None
+    return Camera(wanted.command, folder, wanted.seconds)

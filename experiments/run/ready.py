@@ -20,7 +20,7 @@ from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import LONGEST_TEXT, Event, TrialName, add_remark, clean_text
-from experiments.trial import next_push, review_trial
+from experiments.trial import kept_rows, next_push, review_trial
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
 _READY_SECONDS = 0.1  # from the request for hold to its first torques
@@ -78,13 +78,16 @@ def wait_ready(context: RunContext, name: TrialName) -> None:
     console_loop, feet = context.console_loop, context.watch_foot()
     while True:
         _show(context)
-        action = None
+        action, key = None, ""
         while action is None:
             key = console_loop.tick(Prompt.READY, name) or feet.key(" ")
             action = key_action(Prompt.READY, key)
         console_loop.show(None)
         if action is KeyAction.RECORD:
             return
+        if action is KeyAction.TICK:
+            context.ticked ^= {int(key)}
+            continue
         _ACTIONS[action](context, name)
 
 
@@ -106,6 +109,10 @@ def ready_view(context: RunContext) -> ReadyView:
         reset=row.reset,
         suggestion=push.text,
         enough=push.enough,
+        ticked=frozenset(context.ticked),
+        table=kept_rows(folder),
+        given=context.given.text if context.given is not None else "",
+        undo_left=context.console_loop.undo_left,
     )
 
 
@@ -159,9 +166,13 @@ def _show(context: RunContext) -> None:
         return
 
     def now(width: int) -> list[str]:
-        del width
-        newer = replace(view, elapsed=context.elapsed, left=context.time_left)
-        return [*ready_lines(newer), screen_keys(Prompt.READY)]
+        newer = replace(
+            view,
+            elapsed=context.elapsed,
+            left=context.time_left,
+            undo_left=context.console_loop.undo_left,
+        )
+        return [*ready_lines(newer, width), screen_keys(Prompt.READY)]
 
     context.console_loop.show(now)
 
@@ -176,6 +187,8 @@ def _note(context: RunContext, name: TrialName) -> None:
 def _pause(context: RunContext, name: TrialName) -> None:
     context.loop_client.request(ArmState.HOLD)
     context.append(Event.PAUSED)
+    before = context.fault_context
+    context.fault_context = replace(before, prompt=Prompt.PAUSED)
     is_over = False
     while not is_over:
         context.say("Paused. ARM: holding. [space] to go on.")
@@ -185,6 +198,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
             is_over = True
         except ArmFaultError as fault:
             context.clear_faults(fault)  # and there is no answer: the pause goes on
+    context.fault_context = before
     context.append(Event.CONTINUED)
     context.loop_client.request(ArmState.FLOAT)
 

@@ -4,7 +4,14 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from acquisition import MOTOR_FRESH_SHIFT, RATE_HZ, Flag, TractionError, TrialFileError
+from acquisition import (
+    MOTOR_FRESH_SHIFT,
+    RATE_HZ,
+    Flag,
+    SystemClock,
+    TractionError,
+    TrialFileError,
+)
 from acquisition.control_loop import Action, ArmState
 from acquisition.ipc import ProcessLostError
 from acquisition.trial_file import TrialHeader
@@ -14,6 +21,7 @@ from experiments.operator import (
     WARNING,
     FeedbackSignal,
     ForesightView,
+    LiveScales,
     Prompt,
     RecordingView,
     live_line,
@@ -22,9 +30,16 @@ from experiments.operator import (
 from experiments.rig import Rig, foresight_view
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
+from experiments.run.photo import take_photo
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import Event, TrialName, TrialOutcome
-from experiments.trial import EndDetector, PaceMonitor, review_trial, trial_header
+from experiments.trial import (
+    EndDetector,
+    PaceMonitor,
+    kept_traces,
+    review_trial,
+    trial_header,
+)
 from wam.control import SWUNG_MOTOR
 
 HISTORY = 5.0  # s of traction in the sparklines
@@ -36,7 +51,8 @@ def recording_screen(
     rig: Rig, trial: str, outcome: TrialOutcome
 ) -> Callable[[int], list[str]]:
     """Return what draws trial `trial`, whose `outcome` is kept up to date."""
-    loop_client = rig.backend.loop_client
+    loop_client, limits = rig.backend.loop_client, rig.settings.rig.limits
+    scales = LiveScales(limits.foot_speed, limits.contact_force)
     missed_before = loop_client.loop.skipped + loop_client.loop.late
 
     def lines(width: int) -> list[str]:
@@ -56,6 +72,7 @@ def recording_screen(
             is_sensor_fine=is_sensor_fine,
             traction=np.array(records["traction"]),
             foresight=_foreseen(rig, int(records["cycle"][-1])),
+            scales=scales,
         )
         return recording_lines(view, width)
 
@@ -123,8 +140,13 @@ def _record(
     path = context.metadata.folder.trials / f"{name.kept}.mcap"
     recorder, console_loop = context.rig.backend.recorder, context.console_loop
     _set_aside(context, name.number)
-    details = {"trial": name.number, "attempt": name.attempt}
+    details: dict[str, object] = {"trial": name.number, "attempt": name.attempt}
+    if context.ticked:
+        steps = enumerate(context.rig.row.reset, 1)
+        details["reset"] = [step for n, step in steps if n in context.ticked]
+        context.ticked.clear()
     context.append(Event.TRIAL_STARTED, **details)
+    context.trial_began_utc_ns = SystemClock().utc_ns()
     recorder.start(path, header)
     recorder.event(20, "operator", "trial started")
     context.loop_client.watch_trial(is_recording=True)
@@ -204,8 +226,11 @@ def _end(
         review = context.console_loop.run_aside(lambda: review_trial(path, context.aim))
         lines = [f" {m} {text}" for m, text in review.lines(archive.kept_ratios())]
         warnings = [f" {WARNING} {line}" for line in rubbing]
-        context.say_page([written, *lines, *warnings])
+        kept = kept_traces(context.metadata.folder)
+        traces = review.trace_lines(kept, name.kept, context.console.width)
+        context.say_page([written, *lines, *warnings, *traces])
         archive.write_sidecar(name, verified, outcome, review)
+        take_photo(context, name)
         return
     context.say(written)
     context.reject(name, f"interrupted: {outcome.reason}")

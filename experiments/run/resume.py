@@ -13,6 +13,7 @@ from acquisition import SessionError, SettingsError, SystemClock
 from experiments.arguments import PACES
 from experiments.messages import CATALOGUE
 from experiments.operator import (
+    NO_PERSONS,
     WARNING,
     Console,
     KeyAction,
@@ -245,21 +246,20 @@ def _reopen(
     folder, console = journal.folder, request.console
     reason = refusal(journal.state, {"event": event, **details})
     if reason:
-        raise SessionError(
-            f"{folder.id} cannot be opened: {reason}.", hint="Nothing was started."
-        )
+        why = f"{folder.id} cannot be opened: {reason}."
+        raise SessionError(why, hint="Nothing was started.")
     before = _last_opening(journal)
-    config = request.config or _config_of(before)
-    settings = load_settings(config)
+    settings = load_settings(config := request.config or _config_of(before))
     fake = fake_of(before, request) if folder.is_simulated else None
+    operator = choose_operator(request.script, is_fake=folder.is_simulated)
     session = SessionRequest(
         data=request.data,
         settings=settings,
         config=config,
         row=settings.row(folder.terrain),
         fake=fake,
-        operator_name=request.operator or str(before.get("operator") or ""),
-        operator=choose_operator(request.script, is_fake=folder.is_simulated),
+        operator_name=request.operator or _person_of(before, operator),
+        operator=operator,
         console=console,
         faults=request.faults,
         can_log=request.can_log,
@@ -277,6 +277,12 @@ def _last_opening(journal: Journal) -> dict[str, Any]:
         if event.get("event") in _OPENINGS:
             opening = event
     return opening
+
+
+def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
+    """Return the name of a session's person for a person; "" for who answers now."""
+    name = str(opening.get("operator") or "")
+    return "" if NO_PERSONS & {name, operator.who} else name
 
 
 def _config_of(opening: Mapping[str, Any]) -> Path | None:

@@ -1,6 +1,9 @@
 """The runner: lift, tare, put down, record, review, until the session is complete."""
 
 import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
 
 from acquisition import TractionError
 from acquisition.control_loop import ArmState
@@ -8,19 +11,20 @@ from analysis.data import MINIMUM_TRAVEL_SHARE
 from experiments.arguments import data_option
 from experiments.messages import CATALOGUE, FaultContext, rest_text
 from experiments.operator import (
+    NO_PERSONS,
     REJECT_REASONS,
     EndView,
     KeyAction,
     Prompt,
     end_lines,
     key_action,
-    screen_keys,
 )
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext, open_context
+from experiments.run.photo import collect_photo
 from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
-from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
 from experiments.session import Event, Journal, TrialName, TrialOutcome, write_text
 from experiments.trial import SessionMetadata
@@ -64,6 +68,7 @@ class SessionRunner:
             context.say(CATALOGUE["interrupted"].text({}, context.journal.saved()))
         except ArmFaultError as fault:
             code, reason = 4, fault.verdict.reason
+            context.fault_context = replace(context.fault_context, prompt=None)
             context.report_fault(fault.verdict)
         except TractionError as error:
             code, reason = error.exit_code, "error"
@@ -84,19 +89,41 @@ class SessionRunner:
         activate(context.console_loop)
         context.append(Event.ACTIVATED)
         prove_mounting(context)
-        while not context.journal.state.is_over:
-            self._try_trial()
-            context.update_estimate()
-            if context.is_last and not context.journal.state.is_over:
-                raise StopRequestedError
-        take_end_tare(context)
+        is_over = False
+        while not is_over:
+            while not context.journal.state.is_over:
+                self._try(self._run_trial)
+                context.update_estimate()
+                if context.is_last and not context.journal.state.is_over:
+                    raise StopRequestedError
+            self._try(self._close_session)
+            is_over = context.journal.state.is_over
 
-    def _try_trial(self) -> None:
-        """One trial; a fault that leaves the arm holding does not end the session."""
+    def _close_session(self) -> None:
+        """Tare once more, and let the last verdict be taken back."""
+        context = self._context
+        take_end_tare(context)
+        if context.given is None or context.operator.who in NO_PERSONS:
+            return
+        context.say("[space] to end the session  [u]ndo the verdict")
+        while context.console_loop.undo_left:
+            with suppress(StopRequestedError):  # everything is kept: [q] ends it too
+                if context.console_loop.tick(Prompt.UNDO) != " ":
+                    continue
+            return
+
+    def _try(self, step: Callable[[], None]) -> None:
+        """Do one step; a fault that leaves the arm holding does not end the session.
+
+        Nor does a verdict that is taken back in it: the trial is judged again.
+        """
         context = self._context
         context.fault_context = FaultContext()
         try:
-            self._run_trial()
+            try:
+                step()
+            except UndoRequestedError:
+                judge_again(context)
         except ArmFaultError as fault:
             self._faults += 1
             if self._faults >= FAULTS_IN_A_ROW:
@@ -113,6 +140,7 @@ class SessionRunner:
         take_tare(context, name)
         context.loop_client.request(ArmState.FLOAT)
         wait_ready(context, name)
+        context.close_undo()
         outcome = record_trial(context, name)
         ask_verdict(context, name, outcome)
 
@@ -158,8 +186,8 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
         ArmFaultError: the arm is not under control; the trial is rejected.
         StopRequestedError: the session is to end; the trial is rejected.
     """
-    context.say(screen_keys(Prompt.REVIEW))
-    context.fault_context = FaultContext(name.kept)
+    context.say_keys(Prompt.REVIEW)
+    context.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
     is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
     is_asked = not is_whole  # one that is not whole is rejected by [q] at once
     feet = context.watch_foot()
@@ -168,7 +196,7 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
             key = context.console_loop.tick(Prompt.REVIEW, name, is_complete=is_whole)
             if key_action(Prompt.REVIEW, key) is KeyAction.NOTE:
                 take_note(context, name, is_on_trial=True)
-                context.say(screen_keys(Prompt.REVIEW))
+                context.say_keys(Prompt.REVIEW)
         except ArmFaultError as fault:
             try:
                 context.clear_faults(fault)
@@ -192,16 +220,54 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
     """
     action = key_action(Prompt.REVIEW, key)
     if action is KeyAction.KEEP:
+        collect_photo(context, name)
         context.record_verdict(Event.TRIAL_KEPT, name, "")
+        context.open_undo(name, "", is_kept=True)
         return True
     if action is KeyAction.REDO:
-        context.reject(name, REJECT_REASONS[key[1:]])
+        reason = REJECT_REASONS[key[1:]]
+        collect_photo(context, name)
+        context.reject(name, reason)
+        context.open_undo(name, reason, is_kept=False)
         return True
     if action is KeyAction.QUIT or context.stop.count:
         context.reject(name, _ENDED)
         context.say(_later(context, name))
         raise StopRequestedError
     return False
+
+
+def judge_again(context: RunContext) -> None:
+    """Ask once more for the newest verdict; until another is given it stands.
+
+    Raises:
+        ArmFaultError: the arm is not under control.
+        StopRequestedError: the session is to end.
+    """
+    given = context.close_undo()
+    if given is None:
+        return
+    context.console_loop.show(None)
+    context.loop_client.request(ArmState.HOLD)
+    context.fault_context = FaultContext(given.name.kept, prompt=Prompt.REVIEW)
+    context.say_page(context.page)
+    context.say(f"{given.text}: this stands until you give another verdict.")
+    context.say_keys(Prompt.REVIEW)
+    action, key = None, ""
+    while action not in (KeyAction.KEEP, KeyAction.REDO):
+        try:
+            key = context.console_loop.tick(Prompt.REVIEW, given.name, is_complete=True)
+            action = key_action(Prompt.REVIEW, key)
+            if action is KeyAction.NOTE:
+                take_note(context, given.name, is_on_trial=True)
+                context.say_keys(Prompt.REVIEW)
+        except ArmFaultError as fault:
+            context.clear_faults(fault)
+        if action is KeyAction.QUIT or context.stop.count:
+            raise StopRequestedError
+    context.change_verdict(
+        given, is_kept=action is KeyAction.KEEP, reason=REJECT_REASONS.get(key[1:], "")
+    )
 
 
 def _later(context: RunContext, name: TrialName) -> str:

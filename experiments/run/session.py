@@ -5,10 +5,11 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
-from acquisition import TractionError
+from acquisition import PreflightError, TractionError
 from acquisition.trial_file import is_there
 from experiments.arguments import data_option
 from experiments.fault_injection import HostFaults, plan_faults
+from experiments.messages import blames_hardware
 from experiments.operator import WARNING, Console, OperatorInput, keyboard
 from experiments.preflight import (
     Preflight,
@@ -31,6 +32,7 @@ from experiments.rig import (
     read_foresight,
 )
 from experiments.run.console_loop import ConsoleLoop
+from experiments.run.context import busy_load
 from experiments.run.runner import SessionRunner
 from experiments.run.stop import StopFlag, handle_signals
 from experiments.session import (
@@ -80,8 +82,8 @@ class SessionRequest:
 
     @property
     def who(self) -> str:
-        """Name of the operator, "auto" in a simulation without one."""
-        return self.operator_name or ("auto" if self.fake is not None else "")
+        """Name of the operator: as given, else of whoever presses the keys."""
+        return self.operator_name or self.operator.who
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +121,13 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         differences = _check_conditions(rig_conditions(rig), mode, console)
         if source is not None:
             _foresee(source, rig, console)
-        page = _check_rig(request, rig, host_faults)
+        try:
+            page = _check_rig(request, rig, host_faults)
+        except PreflightError as error:
+            load = busy_load(rig, is_rehearsed=bool(request.faults))
+            if load is None or not blames_hardware(error):
+                raise
+            raise load.blamed(error) from error
         sensor = sensor_conditions(page.devices)
         differences += _check_conditions(sensor, mode, console)
         hand = SimulatedHand(rig.simulation) if rig.simulation else None

@@ -15,6 +15,10 @@ class StopRequestedError(Exception):
     """The operator requested a stop: Ctrl-C, SIGTERM, or [q]uit."""
 
 
+class UndoRequestedError(Exception):
+    """The operator takes the newest verdict back, while that is possible."""
+
+
 class ArmFaultError(Exception):
     """The guard stopped the arm.
 

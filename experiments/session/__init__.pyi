@@ -36,7 +36,8 @@ from .matrix_board import (
     next_steps,
     parse_where,
 )
-from .reducer import KEEP, refusal, replay
+from .photos import Camera, PhotoError, add_photo, has_photo, photos_of
+from .reducer import KEEP, REJECT, refusal, replay
 from .sidecar import TrialOutcome, sidecar_of
 from .states import Event, SessionPhase, table_lines
 from .store import (
@@ -60,18 +61,22 @@ __all__ = [
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
+    "REJECT",
+    "Camera",
     "Deviation",
     "DigestCache",
     "Event",
     "Journal",
     "KeptDataError",
     "MatrixRow",
+    "PhotoError",
     "SessionFolder",
     "SessionPhase",
     "TrialName",
     "TrialOutcome",
     "UnfinishedSession",
     "add_note",
+    "add_photo",
     "add_remark",
     "board_notes",
     "change_verdict",
@@ -85,6 +90,7 @@ __all__ = [
     "enough_lines",
     "find_session",
     "find_unfinished",
+    "has_photo",
     "iso_utc",
     "kept_data_error",
     "kept_pushes",
@@ -97,6 +103,7 @@ __all__ = [
     "owner_of",
     "parse_trial",
     "parse_where",
+    "photos_of",
     "read_json",
     "recover_session",
     "refusal",

@@ -1,13 +1,11 @@
 """What people say about sessions on the disk: notes, and verdicts changed later."""
 
-import os
-import pwd
 import re
 from pathlib import Path
 
 from acquisition import SessionError, SystemClock
 from acquisition.trial_file import is_there, list_folder
-from experiments.operator import WARNING
+from experiments.operator import WARNING, login_name
 from experiments.session.crash_recovery import recover_session
 from experiments.session.data_files import sha256_of
 from experiments.session.journal import Journal, open_journal
@@ -63,12 +61,7 @@ def clean_text(text: str) -> str:
 
 def author(name: str) -> str:
     """Return `name`, or that of the person who is logged in."""
-    if name:
-        return clean_text(name)
-    try:
-        return pwd.getpwuid(os.getuid()).pw_name
-    except KeyError:
-        return f"user {os.getuid()}"
+    return clean_text(name) if name else login_name()
 
 
 def add_note(folder: SessionFolder, trial: str, text: str, who: str) -> str:

@@ -143,9 +143,7 @@ def _numbers(value: object) -> tuple[float, ...]:
     return numbers if len(numbers) == len(entries) else ()
 
 
-# --- what a phase alone cannot know ------------------------------------------------
-
-
+# What a phase alone cannot know.
 def _check_start(state: SessionState, event: _Facts) -> str:
     del state
     is_whole = bool(event.get("terrain")) and _whole(event, "trials")
@@ -216,9 +214,7 @@ _CHECKS: Mapping[Event, Callable[[SessionState, _Facts], str]] = {
 }
 
 
-# --- what an event changes beside the phase ----------------------------------------
-
-
+# What an event changes beside the phase.
 def _start(state: SessionState, event: _Facts) -> SessionState:
     terrain, wanted = str(event["terrain"]), _whole(event, "trials")
     return _open(replace(state, terrain=terrain, wanted=wanted), event)
@@ -279,6 +275,9 @@ def _change_verdict(state: SessionState, event: _Facts) -> SessionState:
     is_kept = state.kept_attempt(number) == attempt
     if is_kept == (event.get("verdict") == KEEP):
         return state
+    is_redone = state.is_redo and state.phase is SessionPhase.READY
+    if is_redone:
+        state = replace(state, redoing=number if is_kept else None)
     if is_kept:
         return _set_aside(state, event)
     kept = (*state.kept_attempts, (number, attempt))

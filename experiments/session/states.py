@@ -96,6 +96,7 @@ _WAYS: Mapping[Event, _Ways] = {
         **_stay(SessionPhase.CRASHED),
     },
     Event.VERDICT: {
+        SessionPhase.READY: (SessionPhase.READY,),  # taken back within seconds
         SessionPhase.UNFINISHED: _AT_REST,
         SessionPhase.COMPLETE: _AT_REST,
         SessionPhase.CLOSED: (SessionPhase.CLOSED, SessionPhase.COMPLETE),

@@ -20,7 +20,8 @@ from experiments.session.states import Event
 from experiments.session.store import SessionFolder
 from experiments.session.trial_name import TrialName
 
-_SUFFIXES = (".mcap", ".truth.mcap")
+PHOTO_SUFFIXES = (".photo.jpg", ".photo.png")
+_SUFFIXES = (".mcap", ".truth.mcap", *PHOTO_SUFFIXES)
 _VERDICTS: Mapping[str, str] = {
     Event.TRIAL_KEPT: KEEP,
     Event.TRIAL_REJECTED: REJECT,
@@ -157,7 +158,7 @@ def add_remark(folder: SessionFolder, name: TrialName, text: str, who: str) -> s
     Raises:
         TrialFileError: the disk is full or gone.
     """
-    path = _sidecar_path(folder, name)
+    path = sidecar_path(folder, name)
     sidecar = find_sidecar(folder, name)
     remark = {"text": text, "who": who, "when": folder.events()[-1]["utc"]}
     notes = [*_list(sidecar, "notes"), remark]
@@ -180,10 +181,10 @@ def write_next_tare(
     """
     sidecar = find_sidecar(folder, name)
     if sidecar.get("attempt") == name.attempt:
-        write_json(_sidecar_path(folder, name), {**sidecar, "next_tare": dict(tare)})
+        write_json(sidecar_path(folder, name), {**sidecar, "next_tare": dict(tare)})
 
 
-def _sidecar_path(folder: SessionFolder, name: TrialName) -> Path:
+def sidecar_path(folder: SessionFolder, name: TrialName) -> Path:
     """Return where the sidecar of an attempt stands."""
     path = folder.trials / f"{name.kept}.json"
     return path if _is_of(path, name) else folder.rejected / f"{name.rejected}.json"

@@ -8,6 +8,7 @@ from .files import (
     trial_header,
 )
 from .quality import NextPush, next_push, review_trial
+from .running import kept_rows, kept_traces
 
 __all__ = [
     "TIME_LIMIT",
@@ -17,6 +18,8 @@ __all__ = [
     "SessionMetadata",
     "TrialArchive",
     "collect_metadata",
+    "kept_rows",
+    "kept_traces",
     "next_push",
     "review_trial",
     "trial_header",

@@ -233,6 +233,7 @@ class TrialArchive:
         details = sidecar_of(name, verified, outcome)
         if review is not None:
             details |= {"ratio": review.known_ratio, "coverage": review.counts.tolist()}
+            details |= review.plain()
             if review.push is not None:
                 details["push"] = review.push.plain()
         write_json(self.metadata.folder.trials / f"{name.kept}.json", details)

@@ -3,7 +3,7 @@
 And what the next push should be, by what the kept ones know.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from analysis.data import (
     CoverageGrid,
     Doubt,
     ForceLag,
+    PreparedTrial,
     PrepareOptions,
     coverage,
     doubts_of,
@@ -28,9 +29,10 @@ from analysis.data import (
     suggest,
 )
 from analysis.next_push import Aim, PushRecord, advise, push_record
-from experiments.operator import BAD, GOOD, WARNING
+from experiments.operator import BAD, GOOD, WARNING, WayTrace, trace_lines
 from experiments.session import SessionFolder, kept_pushes, kept_sidecars
 from experiments.settings import TerrainRow
+from experiments.trial.running import plain_trace, traces_of
 
 STALE_SHARE = 0.01  # of the cycles
 ENOUGH_EARLIER = 3  # trials before which nothing is odd
@@ -58,6 +60,8 @@ class Review:
         doubts: why velocity and forces cannot be right; empty if they can.
         lag: how late the forces are; None where the trial does not show it.
         push: what the choice of the next push needs; None with too few samples.
+        v_t: median velocity of the kept samples [m/s]; NaN without any.
+        traces: F_t and v_t over the way along the container.
     """
 
     worst_gap: float
@@ -73,11 +77,37 @@ class Review:
     doubts: tuple[Doubt, ...] = ()
     lag: ForceLag | None = None
     push: PushRecord | None = None
+    v_t: float = np.nan
+    traces: tuple[WayTrace, ...] = ()
 
     @property
     def known_ratio(self) -> float | None:
         """The slope, None where there is none."""
         return None if np.isnan(self.ratio) else self.ratio
+
+    def plain(self) -> dict[str, object]:
+        """Return what the running table and later reviews need, for the sidecar."""
+        return {
+            "slips": self.slips,
+            "v_t": None if np.isnan(self.v_t) else round(self.v_t, 4),
+            "traces": {trace.name: plain_trace(trace) for trace in self.traces},
+        }
+
+    def trace_lines(
+        self, kept: Sequence[Mapping[str, NDArray[np.float64]]], name: str, width: int
+    ) -> list[str]:
+        """Return the traces in `width` columns, beside the median of the kept ones.
+
+        Args:
+            kept: values of the kept trials by quantity.
+            name: of this trial.
+            width: of the terminal [characters].
+        """
+        lines: list[str] = []
+        for trace in self.traces:
+            others = [values[trace.name] for values in kept if trace.name in values]
+            lines += trace_lines(trace, others, name, width)
+        return lines
 
     def lines(self, earlier: Sequence[float] = ()) -> list[tuple[str, str]]:
         """Return (mark, text) of every line.
@@ -166,7 +196,14 @@ def review_trial(path: Path, aim: Aim | None = None) -> Review:
         doubts=(*doubts_of(prepared), *doubts_of_record(trial)),
         lag=prepared.lag,
         push=push_record(prepared, aim),
+        v_t=_median_speed(prepared),
+        traces=traces_of(trial),
     )
+
+
+def _median_speed(prepared: PreparedTrial) -> float:
+    speeds = prepared.v_t
+    return float(np.median(speeds)) if len(speeds) else np.nan
 
 
 @dataclass(frozen=True, slots=True)

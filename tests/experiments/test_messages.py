@@ -3,6 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from acquisition import PreflightError
+from acquisition.control_loop.details import ReplySilence
 from acquisition.control_loop.faults import (
     FAULTS,
     Action,
@@ -12,8 +14,10 @@ from acquisition.control_loop.faults import (
 )
 from experiments.messages import (
     CATALOGUE,
+    ComputerLoad,
     FaultContext,
     Message,
+    blames_hardware,
     catalogue_table,
     fault_text,
 )
@@ -86,3 +90,51 @@ def test_the_numbers_of_a_fault_fill_its_message(fault):
     text = fault_text(verdict_for(fault, detail(*numbers)), FaultContext("T03", 1.5))
     assert "{" not in text
     assert CATALOGUE[fault.value].arm in text or fault is Fault.CAN_SILENCE
+
+
+LOAD = ComputerLoad(8.7, 2)
+SILENCE = verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x7F))
+
+
+def test_a_computer_that_is_too_busy_is_said_first_and_no_cable_is_blamed():
+    text = fault_text(SILENCE, FaultContext("T03", 1.5, load=LOAD))
+    assert text.startswith(
+        "This computer is too busy to simulate on the wall clock (load 8.7, cores 2)."
+    )
+    assert "No reply from the arm for 10 ms." in text
+    assert "ARM: UNKNOWN - support it" in text
+    assert "--fast" in text
+    assert "cable" not in text
+
+
+def test_a_real_arm_or_a_rehearsed_fault_is_told_as_it_is():
+    text = fault_text(SILENCE, FaultContext("T03", 1.5))
+    assert "busy" not in text
+    assert "Check the CAN cable" in text
+
+
+def test_what_is_no_matter_of_time_is_not_blamed_on_the_computer():
+    spec = FAULTS[Fault.OVERSPEED]
+    detail = spec.detail(*(7 for _ in fields(spec.detail)))
+    text = fault_text(
+        verdict_for(Fault.OVERSPEED, detail), FaultContext("T03", 1.5, load=LOAD)
+    )
+    assert "busy" not in text
+
+
+def test_a_refusal_that_blames_cables_says_the_computer_first():
+    error = PreflightError("Puck 5 does not answer.", hint="Check its cable.")
+    assert blames_hardware(error)
+    told = LOAD.blamed(error)
+    assert told.message.startswith("This computer is too busy")
+    assert "Puck 5 does not answer." in told.message
+    assert "cable" not in told.hint
+    assert not blames_hardware(PreflightError("2 GB free.", hint="Make room."))
+
+
+def test_a_computer_is_too_busy_where_programs_wait_for_a_core():
+    assert LOAD.is_too_much
+    assert not ComputerLoad(2.0, 2).is_too_much
+    now = ComputerLoad.now()
+    assert now.load >= 1.0  # this one runs
+    assert now.cores >= 1

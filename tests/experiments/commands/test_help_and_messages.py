@@ -536,8 +536,12 @@ def files_of_first(scene):
     return {path.name: (digest(path), path.stat().st_mtime_ns) for path in paths}
 
 
+# Depends on what else the computer does: tests/experiments/test_messages.py.
+OF_THE_COMPUTER = {"too-busy"}
+
+
 def test_every_row_of_the_catalogue_has_a_case():
-    assert set(CASES) | SHARED_ARM == set(CATALOGUE)
+    assert set(CASES) | SHARED_ARM | OF_THE_COMPUTER == set(CATALOGUE)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -1,6 +1,7 @@
 import contextlib
 import os
 import pty
+import pwd
 import termios
 
 import pytest
@@ -28,6 +29,12 @@ def keys_of(terminal):
     keys = TerminalInput(program)
     keys.answer(asked())  # the prompt is on the screen before anything is typed
     return person, keys
+
+
+def test_keys_from_a_terminal_are_those_of_the_person_who_is_logged_in(terminal):
+    name = pwd.getpwuid(os.getuid()).pw_name
+    assert TerminalInput(terminal[1]).who == name
+    assert AutoOperator().who == "auto"
 
 
 def local_flags(descriptor):

@@ -53,6 +53,7 @@ class Keys:
     """An operator who presses the given keys, one per look, then nothing."""
 
     draft = ""
+    who = "mk"
 
     def __init__(self, *keys, lines=()):
         self.keys, self.lines = list(keys), list(lines)
@@ -89,6 +90,7 @@ def make_loop(operator, *, is_stepped=True, console=None, **more):
         backend=StubBackend(StubClient(clock)),
         simulation=None,
         is_stepped=is_stepped,
+        is_simulated=True,
         settings=SimpleNamespace(
             rig=SimpleNamespace(operator=SimpleNamespace(double_tap=False))
         ),

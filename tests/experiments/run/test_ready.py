@@ -66,7 +66,7 @@ def test_a_note_on_the_session_is_in_the_journal_only(scripted):
         for e in journal(scripted.folder)
         if e["event"] == "noted" and "trial" not in e
     ]
-    assert (note["text"], note["who"]) == ("dry stones", "auto")
+    assert (note["text"], note["who"]) == ("dry stones", "script")
     assert "Noted on S001: dry stones" in scripted.done.out
 
 
@@ -93,15 +93,18 @@ def test_the_last_review_is_shown_again(scripted):
     assert lines[last + 1].startswith(" ✔ timing worst gap")
 
 
+RESET = "Reset (its digit ticks a step):  1 ☐ wipe  2 ☐ foot at the far end"
+
+
 def test_the_screen_between_trials_says_what_to_do_and_how_long_it_takes(scripted):
     lines = scripted.done.out.splitlines()
     heads = [line for line in lines if "ARM: floating" in line]
-    assert heads[0].startswith("S001 TF · trial 1 of 3 · kept 0 · rejected 0")
+    assert heads[0].endswith("S001 TF · trial 1 of 3 · kept 0 · rejected 0")
     clocks = [line for line in lines if line.startswith("Elapsed ")]
     assert "left about" not in clocks[0]
-    assert heads[-1].startswith("S001 TF · trial 2 of 3 · kept 1 · rejected 1")
+    assert heads[-1].endswith("S001 TF · trial 2 of 3 · kept 1 · rejected 1")
     assert clocks[-1].endswith(" · left about 1 min")
-    assert "Reset: ☐ wipe ☐ foot at the far end" in lines
+    assert RESET in lines
     assert "[space] record  [n]ote  [v]iew last  [p]ause  [q]uit after this" in lines
 
 
@@ -116,7 +119,7 @@ def test_the_last_trial_is_announced(scripted):
 def test_the_next_push_is_suggested_from_the_kept_trials(recorded):
     """What one push has left unknown is what the next one is asked for."""
     lines = recorded.done.out.splitlines()
-    first = lines.index("Reset: ☐ wipe ☐ foot at the far end")
+    first = lines.index(RESET)
     (suggested,) = [line for line in lines if line.startswith("Suggested next: ")]
     assert lines.index(suggested) > first + 2  # not before there is a kept trial
     kept = sidecar(recorded.folder / "trials" / "T01.mcap")["push"]

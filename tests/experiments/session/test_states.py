@@ -15,6 +15,7 @@ LEADS = {
     ("ready", "paused"): "paused",
     ("ready", "trial-set-aside"): "ready",
     ("ready", "trial-started"): "recording",
+    ("ready", "verdict-changed"): "ready",
     ("ready", "noted"): "ready",
     ("ready", "session-ended"): "unfinished complete",
     ("ready", "crash-found"): "crashed",

@@ -1,0 +1,171 @@
+"""The door to foxglove-sdk: channels on a WebSocket of this computer, read only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from acquisition import MissingLibraryError, SettingsError, schema_text
+
+if TYPE_CHECKING:
+    from foxglove import Channel, Context
+    from foxglove.websocket import PlaybackControlRequest, ServerListener
+
+HOST, PORT = "127.0.0.1", 8765
+BACKLOG = 64  # messages that wait for one slow client; the oldest are dropped
+LAYOUT_FILE = "foxglove_layout.json"
+
+
+def layout_path() -> Path:
+    """Return the file of the layout that is shipped."""
+    return Path(str(resources.files("experiments.data") / LAYOUT_FILE))
+
+
+@dataclass(frozen=True, slots=True)
+class PlaybackWish:
+    """What a viewer wants of a playback.
+
+    Attributes:
+        is_playing: it is to run.
+        speed: times as fast as it was recorded.
+        seek_ns: where to go first [UTC ns]; None = stay.
+        request_id: of the wish, to be answered.
+    """
+
+    is_playing: bool
+    speed: float
+    seek_ns: int | None
+    request_id: str | None
+
+
+def _listener(hear: Callable[[PlaybackWish], None]) -> ServerListener:
+    """Return what takes the wishes of viewers; called on a thread of the library."""
+    from foxglove.websocket import PlaybackCommand, ServerListener
+
+    class Wishes(ServerListener):
+        def on_playback_control_request(
+            self, playback_control_request: PlaybackControlRequest
+        ) -> None:
+            asked = playback_control_request
+            speed = asked.playback_speed
+            hear(
+                PlaybackWish(
+                    is_playing=asked.playback_command == PlaybackCommand.Play,
+                    speed=speed if speed > 0.0 else 1.0,
+                    seek_ns=asked.seek_time,
+                    request_id=asked.request_id,
+                )
+            )
+
+    return Wishes()
+
+
+def _channels(topics: Mapping[str, str], context: Context) -> dict[str, Channel]:
+    """Return a channel for each topic, whose messages are CDR of a ROS 2 type."""
+    from foxglove import Channel, Schema
+
+    return {
+        topic: Channel(
+            topic,
+            schema=Schema(
+                name=type_name,
+                encoding="ros2msg",
+                data=schema_text(type_name).encode(),
+            ),
+            message_encoding="cdr",
+            context=context,
+        )
+        for topic, type_name in topics.items()
+    }
+
+
+class LiveServer:
+    """Serves channels on 127.0.0.1; a client can read, and nothing else.
+
+    A client that does not read costs no more than its backlog: its oldest messages are
+    dropped. The library has threads of its own; a process with a control loop must
+    never make such a server.
+
+    Attributes:
+        port: where it listens.
+    """
+
+    def __init__(
+        self,
+        port: int,
+        topics: Mapping[str, str],
+        *,
+        span_ns: tuple[int, int] | None = None,
+        hear: Callable[[PlaybackWish], None] | None = None,
+    ) -> None:
+        """Begin to serve.
+
+        Args:
+            port: where to listen; 0 = any that is free.
+            topics: topic to type of its messages, CDR.
+            span_ns: of a playback that viewers may control [UTC ns]; None = live.
+            hear: takes what viewers want of the playback, on another thread.
+
+        Raises:
+            MissingLibraryError: foxglove-sdk is not installed.
+            SettingsError: the port is taken.
+        """
+        try:
+            import foxglove
+            from foxglove.websocket import Capability
+        except ImportError as error:
+            raise MissingLibraryError("foxglove-sdk", "live") from error
+        foxglove.set_log_level("CRITICAL")  # a client that hangs up is no news
+        self._context = context = foxglove.Context()  # its end closes the channels
+        capabilities = [Capability.Time]
+        if span_ns is not None:
+            capabilities.append(Capability.PlaybackControl)
+        self._channels = _channels(topics, context)
+        try:
+            self._server = foxglove.start_server(
+                name="traction",
+                host=HOST,
+                port=port,
+                capabilities=capabilities,
+                server_listener=None if hear is None else _listener(hear),
+                context=context,
+                playback_time_range=span_ns,
+                message_backlog_size=BACKLOG,
+            )
+        except (RuntimeError, OSError) as error:
+            raise SettingsError(
+                f"Port {port} of this computer cannot be served: {error}.",
+                hint="Is another traction watch running? Name another --port.",
+            ) from error
+        self.port: int = self._server.port
+
+    def publish(self, messages: Mapping[str, bytes], t_ns: int) -> None:
+        """Send messages of UTC `t_ns` [ns], by topic, to everyone who reads them."""
+        for topic, payload in messages.items():
+            self._channels[topic].log(payload, log_time=t_ns)
+
+    def tell_time(self, t_ns: int) -> None:
+        """Tell viewers the newest time [UTC ns]: one that lags shows it."""
+        self._server.broadcast_time(t_ns)
+
+    def tell_playback(self, wish: PlaybackWish, t_ns: int, *, is_over: bool) -> None:
+        """Tell viewers how a playback stands after `wish`, at UTC `t_ns` [ns]."""
+        from foxglove.websocket import PlaybackState, PlaybackStatus
+
+        status = PlaybackStatus.Playing if wish.is_playing else PlaybackStatus.Paused
+        self._server.broadcast_playback_state(
+            PlaybackState(
+                status=PlaybackStatus.Ended if is_over else status,
+                current_time=t_ns,
+                playback_speed=wish.speed,
+                did_seek=wish.seek_ns is not None,
+                request_id=wish.request_id,
+            )
+        )
+
+    def close(self) -> None:
+        """Hang up; safe to repeat."""
+        self._server.stop()

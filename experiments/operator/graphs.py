@@ -1,0 +1,257 @@
+"""Numbers as bars and tables of characters, and lines that fit a terminal; pure."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.data import PrepareOptions
+
+_BARS = "▁▂▃▄▅▆▇█"
+_ABSURD = 1e9  # nothing a sensor or an encoder can mean
+# What a push needs at most; what it may, stands in LimitSection of rig.toml [N].
+PUSH_ALONG, PUSH_ACROSS = 60.0, 30.0
+_JOINT = "\u00a0"  # a space at which no line is broken
+
+
+@dataclass(frozen=True, slots=True)
+class BarScale:
+    """What the height of a bar means, the same from trial to trial.
+
+    Attributes:
+        limit: where the guard steps in; the highest bar.
+        lowest, highest: the band in which a push is wanted.
+        unit: of all of them.
+        form: format of a number.
+    """
+
+    limit: float
+    lowest: float
+    highest: float
+    unit: str
+    form: str
+
+    def heights(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return 0..1 for magnitudes from 0 to the limit, shape kept.
+
+        The square root of the share: a push at a tenth of the limit is still seen.
+        """
+        return np.sqrt(np.clip(np.abs(values) / self.limit, 0.0, 1.0))
+
+    def number(self, value: float) -> str:
+        """Return a value with its unit."""
+        return f"{value:{self.form}} {self.unit}"
+
+    def band_words(self, value: float) -> str:
+        """Return the band and on which side of it `value` is."""
+        band = f"{self.lowest:g}..{self.highest:g}"
+        if not np.isfinite(value):
+            return f"▲ unknown, band {band}"
+        if value > self.highest:
+            return f"▲ above {band}"
+        return f"{'below' if value < self.lowest else 'in'} {band}"
+
+
+@dataclass(frozen=True, slots=True)
+class LiveScales:
+    """The scales of a running trial's bars, from the limits of rig.toml.
+
+    Attributes:
+        foot_speed: beyond it the arm damps [m/s].
+        contact_force: beyond it the trial ends [N].
+    """
+
+    foot_speed: float = 0.8
+    contact_force: float = 100.0
+
+    @property
+    def v_t(self) -> BarScale:
+        """Of velocity; the band is that of the samples which models use."""
+        window = PrepareOptions()
+        band = (window.slowest, window.fastest)
+        return BarScale(self.foot_speed, *band, "m/s", ".3f")
+
+    @property
+    def F_t(self) -> BarScale:
+        """Of traction."""
+        return BarScale(self.contact_force, 0.0, PUSH_ALONG, "N", ".1f")
+
+    @property
+    def F_n(self) -> BarScale:
+        """Of normal force."""
+        return BarScale(self.contact_force, 0.0, PUSH_ACROSS, "N", ".1f")
+
+
+def sparkline(
+    values: Sequence[float] | NDArray[np.float64], width: int, scale: BarScale
+) -> str:
+    """Return `values` as `width` bars; the last bar is the newest value.
+
+    Each bar before it is the largest magnitude of its share, so that a short slip
+    shows. A value that is none leaves its bar empty.
+    """
+    data = np.asarray(values, dtype=np.float64)
+    if not len(data) or width < 1:
+        return " " * max(0, width)
+    parts = np.array_split(data[:-1], width - 1) if width > 1 else []
+    peaks = [_peak(part) for part in parts if len(part)]
+    return bars(scale.heights(np.array([*peaks, _peak(data[-1:])]))).rjust(width)
+
+
+def _peak(part: NDArray[np.float64]) -> float:
+    """Return the largest magnitude that can be one, NaN where there is none."""
+    known = np.abs(part)[np.abs(part) < _ABSURD]  # no NaN is
+    return float(known.max()) if len(known) else np.nan
+
+
+def bars(heights: NDArray[np.float64]) -> str:
+    """Return one bar for each height of 0..1, a space for NaN."""
+    top = len(_BARS) - 1
+    return "".join(
+        _BARS[round(min(max(height, 0.0), 1.0) * top)] if np.isfinite(height) else " "
+        for height in heights.tolist()
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class WayTrace:
+    """A quantity over the way along the container.
+
+    Attributes:
+        name: of the quantity.
+        unit: of the numbers.
+        values: largest magnitude of each share of the way, NaN where no sample is.
+    """
+
+    name: str
+    unit: str
+    values: NDArray[np.float64]
+
+
+def trace_lines(
+    trace: WayTrace, kept: Sequence[NDArray[np.float64]], name: str, width: int
+) -> list[str]:
+    """Return a trace in `width` columns, beside the median of the kept ones.
+
+    Args:
+        trace: of this trial.
+        kept: values of the kept trials, of the same shares of the way.
+        name: of this trial.
+        width: of the terminal [characters].
+    """
+    label = max(len(name), len("kept"))
+    columns = max(1, width - label - 2)
+    rows = [_resampled(trace.values, columns)]
+    same = [values for values in kept if values.shape == trace.values.shape]
+    if same:
+        rows.append(_resampled(_median(np.stack(same)), columns))
+    known = np.concatenate(rows)
+    top = float(np.nanmax(known)) if np.isfinite(known).any() else 0.0
+    if top <= 0.0:
+        return []
+    number = f"{top:.3f}" if top < 1.0 else f"{top:.1f}"
+    words = f"{trace.name} over the way, full bar {number} {trace.unit}"
+    if same:
+        words += f"; kept = median of {len(same)}"
+    names = [name, "kept"]
+    return [words[:width]] + [
+        f" {title:<{label}} {bars(row / top)}"
+        for title, row in zip(names, rows, strict=False)
+    ]
+
+
+def _median(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the median of every column without NaN, NaN where there is nothing."""
+    columns = [column[np.isfinite(column)] for column in rows.T]
+    return np.array([np.median(c) if len(c) else np.nan for c in columns])
+
+
+def _resampled(values: NDArray[np.float64], columns: int) -> NDArray[np.float64]:
+    """Return the largest value of each of `columns` shares, at most one each."""
+    if columns >= len(values):
+        return values
+    return np.array([_peak(part) for part in np.array_split(values, columns)])
+
+
+@dataclass(frozen=True, slots=True)
+class KeptRow:
+    """A kept trial in the running table; None = not known of an older record.
+
+    Attributes:
+        trial: its name.
+        v_t: median of the velocity while it moves [m/s].
+        ratio: slope of F_t over F_n.
+        slips: how many there were.
+        remark: the newest note on it; empty for none.
+    """
+
+    trial: str
+    v_t: float | None
+    ratio: float | None
+    slips: int | None
+    remark: str
+
+
+def kept_table(rows: Sequence[KeptRow], width: int, most: int) -> list[str]:
+    """Return the newest `most` rows as lines of at most `width` characters."""
+    if not rows:
+        return []
+    earlier = len(rows) - most
+    more = f"  ({earlier} earlier)" if earlier > 0 else ""
+    lines = [f"kept    v_t [m/s]  F_t/F_n  slips  remark{more}"]
+    for row in rows[-most:]:
+        v_t = "?" if row.v_t is None else f"{row.v_t:.3f}"
+        ratio = "?" if row.ratio is None else f"{row.ratio:.2f}"
+        slips = "?" if row.slips is None else str(row.slips)
+        start = f"{row.trial:<5}  {v_t:>9}  {ratio:>7}  {slips:>5}  "
+        lines.append(start + _shortened(row.remark, width - len(start)))
+    return [line.rstrip() for line in lines]
+
+
+def _shortened(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: max(0, most - 1)] + "…"
+
+
+def packed(text: str, width: int) -> str:
+    """Return `text` in lines of `width`, broken only between its parts if possible.
+
+    Parts stand two spaces or " · " apart, as keys do: "[space] record" is one of
+    them. A part that is longer than a line is broken between words.
+    """
+    import textwrap
+
+    parts = [
+        part.replace(" ", _JOINT) if len(part) <= width else part
+        for part in _parts(text)
+    ]
+    lines = textwrap.wrap(
+        "  ".join(parts), width, break_long_words=False, break_on_hyphens=False
+    )
+    return "\n".join(line.replace(_JOINT, " ") for line in lines)
+
+
+def _parts(text: str) -> list[str]:
+    spaced = text.replace(" · ", "  · ")
+    return [part.strip() for part in spaced.split("  ") if part.strip()]
+
+
+def fitted(lines: Sequence[str], width: int, height: int) -> list[str]:
+    """Return the lines of a panel inside a terminal of `width` times `height`.
+
+    Nothing is cut: lines are broken between their parts. Where there is no room for
+    all, those in the middle give way: the first says what the arm does, the last two
+    which keys there are.
+    """
+    broken = [
+        packed(line, width).split("\n") if len(line) > width else [line]
+        for line in lines
+    ]
+    head, foot = broken[:1], broken[-2:] if len(broken) > 2 else broken[1:]
+    middle = [line for group in broken[1:-2] for line in group]
+    outer = sum(map(len, head)) + sum(map(len, foot))
+    room = max(0, height - outer)
+    middle = (
+        middle if len(middle) <= room else [*middle[: max(0, room - 1)], "…"][:room]
+    )
+    return [*(x for g in head for x in g), *middle, *(x for g in foot for x in g)]
