@@ -53,13 +53,14 @@ class SlidLoad:
 class SlidingHand:
     """A hand that slides the foot at `speed` [m/s] and presses neither up nor down."""
 
-    def __init__(self, x: float, speed: float) -> None:
-        self._x, self._speed = x, speed
+    def __init__(self, speed: float) -> None:
+        self._x: float | None = None
+        self._speed = speed
         self.is_holding = self.is_done = True
 
     def step(self, view: HandView) -> Vector3:
         """Return the force on the hand point along x, y, z of the terrain frame."""
-        self._x += 0.002 * self._speed
+        self._x = (view.hand[0] if self._x is None else self._x) + 0.002 * self._speed
         (x, y, _), (vx, vy, _) = view.hand, view.hand_v
         along = _K * (self._x - x) + _B * (self._speed - vx)
         return along, -_ASIDE * y - 20.0 * vy, 0.0
@@ -90,7 +91,7 @@ def put_down_and_slide(bench: HoldBench, speed: float) -> tuple[float, float]:
     plant.hand.put_down(plant.terrain.surface(0.0))
     forces(bench, _RESTS)
     stood = forces(bench, _STANDS)
-    plant.hand = SlidingHand(plant._hand_at[0], speed)
+    plant.hand = SlidingHand(speed)
     slid = forces(bench, min(_WAY / speed, _LONGEST))
     return float(stood.mean()) - _WEIGHT, float(slid[slid.size // 2 :].mean()) - _WEIGHT
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -99,7 +99,7 @@ def _question(newest: UnfinishedSession, terrain: str) -> str:
     return f"{newest.text()} {mismatch}" if newest.is_crashed else mismatch
 
 
-_FAKE = TypeAdapter(FakeOptions)
+_FAKE, _FIELDS = TypeAdapter(FakeOptions), TypeAdapter(dict[str, Any])
 _FRICTION_OF_THEN = 0.02  # where none is written
 _OPENINGS = (Event.STARTED, Event.RESUMED, Event.REDO)
 
@@ -272,11 +272,9 @@ def _reopen(
 
 def _last_opening(journal: Journal) -> dict[str, Any]:
     """Return the event with which the session was opened last."""
-    opening: dict[str, Any] = {}
-    for event in journal.folder.events():
-        if event.get("event") in _OPENINGS:
-            opening = event
-    return opening
+    events = journal.folder.events()
+    openings = [event for event in events if event.get("event") in _OPENINGS]
+    return openings[-1] if openings else {}
 
 
 def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
@@ -292,17 +290,11 @@ def _config_of(opening: Mapping[str, Any]) -> Path | None:
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:
     """Return how it was simulated before, on stepped time if that is asked for."""
+    written = opening.get("fake")
     try:
-        before = _FAKE.validate_python(_with_friction(opening.get("fake")))
+        known = {"friction": _FRICTION_OF_THEN} | _FIELDS.validate_python(written)
+        before = _FAKE.validate_python(known)
     except ValidationError:
         before = FakeOptions(is_fast=False, seed=1)
     pace = before.pace if before.pace in PACES else PACES[0]
-    is_fast = request.is_fast or before.is_fast
-    return replace(before, is_fast=is_fast, pace=pace)
-
-
-def _with_friction(fake: object) -> object:
-    """Return what was simulated; where no friction is written it was that of then."""
-    if not isinstance(fake, dict):
-        return fake
-    return {"friction": _FRICTION_OF_THEN, **cast("dict[str, object]", fake)}
+    return replace(before, is_fast=request.is_fast or before.is_fast, pace=pace)

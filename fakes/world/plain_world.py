@@ -57,8 +57,8 @@ def simulated_rig(
     """Return the simulation that was put into plain values.
 
     Args:
-        fields: scene, tool, share of friction, pace, cables; "body" of the twin of an
-            arm: centres of mass of its links and, unless None, friction of its motors.
+        fields: scene, tool, share of friction, pace, cables; "body" of a twin, which
+            has centres of mass of links and, unless None, friction of motors.
         constants: of the arm by its drawings.
         clock: of the world.
     """
