@@ -12,6 +12,7 @@ from . import (
 )
 from .sections import ReportSection
 from .spec import FigureSpec
+from .stances import draw_stances
 from .style import Figure, Picture, new_figure, render, styled
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "break_away",
     "confusion",
     "curves",
+    "draw_stances",
     "errors",
     "excerpts",
     "new_figure",

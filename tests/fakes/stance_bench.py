@@ -1,0 +1,221 @@
+"""Stances on the simulated ground alone: two masses on it, no arm.
+
+The ground, the law of the sole, the sequence and the policies are those of a session;
+the masses stand in for the arm as in `point_foot`. Forces are those of the ground,
+without a sensor's errors.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import exp, log, nan, radians
+
+import numpy as np
+
+from acquisition.control_loop import SoleGoal
+from analysis.breakaway import BreakAwayModel, BreakAwayOptions, FootPush, fit_pushes
+from analysis.data.series import TractionSeries
+from analysis.foresight import (
+    FootSample,
+    Foresight,
+    ForesightFlag,
+    ForesightModel,
+    RigIdentity,
+    fit_foresight,
+    watch_series,
+)
+from analysis.stance import (
+    SoleView,
+    StanceCommand,
+    StanceForesight,
+    StanceOutcome,
+    StancePhase,
+    StancePlan,
+    StanceRequest,
+    StanceSample,
+    StanceSequence,
+    avoid_slip,
+)
+from fakes.ground.terrain import make_terrain
+from fakes.randomness import trial_generators
+from tests.fakes.point_foot import (
+    COULOMB,
+    DT,
+    GROUNDS,
+    MASS_X,
+    MASS_Z,
+    PERIOD,
+    SUBSTEPS,
+    VISCOUS,
+)
+from wam.control import SoleAxes
+
+TRAVEL = 0.45  # m
+TICK_CYCLES = 10
+RIG = RigIdentity("true", "true", "0.3", "0.45")
+_STONES = "small", "big"
+KINDS = {name: stones for name, (stones, _, _) in GROUNDS.items()}
+TRAINING = 10_000  # trials of this number and more teach
+_PROBES, _BEDS, _STANCES = 6, 12, 25  # that teach, of every terrain
+_LONGEST = 2000  # ticks of a stance and the way to it
+
+
+class StanceBench:
+    """One bed under a foot that nothing but the law of the sole moves."""
+
+    def __init__(self, terrain: str, seed: int, trial: int) -> None:
+        stones, foot, incline_deg = GROUNDS[terrain]
+        random = trial_generators(seed, terrain, trial)
+        self.ground = make_terrain(stones, foot, radians(incline_deg), random.ground)
+        self.axes = SoleAxes(TRAVEL, PERIOD)
+        self.x = self.vx = self.vz = 0.0
+        self.z = 0.02
+        self.F_t = self.F_n = 0.0
+        self.cycles = 0
+        self.axes.begin(self.x, self.z, 0)
+
+    @property
+    def now_ns(self) -> int:
+        return round(self.cycles * PERIOD * 1e9)
+
+    def cycle(self) -> None:
+        """Advance by 2 ms."""
+        place, speed = (self.x, self.z), (self.vx, self.vz)
+        f_x, f_z = self.axes.force(place, speed, self.now_ns)
+        F_t = F_n = 0.0
+        for _ in range(SUBSTEPS):
+            vx, vz = self.vx, self.vz
+            motion = (self.x, 0.0, self.z, vx, 0.0, vz, 0.0, 0.0, 0.0)
+            t, _, n, *_ = self.ground.step(DT, motion)
+            F_t, F_n = F_t + t, F_n + n
+            self.vx += DT * (f_x - t - _drag(vx)) / MASS_X
+            self.vz += DT * (f_z + n - _drag(vz)) / MASS_Z
+            self.x += DT * self.vx
+            self.z += DT * self.vz
+        self.F_t, self.F_n = F_t / SUBSTEPS, F_n / SUBSTEPS
+        self.cycles += 1
+
+    def aim(self, goal: SoleGoal) -> None:
+        self.axes.aim(goal, self.x, self.z, self.now_ns)
+
+    def view(self, shares: Mapping[str, float]) -> SoleView:
+        capacity = self.ground.capacity(self.x, self.F_n) if self.F_n > 0.0 else nan
+        return SoleView(self.x, self.z, self.F_t, self.F_n, shares, capacity)
+
+
+def _drag(v: float) -> float:
+    slow = max(min(v / 0.01, 1.0), -1.0)
+    return COULOMB * slow + VISCOUS * v
+
+
+def record(
+    bench: StanceBench, plan: StancePlan, foresight: Foresight | None = None
+) -> StanceSequence:
+    """Return a recording of stances, made now."""
+    sequence, shares = StanceSequence(plan), {}
+    for _ in range(_LONGEST * plan.count):
+        bench.aim(sequence.next_goal(bench.view(shares)))
+        if sequence.is_over:
+            return sequence
+        shares = {}
+        for _ in range(TICK_CYCLES):
+            bench.cycle()
+            if foresight is not None and not sequence.outcomes:
+                shares = _felt(foresight, bench) or shares
+    raise AssertionError(f"a stance does not end: {sequence.state}")
+
+
+def _felt(foresight: Foresight, bench: StanceBench) -> dict[str, float]:
+    sample = FootSample(bench.cycles, bench.now_ns, bench.x, bench.F_t, bench.F_n)
+    state = foresight.push(sample)
+    if state is None or not state.flags & ForesightFlag.GROUND:
+        return {}
+    return dict(zip(foresight.terrains, state.terrains, strict=True))
+
+
+class _Draws:
+    """A policy that pushes at random: what break-away is learnt from."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self._load = self._most = 0.0
+
+    def __call__(
+        self, sample: StanceSample, foresight: StanceForesight, request: StanceRequest
+    ) -> StanceCommand:
+        if sample.last.phase is StancePhase.LOAD and not sample.is_loaded:
+            if sample.last.most != self._most:
+                self._load = exp(self._rng.uniform(log(3.0), log(20.0)))
+                self._most = float(
+                    self._rng.uniform(1.0, min(12.0, 1.2 * self._load + 4.0))
+                )
+            return StanceCommand(0.0, self._load, StancePhase.LOAD, most=self._most)
+        return avoid_slip(sample, foresight, request)
+
+
+def taught(terrain: str, seed: int) -> list[list[FootPush]]:
+    """Return pushes of stances with random forces, by bed."""
+    beds = []
+    for k in range(_BEDS):
+        rng = np.random.default_rng((seed, k, 77))
+        plan = StancePlan(
+            _Draws(rng), StanceRequest(), _STANCES, TRAVEL, float(rng.random())
+        )
+        made = record(StanceBench(terrain, seed, TRAINING + k), plan)
+        beds.append([p for one in made.outcomes if (p := one.push) is not None])
+    return beds
+
+
+def learn_break_away(
+    pushes: Mapping[str, list[list[FootPush]]],
+) -> dict[str, BreakAwayModel]:
+    """Return the break-away models of pushes by terrain."""
+    kinds = {name: KINDS[name] for name in pushes}
+    return fit_pushes(pushes, kinds, BreakAwayOptions(draws=1))
+
+
+def felt_series(terrain: str, seed: int, trial: int) -> TractionSeries:
+    """Return a foot that is drawn along, as before the first stance."""
+    bench = StanceBench(terrain, seed, trial)
+    bench.z = 0.005
+    bench.axes.begin(0.0, bench.z, 0)
+    rows = []
+    for tick in range(350):
+        end = 0.0 if tick < 50 else 0.30
+        bench.aim(SoleGoal(nan, 4.0, end, 0.0, 0.05))
+        for _ in range(TICK_CYCLES):
+            bench.cycle()
+            rows.append((bench.vx, bench.F_n, bench.F_t))
+    v, F_n, F_t = np.array(rows[400:]).T
+    t = PERIOD * np.arange(v.size)
+    return TractionSeries(terrain, f"{terrain}-{trial}", t, v, F_n, F_t)
+
+
+def learn_foresight(terrains: list[str], seed: int) -> ForesightModel:
+    """Return what feeling grounds teaches of them."""
+    watched = [
+        watch_series(
+            felt_series(name, seed, TRAINING + 100 + k),
+            "flat" if KINDS[name] == "none" else "rocky",
+            RIG,
+        )
+        for name in terrains
+        for k in range(_PROBES)
+    ]
+    model = fit_foresight(watched)
+    assert model is not None
+    return model
+
+
+def stances(
+    terrain: str, plan: StancePlan, seed: int, beds: int, model: ForesightModel | None
+) -> list[StanceOutcome]:
+    """Return recordings of stances on beds of their own, adapted on and on."""
+    made: list[StanceOutcome] = []
+    for k in range(beds):
+        rng = np.random.default_rng((seed, k, 5))
+        foresight = None if model is None else Foresight(model, {}, RIG)
+        bench = StanceBench(terrain, seed, k)
+        one = record(bench, replace(plan, phase=float(rng.random())), foresight)
+        made += one.outcomes
+        plan = replace(plan, scale=one.scale)
+    return made
