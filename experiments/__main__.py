@@ -16,6 +16,7 @@ from experiments.arguments import add_global_options, did_you_mean
 COMMANDS = {
     "check": "is the rig fit to run? one graded page",
     "run": "record a session of trials on one terrain",
+    "stance": "let the simulated foot stand by itself, asked for traction",
     "resume": "continue the session that is not finished",
     "redo": "record any one trial of a session once more",
     "status": "the matrix board, counted from verified files",
@@ -36,7 +37,10 @@ COMMANDS = {
     "identify": "which terrain is this? probabilities over time",
     "fit": "the same for external data, npz or CSV",
 }
-_JOINED = {"publish": "export"}  # commands that share a file with another
+_JOINED = {
+    "publish": "export",
+    "stance": "run",
+}  # commands that share a file with another
 _OF_THE_DISK = {
     errno.EIO,
     errno.ENOSPC,

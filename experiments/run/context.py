@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from acquisition import TractionError
-from acquisition.control_loop import GuardVerdict
+from acquisition.control_loop import ArmState, GuardVerdict
 from acquisition.ipc import LoopClient
 from analysis.next_push import Aim
 from experiments.messages import FaultContext, fault_text
@@ -18,7 +18,7 @@ from experiments.operator import (
 from experiments.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session import Event, Journal, TrialName
+from experiments.session import Event, Journal, StanceTask, TrialName
 from experiments.trial import SessionMetadata, TrialArchive
 
 
@@ -44,6 +44,7 @@ class RunContext:
         is_last: no trial begins after this one.
         estimate: expected duration, as of the first kept trial [s].
         aim: of the push that was suggested last; None where there was none.
+        stance: what the foot is to do by itself; None = it is pushed.
     """
 
     console_loop: ConsoleLoop
@@ -63,6 +64,7 @@ class RunContext:
     is_last: bool = False
     estimate: float | None = None
     aim: Aim | None = None
+    stance: StanceTask | None = None
 
     @property
     def loop_client(self) -> LoopClient:
@@ -80,6 +82,14 @@ class RunContext:
         kept = len(self.journal.state.kept) - self.kept_before
         missing = self.journal.state.wanted - len(self.journal.state.kept)
         return self.elapsed / kept * missing if kept > 0 else None
+
+    def await_trial(self) -> None:
+        """Ask for what the arm does until a trial begins.
+
+        It floats in the hand that puts it down; a foot that will stand is held.
+        """
+        is_held = self.stance is not None
+        self.loop_client.request(ArmState.HOLD if is_held else ArmState.FLOAT)
 
     def say(self, text: str) -> None:
         """Print one line."""
@@ -154,7 +164,10 @@ class RunContext:
 
 
 def open_context(
-    console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
+    console_loop: ConsoleLoop,
+    metadata: SessionMetadata,
+    journal: Journal,
+    stance: StanceTask | None = None,
 ) -> RunContext:
     """Return the context of a session that is opened now."""
     rig, console = console_loop.rig, console_loop.console
@@ -170,4 +183,5 @@ def open_context(
         feedback=build_feedback(rig.settings.rig.operator, console),
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
+        stance=stance,
     )

@@ -186,7 +186,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
         except ArmFaultError as fault:
             context.clear_faults(fault)  # and there is no answer: the pause goes on
     context.append(Event.CONTINUED)
-    context.loop_client.request(ArmState.FLOAT)
+    context.await_trial()
 
 
 def _view_last(context: RunContext, name: TrialName) -> None:

@@ -32,6 +32,7 @@ from experiments.session import (
     UnfinishedSession,
     check_kept,
     open_journal,
+    read_stance_task,
     recover_session,
     refusal,
     session_lock,
@@ -263,6 +264,7 @@ def _reopen(
         faults=request.faults,
         can_log=request.can_log,
         foresight=request.foresight,
+        stance=read_stance_task(folder),
     )
     kept = len(journal.state.kept)
     console.say(f"session {folder.id}: {kept} of {journal.state.wanted} kept")

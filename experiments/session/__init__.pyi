@@ -37,7 +37,13 @@ from .matrix_board import (
     parse_where,
 )
 from .reducer import KEEP, refusal, replay
-from .sidecar import TrialOutcome, sidecar_of
+from .sidecar import STANCES, TrialOutcome, sidecar_of
+from .stance_task import (
+    StanceTask,
+    adapted_scale,
+    read_stance_task,
+    stance_outcomes,
+)
 from .states import Event, SessionPhase, table_lines
 from .store import (
     SessionFolder,
@@ -57,6 +63,7 @@ from .trial_name import TrialName
 from .unfinished import UnfinishedSession, find_unfinished
 
 __all__ = [
+    "STANCES",
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
@@ -69,6 +76,7 @@ __all__ = [
     "SessionFolder",
     "SessionPhase",
     "TrialName",
+    "StanceTask",
     "TrialOutcome",
     "UnfinishedSession",
     "add_note",
@@ -83,6 +91,7 @@ __all__ = [
     "count_board",
     "create_session",
     "enough_lines",
+    "adapted_scale",
     "find_session",
     "find_unfinished",
     "iso_utc",
@@ -104,7 +113,9 @@ __all__ = [
     "session_lock",
     "session_utc_ns",
     "sha256_of",
+    "read_stance_task",
     "sidecar_of",
+    "stance_outcomes",
     "sign",
     "table_lines",
     "trial_path",
