@@ -56,6 +56,7 @@ _STONES = "small", "big"
 KINDS = {name: stones for name, (stones, _, _) in GROUNDS.items()}
 TRAINING = 10_000  # trials of this number and more teach
 _PROBES, _BEDS, _STANCES = 6, 12, 25  # that teach, of every terrain
+_CARRIED, _ALOFT = 0.014, 0.3  # m, s
 _LONGEST = 2000  # ticks of a stance and the way to it
 
 
@@ -87,12 +88,22 @@ class StanceBench:
             motion = (self.x, 0.0, self.z, vx, 0.0, vz, 0.0, 0.0, 0.0)
             t, _, n, *_ = self.ground.step(DT, motion)
             F_t, F_n = F_t + t, F_n + n
-            self.vx += DT * (f_x - t - _drag(vx)) / MASS_X
-            self.vz += DT * (f_z + n - _drag(vz)) / MASS_Z
+            slow_x = 1.0 if vx > 0.01 else -1.0 if vx < -0.01 else 100.0 * vx
+            slow_z = 1.0 if vz > 0.01 else -1.0 if vz < -0.01 else 100.0 * vz
+            drag_x = COULOMB * slow_x + VISCOUS * vx
+            drag_z = COULOMB * slow_z + VISCOUS * vz
+            self.vx += DT * (f_x - t - drag_x) / MASS_X
+            self.vz += DT * (f_z + n - drag_z) / MASS_Z
             self.x += DT * self.vx
             self.z += DT * self.vz
         self.F_t, self.F_n = F_t / SUBSTEPS, F_n / SUBSTEPS
         self.cycles += 1
+
+    def carry(self, x: float) -> None:
+        """Be carried through the air to `x`: nothing happens there."""
+        self.x, self.z, self.vx, self.vz = x, _CARRIED, 0.0, 0.0
+        self.ground.step(_ALOFT, (x, 0.0, _CARRIED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        self.axes.begin(x, self.z, self.now_ns)
 
     def aim(self, goal: SoleGoal) -> None:
         self.axes.aim(goal, self.x, self.z, self.now_ns)
@@ -102,20 +113,19 @@ class StanceBench:
         return SoleView(self.x, self.z, self.F_t, self.F_n, shares, capacity)
 
 
-def _drag(v: float) -> float:
-    slow = max(min(v / 0.01, 1.0), -1.0)
-    return COULOMB * slow + VISCOUS * v
-
-
 def record(
     bench: StanceBench, plan: StancePlan, foresight: Foresight | None = None
 ) -> StanceSequence:
     """Return a recording of stances, made now."""
     sequence, shares = StanceSequence(plan), {}
     for _ in range(_LONGEST * plan.count):
-        bench.aim(sequence.next_goal(bench.view(shares)))
+        goal = sequence.next_goal(bench.view(shares))
         if sequence.is_over:
             return sequence
+        if sequence.state == "carry":
+            bench.carry(goal.x)
+            continue
+        bench.aim(goal)
         shares = {}
         for _ in range(TICK_CYCLES):
             bench.cycle()
