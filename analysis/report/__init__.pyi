@@ -6,6 +6,7 @@ from .friction_page import (
 )
 from .page import ReportContext, write_report
 from .page_model import ReportTable
+from .stance_page import StanceGroup, stance_html
 from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
@@ -14,6 +15,7 @@ __all__ = [
     "FrictionPage",
     "ReportContext",
     "ReportTable",
+    "StanceGroup",
     "StudyVariant",
     "friction_html",
     "friction_rows",
@@ -21,5 +23,6 @@ __all__ = [
     "parse_window",
     "plain_choice",
     "side_by_side",
+    "stance_html",
     "write_report",
 ]

@@ -61,13 +61,8 @@ def avoid_slip(
 ) -> StanceCommand:
     """Take the asked risk and no more; longer, where the ground bears less."""
     last, t = sample.last, sample.t
-    if last.phase is StancePhase.LOAD and not sample.is_loaded:
-        if not isnan(last.most):
-            return last
-        load, most = planned(foresight, request)
-        return StanceCommand(0.0, load, StancePhase.LOAD, most=most)
     if last.phase is StancePhase.LOAD:
-        return replace(last, phase=StancePhase.PUSH, since=t, x0=sample.x)
+        return _loading(sample, foresight, request)
     if t >= LONGEST or last.phase is StancePhase.DONE:
         return replace(last, F_t=0.0, phase=StancePhase.DONE)
     if last.phase is StancePhase.BACK_OFF:
@@ -140,6 +135,19 @@ def _as_asked(
     if sample.t >= LONGEST or last.phase is StancePhase.DONE:
         return replace(last, F_t=0.0, phase=StancePhase.DONE)
     return _pushing(sample, request)
+
+
+def _loading(
+    sample: StanceSample, foresight: StanceForesight, request: StanceRequest
+) -> StanceCommand:
+    """Plan once, then wait for the load."""
+    last = sample.last
+    if isnan(last.most):
+        load, most = planned(foresight, request)
+        last = StanceCommand(0.0, load, StancePhase.LOAD, most=most)
+    if not sample.is_loaded:
+        return last
+    return replace(last, phase=StancePhase.PUSH, since=sample.t, x0=sample.x)
 
 
 def _pushing(sample: StanceSample, request: StanceRequest) -> StanceCommand:

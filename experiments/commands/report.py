@@ -29,12 +29,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
+    import json
+
     from experiments.operator import Console, PageRecorder
     from experiments.report import (
         ReportRequest,
         analysis_choices,
         choose_sessions,
         report_sessions,
+        report_stances,
+        stance_sessions,
         tell_missing,
     )
     from experiments.settings import load_settings
@@ -42,6 +46,13 @@ def run(args: argparse.Namespace) -> int:
     choices = analysis_choices(args)
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
+    if not args.all and (standing := stance_sessions(data, args.sessions)):
+        tell_missing(standing, console, allow_missing=args.allow_missing)
+        page = report_stances(standing, data)
+        names = {"sessions": [session.id for session in standing], "page": str(page)}
+        shown = json.dumps(names) if args.json else f"Open in a browser: {page}"
+        Console(color=False).say(shown)
+        return 0
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)

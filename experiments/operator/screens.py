@@ -174,6 +174,7 @@ class ReadyView:
         reset: what is to be done to the terrain before each trial.
         suggestion: of the next push; empty if there is none.
         enough: why there are enough trials; empty if there are not.
+        arm: what the arm does.
     """
 
     session: str
@@ -187,6 +188,7 @@ class ReadyView:
     reset: tuple[str, ...]
     suggestion: str
     enough: str = ""
+    arm: str = "floating"
 
 
 def ready_lines(view: ReadyView) -> list[str]:
@@ -194,7 +196,7 @@ def ready_lines(view: ReadyView) -> list[str]:
     left = "" if view.left is None else f" · left about {ceil(view.left / 60)} min"
     lines = [
         f"{view.session} {view.terrain} · trial {view.trial} of {view.wanted} · kept "
-        f"{view.kept} · rejected {view.rejected}    ARM: floating",
+        f"{view.kept} · rejected {view.rejected}    ARM: {view.arm}",
         f"Elapsed {_clock(view.elapsed)}{left}",
     ]
     if view.reset:

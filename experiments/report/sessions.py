@@ -93,9 +93,19 @@ def choose_sessions(
             hint="For example: traction report S012",
         )
     if every:
-        sessions = [s for s in list_sessions(data) if s.kept_trials() or _keeps(s)]
+        sessions = [
+            s
+            for s in list_sessions(data)
+            if not s.is_of_stances and (s.kept_trials() or _keeps(s))
+        ]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
+    for session in sessions:
+        if session.is_of_stances:
+            raise SessionError(
+                f"{session.id} is of stances: it has no push to be studied.",
+                hint=f"Its page: traction report {session.id}",
+            )
     if not sessions:
         raise SessionError(
             f"There are no kept trials in {data}.",

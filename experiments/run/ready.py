@@ -92,8 +92,9 @@ def ready_view(context: RunContext) -> ReadyView:
     """Return what the screen between two trials shows now, and remember its aim."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
+    is_pushed = context.stance is None
     push = context.console_loop.run_aside(lambda: next_push(folder, row))
-    context.aim = push.aim
+    context.aim = push.aim if is_pushed else None
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -104,8 +105,9 @@ def ready_view(context: RunContext) -> ReadyView:
         elapsed=context.elapsed,
         left=context.time_left,
         reset=row.reset,
-        suggestion=push.text,
-        enough=push.enough,
+        suggestion=push.text if is_pushed else "",
+        enough=push.enough if is_pushed else "",
+        arm="floating" if is_pushed else "holding; keep clear of it",
     )
 
 

@@ -59,8 +59,8 @@ def check_stances(rig: Rig, task: StanceTask) -> None:
     if source is None or not source.break_away:
         raise SettingsError(
             "avoid-slip needs the risk of break-away, and none is known here.",
-            hint="Record pushes on some terrains and run traction report --all, or name "
-            "a terrain database with --foresight. Nothing was started.",
+            hint="Record pushes on some terrains and run traction report --all, or "
+            "name a terrain database with --foresight. Nothing was started.",
         )
     if not source.model.knows(rig.identity):
         raise SettingsError(

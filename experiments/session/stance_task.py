@@ -65,10 +65,15 @@ class StanceTask:
         return self.policy == "avoid-slip"
 
     @property
+    def name(self) -> str:
+        """Policy, with its risk where it has one, and the force asked for."""
+        risk = f" {self.risk:g}" if self.is_foreseen else ""
+        return f"{self.policy}{risk}, {self.peak:g} N"
+
+    @property
     def text(self) -> str:
         """The task in words."""
-        risk = f", risk {self.risk:g}" if self.is_foreseen else ""
-        return f"{self.count} stances, {self.policy}{risk}, peak {self.peak:g} N"
+        return f"{self.count} stances a recording: {self.name}"
 
     def metadata(self) -> dict[str, str]:
         """Return what a trial states of it."""
