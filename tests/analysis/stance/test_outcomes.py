@@ -99,5 +99,5 @@ def test_sums_of_nothing_are_none_and_of_stances_shares():
     assert (summed.slips, summed.successes, summed.count) == (0.5, 0.5, 2)
 
 
-def test_the_interval_is_that_of_a_table():
-    assert wilson(0.05, 203) == pytest.approx((0.0276, 0.0889), abs=2e-4)
+def test_the_interval_is_that_of_the_textbook():
+    assert wilson(0.1, 100) == pytest.approx((0.0552, 0.1744), abs=1e-4)
