@@ -29,6 +29,7 @@ from analysis.stance import (
 from tests.fakes.point_foot import GROUNDS
 from tests.fakes.stance_bench import (
     TRAVEL,
+    felt,
     learn_break_away,
     learn_foresight,
     stances,
@@ -103,8 +104,12 @@ def learn(terrains: Sequence[str], seed: int, pool: Pool) -> Lessons:
     pushes = pool.starmap(taught, [(name, seed) for name in terrains])
     tables = risk_tables(learn_break_away(dict(zip(terrains, pushes, strict=True))))
     rest = {name: [other for other in terrains if other != name] for name in terrains}
-    sets = [list(terrains), *rest.values()]
-    models = pool.starmap(learn_foresight, [(names, seed) for names in sets])
+    watched = pool.starmap(felt, [(name, seed) for name in terrains])
+    drawn = dict(zip(terrains, watched, strict=True))
+    models = [
+        learn_foresight([one for name in names for one in drawn[name]])
+        for names in (list(terrains), *rest.values())
+    ]
     return Lessons(tables, dict(zip(("", *rest), models, strict=True)))
 
 

@@ -5,7 +5,7 @@ the masses stand in for the arm as in `point_foot`. Forces are those of the grou
 without a sensor's errors.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import exp, log, nan, radians
 
@@ -19,8 +19,10 @@ from analysis.foresight import (
     Foresight,
     ForesightFlag,
     ForesightModel,
+    Provenance,
     RigIdentity,
-    fit_foresight,
+    WatchedTrial,
+    fit_ground,
     watch_series,
 )
 from analysis.stance import (
@@ -55,7 +57,7 @@ RIG = RigIdentity("true", "true", "0.3", "0.45")
 _STONES = "small", "big"
 KINDS = {name: stones for name, (stones, _, _) in GROUNDS.items()}
 TRAINING = 10_000  # trials of this number and more teach
-_PROBES, _BEDS, _STANCES = 6, 12, 25  # that teach, of every terrain
+_PROBES, _BEDS, _STANCES = 6, 8, 25  # that teach, of every terrain
 _CARRIED, _ALOFT = 0.014, 0.3  # m, s
 _LONGEST = 2000  # ticks of a stance and the way to it
 
@@ -200,20 +202,17 @@ def felt_series(terrain: str, seed: int, trial: int) -> TractionSeries:
     return TractionSeries(terrain, f"{terrain}-{trial}", t, v, F_n, F_t)
 
 
-def learn_foresight(terrains: list[str], seed: int) -> ForesightModel:
-    """Return what feeling grounds teaches of them."""
-    watched = [
-        watch_series(
-            felt_series(name, seed, TRAINING + 100 + k),
-            "flat" if KINDS[name] == "none" else "rocky",
-            RIG,
-        )
-        for name in terrains
-        for k in range(_PROBES)
-    ]
-    model = fit_foresight(watched)
-    assert model is not None
-    return model
+def felt(terrain: str, seed: int) -> list[WatchedTrial]:
+    """Return a foot that is drawn over beds of a terrain, as foresight watches it."""
+    surface = "flat" if KINDS[terrain] == "none" else "rocky"
+    series = [felt_series(terrain, seed, TRAINING + 100 + k) for k in range(_PROBES)]
+    return [watch_series(one, surface, RIG) for one in series]
+
+
+def learn_foresight(watched: Sequence[WatchedTrial]) -> ForesightModel:
+    """Return what feeling grounds teaches of them; slips are not foreseen."""
+    names = tuple(one.name for one in watched)
+    return ForesightModel(None, fit_ground(watched), Provenance((RIG,), names, ()))
 
 
 def stances(

@@ -1,11 +1,14 @@
 """The sequence on the simulated ground: set down, loaded, asked, lifted, again."""
 
+from itertools import pairwise
+
 import pytest
 
-from analysis.stance import POLICIES, StancePlan, StanceRequest, totals
+from analysis.stance import POLICIES, StancePlan, StanceRequest, risk_tables, totals
 from tests.fakes.stance_bench import (
     TRAVEL,
     StanceBench,
+    felt,
     learn_break_away,
     learn_foresight,
     record,
@@ -23,7 +26,7 @@ def plan(policy: str, count: int) -> StancePlan:
 
 def test_spots_are_apart_and_inside():
     spots = [plan("none", 1).spot(k) for k in range(60)]
-    apart = [abs(b - a) for a, b in zip(spots, spots[1:], strict=False)]
+    apart = [abs(b - a) for a, b in pairwise(spots)]
 
     assert min(apart) >= 2.0 * 0.037
     assert min(spots) > 0.02
@@ -59,9 +62,7 @@ def test_a_fresh_place_has_a_fresh_jam():
 def test_avoid_slip_slips_as_asked_and_slides_less_than_constant_mu():
     pushes = {name: taught(name, 5) for name in ("S0", "B15", "TF")}
     learnt = learn_break_away(pushes)
-    model = learn_foresight(["S0", "B15", "TF"], 5)
-    from analysis.stance import risk_tables
-
+    model = learn_foresight([one for name in pushes for one in felt(name, 5)])
     avoiding = StancePlan(
         POLICIES["avoid-slip"], REQUEST, 25, TRAVEL, 0.0, risk_tables(learnt)
     )
@@ -76,9 +77,8 @@ def test_avoid_slip_slips_as_asked_and_slides_less_than_constant_mu():
 
 
 def test_a_claim_of_the_study_can_fail():
-    one = totals(
-        record(StanceBench("Tf", 1, 0), plan("constant-mu", 1)).outcomes, REQUEST
-    )
+    made = record(StanceBench("Tf", 1, 0), plan("constant-mu", 1))
+    one = totals(made.outcomes, REQUEST)
     assert one is not None
     judged = claims({StanceCase("S0", "avoid-slip", 0.1, KNOWN): one})
 

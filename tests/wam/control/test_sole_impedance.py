@@ -86,5 +86,5 @@ def test_a_foot_that_is_lifted_begins_where_it_stands(axes):
     ],
 )
 def test_what_no_sole_is_to_do_is_refused(axes, goal):
-    with pytest.raises(ValueError, match="sole|bounds"):
+    with pytest.raises(ValueError, match=r"sole|bounds"):
         axes.aim(goal, 0.1, 0.0, 0)
