@@ -18,11 +18,12 @@ from .seam import (
     StanceSample,
     risk_tables,
 )
-from .sequence import SoleView, StancePlan, StanceSequence
+from .sequence import LEAST_TRAVEL, SoleView, StancePlan, StanceSequence
 
 __all__ = [
     "BEGIN",
     "FRESH_SCALE",
+    "LEAST_TRAVEL",
     "POLICIES",
     "SoleView",
     "StanceCommand",

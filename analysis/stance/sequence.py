@@ -39,6 +39,8 @@ _CLOSE, _SLOW = 0.004, 0.02  # m, m/s: a foot has arrived
 _WITHIN, _SETTLED, _LONGEST_LOADING = 0.1, 5, 1.5  # of F_n, ticks, s
 _MARGIN = 0.03  # m of the container that is not stood on, at both ends
 _GOLDEN = 0.618034
+# Neighbours in the row lie 0.38 of the free way apart: 2 d50 of the big stones here.
+LEAST_TRAVEL: Final = 0.26  # m
 PROBE_WAY, PROBE_SPEED, PROBE_LOAD = 0.08, 0.05, 4.0  # m, m/s, N
 _LONGEST_STEP = 6.0  # s that carrying, lowering or feeling may take
 

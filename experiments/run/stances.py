@@ -11,6 +11,7 @@ from acquisition.control_loop import ArmState
 from analysis.foresight import ForesightFlag, RiskTable
 from analysis.stance import (
     FRESH_SCALE,
+    LEAST_TRAVEL,
     POLICIES,
     SoleView,
     StanceOutcome,
@@ -49,10 +50,18 @@ def check_stances(rig: Rig, task: StanceTask) -> None:
 
     Raises:
         PreflightError: it is a real one.
-        SettingsError: the risk is not known, or was learnt on another rig.
+        SettingsError: the container is too short, the risk is not known, or was
+            learnt on another rig.
     """
     if rig.simulation is None:
         raise PreflightError(LIVE_STANCE, hint="Add --fake. Nothing was started.")
+    travel = rig.frame.travel
+    if travel < LEAST_TRAVEL:
+        raise SettingsError(
+            f"{rig.row.name}: a container of {travel:g} m has no fresh place for every "
+            f"stance; {LEAST_TRAVEL:g} m are needed.",
+            hint="Correct travel in matrix.toml. Nothing was started.",
+        )
     if not task.is_foreseen:
         return
     source = rig.foresight
