@@ -18,12 +18,16 @@ from acquisition import ArmReading
 from acquisition.control_loop import SoleGoal
 from wam.model import ArmModel, Array
 
-LARGEST_F_T, LARGEST_F_N = 12.0, 22.0  # N that may be asked for
+# N that may be asked for. At 12 N of traction the wrist is at its torque limit, and
+# beyond it the foot would tip over.
+LARGEST_F_T, LARGEST_F_N = 11.0, 22.0
 TRACTION_RATE, RELEASE_RATE, LOAD_RATE = 20.0, 100.0, 40.0  # N/s: grow, fall; F_n
 FASTEST = 0.20  # m/s of a reference
 STALE_NS = 100_000_000  # age of a command that asks for nothing more
 _DAMPING = 40.0  # N s/m, along a force
 _K, _B, _STRONGEST = 800.0, 100.0, 25.0  # to a place: N/m, N s/m, N
+_DRAWN = 9.0  # N, the same along x for a foot that is loaded
+_TIPPED = 0.1  # rad from where it was, beyond which a foot is pushed no more
 _K_ASIDE, _B_ASIDE = 800.0, 100.0  # N/m, N s/m
 _K_TURN, _B_TURN = 12.0, 0.8  # N m/rad, N m s/rad
 _BEYOND = 0.05  # m past the ends of the container where traction is taken back
@@ -33,6 +37,9 @@ class SoleAxes:
     """Forces along x and z of the terrain frame; knows no arm.
 
     The stance bench steps the same object against the simulated ground alone.
+
+    Attributes:
+        is_tipped: the sole is turned too far; nothing pushes it along x any more.
     """
 
     def __init__(self, travel: float, dt: float) -> None:
@@ -47,6 +54,7 @@ class SoleAxes:
         self._goal = SoleGoal(nan, nan, 0.0, 0.0, 0.0)
         self._aimed_ns = 0
         self._x = self._z = self._F_t = self._F_n = 0.0
+        self.is_tipped = False
 
     def begin(self, x: float, z: float, now_ns: int) -> None:
         """Stay at a place [m] until a goal comes."""
@@ -88,10 +96,13 @@ class SoleAxes:
         step = 0.0 if is_stale else goal.speed * self._dt
         if isnan(goal.F_t):
             self._x = _towards(self._x, goal.x, step)
-            f_x = _bounded(_K * (self._x - x), _STRONGEST) - _B * vx
+            most = _STRONGEST if isnan(goal.F_n) else _DRAWN
+            spring = _bounded(_K * (self._x - x), 0.0 if self.is_tipped else most)
+            f_x = spring - _B * vx
         else:
             is_inside = -_BEYOND <= x <= self._travel + _BEYOND
-            wanted = goal.F_t if is_inside and not is_stale else 0.0
+            is_allowed = is_inside and not (is_stale or self.is_tipped)
+            wanted = goal.F_t if is_allowed else 0.0
             rate = TRACTION_RATE if wanted > self._F_t else RELEASE_RATE
             self._F_t = _towards(self._F_t, wanted, rate * self._dt)
             f_x = self._F_t - _DAMPING * vx
@@ -170,11 +181,12 @@ class SoleImpedance:
         twist = J.dot(reading.qd)
         x, y, z = axes.dot(position - self._origin).tolist()
         vx, vy, vz = axes.dot(twist[:3]).tolist()
+        turned = 0.5 * np.cross(rotation.T, self._rotation.T).sum(axis=0)
+        self._along.is_tipped = bool(np.abs(turned).max() > _TIPPED)
         f_x, f_z = self._along.force((x, z), (vx, vz), reading.host_ns)
         f_y = _bounded(-_K_ASIDE * y, _STRONGEST) - _B_ASIDE * vy
         wrench = np.empty(6)
         wrench[:3] = axes.T.dot((f_x, f_y, f_z))
-        turned = 0.5 * np.cross(rotation.T, self._rotation.T).sum(axis=0)
         wrench[3:] = _K_TURN * turned - _B_TURN * twist[3:]
         tau = J.T.dot(wrench)
         tau[6] = 0.0

@@ -88,3 +88,19 @@ def test_a_foot_that_is_lifted_begins_where_it_stands(axes):
 def test_what_no_sole_is_to_do_is_refused(axes, goal):
     with pytest.raises(ValueError, match=r"sole|bounds"):
         axes.aim(goal, 0.1, 0.0, 0)
+
+
+def test_a_tipped_foot_is_pushed_no_more(axes):
+    forces(axes, SoleGoal(6.0, 12.0, 0.1, 0.0, 0.0), 200)
+    axes.is_tipped = True
+    given = forces(axes, SoleGoal(6.0, 12.0, 0.1, 0.0, 0.0), 50)
+
+    assert given[-1] == pytest.approx((0.0, -12.0))
+
+
+def test_a_loaded_foot_is_drawn_with_nine_newtons_at_most(axes):
+    drawn = forces(axes, SoleGoal(NAN, 4.0, 0.3, 0.0, 0.2), 300)
+    carried = forces(axes, SoleGoal(NAN, NAN, 0.3, 0.0, 0.2), 10)
+
+    assert drawn[-1][0] == pytest.approx(9.0)
+    assert carried[-1][0] == pytest.approx(25.0)
