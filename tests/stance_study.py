@@ -16,8 +16,9 @@ from multiprocessing import get_context
 from multiprocessing.pool import Pool
 from pathlib import Path
 
-from analysis.figures import draw_stances, render, styled
+from analysis.figures import render, styled
 from analysis.foresight import ForesightModel, RiskTable
+from analysis.report import draw_stances
 from analysis.stance import (
     POLICIES,
     StancePlan,

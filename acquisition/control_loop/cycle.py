@@ -190,10 +190,9 @@ class Cycle:
         self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
-        move, stance = self._move, self._stance
         if reading.missing_cycles:
             return
-        self._move = self._stance = None
+        move, stance, self._move, self._stance = self._move, self._stance, None, None
         if self.status.verdict is not None:
             return
         try:

@@ -107,30 +107,17 @@ def fit_pushes(
 ) -> dict[str, BreakAwayModel]:
     """Return the break-away model of every terrain whose pushes are given as such.
 
-    Stones share slope and spread as in `fit_break_away`; a terrain off stones has a
-    model where 15 of its pushes slipped, and a terrain of stones where five did.
-
-    Args:
-        pushes: of every trial, by terrain.
-        kinds: kind by terrain: "small" and "big" are stones.
-        options: what a slip is, and how many times trials are resampled.
+    As `fit_break_away`, but a terrain off stones of fewer than 15 slips has none.
     """
     options = options or BreakAwayOptions()
-    every = [
-        _Recorded(name, (), tuple(tuple(trial) for trial in of if trial))
-        for name, of in pushes.items()
-    ]
+    every = [_Recorded(name, (), tuple(map(tuple, of))) for name, of in pushes.items()]
     surface = groups_of(kinds)["surface"]
     known = [r for r in every if len(r.pushes) >= LEAST_TRIALS]
     stones = [r for r in known if surface[r.name] == ROCKY]
     groups = [[r for r in stones if r.slips >= LEAST_OF_STONES]]
     groups += [[r] for r in known if r not in stones and r.slips >= LEAST_SLIPS]
-    return {
-        name: model
-        for group in groups
-        if group
-        for name, model in _fit_group(group, options).items()
-    }
+    fits = [_fit_group(group, options) for group in groups if group]
+    return {name: model for fit in fits for name, model in fit.items()}
 
 
 def _recorded(

@@ -12,10 +12,22 @@ from . import (
 )
 from .sections import ReportSection
 from .spec import FigureSpec
-from .stances import draw_stances
-from .style import Figure, Picture, new_figure, render, styled
+from .style import (
+    MODEL_COLOURS,
+    MODEL_HATCHES,
+    Axes,
+    Figure,
+    Picture,
+    name_ticks,
+    new_figure,
+    render,
+    styled,
+)
 
 __all__ = [
+    "MODEL_COLOURS",
+    "MODEL_HATCHES",
+    "Axes",
     "Figure",
     "FigureSpec",
     "Picture",
@@ -23,9 +35,9 @@ __all__ = [
     "break_away",
     "confusion",
     "curves",
-    "draw_stances",
     "errors",
     "excerpts",
+    "name_ticks",
     "new_figure",
     "render",
     "rig",

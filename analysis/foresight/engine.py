@@ -180,11 +180,6 @@ class Foresight:
         self._is_alarm = False
 
     @property
-    def terrains(self) -> tuple[str, ...]:
-        """Names of the known terrains, in the order of `ForesightState.terrains`."""
-        return self._model.terrains
-
-    @property
     def ground(self) -> GroundRecogniser:
         """What is known of the ground."""
         return self._ground

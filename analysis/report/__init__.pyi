@@ -6,7 +6,7 @@ from .friction_page import (
 )
 from .page import ReportContext, write_report
 from .page_model import ReportTable
-from .stance_page import StanceGroup, stance_html
+from .stance_page import StanceGroup, draw_stances, stance_html
 from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
@@ -17,6 +17,7 @@ __all__ = [
     "ReportTable",
     "StanceGroup",
     "StudyVariant",
+    "draw_stances",
     "friction_html",
     "friction_rows",
     "parse_choice",

@@ -21,7 +21,6 @@ from .sessions import (
     require_samples,
     tell_missing,
 )
-from .stances import report_stances, stance_sessions
 from .table_columns import Quantity, TableColumn, columns_of
 from .truth_errors import compare_with_truth, z_scores
 
@@ -54,9 +53,7 @@ __all__ = [
     "repeat_study",
     "replay_foresight",
     "report_sessions",
-    "report_stances",
     "require_samples",
-    "stance_sessions",
     "study_foresight",
     "tell_missing",
     "z_scores",

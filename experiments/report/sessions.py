@@ -88,24 +88,17 @@ def choose_sessions(
         SessionError: none are named or found, or live and simulated ones are mixed.
     """
     if bool(names) == every:
-        raise SessionError(
-            "Name the sessions to report, or use --all.",
-            hint="For example: traction report S012",
-        )
+        hint = "For example: traction report S012"
+        raise SessionError("Name the sessions to report, or use --all.", hint=hint)
     if every:
-        sessions = [
-            s
-            for s in list_sessions(data)
-            if not s.is_of_stances and (s.kept_trials() or _keeps(s))
-        ]
+        pushed = [s for s in list_sessions(data) if not s.is_of_stances]
+        sessions = [s for s in pushed if s.kept_trials() or _keeps(s)]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
-    for session in sessions:
-        if session.is_of_stances:
-            raise SessionError(
-                f"{session.id} is of stances: it has no push to be studied.",
-                hint=f"Its page: traction report {session.id}",
-            )
+    if standing := [s.id for s in sessions if s.is_of_stances]:
+        raise SessionError(
+            f"{' '.join(standing)}: of stances, without a push to study."
+        )
     if not sessions:
         raise SessionError(
             f"There are no kept trials in {data}.",

@@ -11,7 +11,6 @@ from acquisition.control_loop import ArmState
 from analysis.foresight import ForesightFlag, RiskTable
 from analysis.stance import (
     FRESH_SCALE,
-    LEAST_TRAVEL,
     POLICIES,
     SoleView,
     StanceOutcome,
@@ -55,13 +54,7 @@ def check_stances(rig: Rig, task: StanceTask) -> None:
     """
     if rig.simulation is None:
         raise PreflightError(LIVE_STANCE, hint="Add --fake. Nothing was started.")
-    travel = rig.frame.travel
-    if travel < LEAST_TRAVEL:
-        raise SettingsError(
-            f"{rig.row.name}: a container of {travel:g} m has no fresh place for every "
-            f"stance; {LEAST_TRAVEL:g} m are needed.",
-            hint="Correct travel in matrix.toml. Nothing was started.",
-        )
+    task.check_travel(rig.row.name, rig.frame.travel)
     if not task.is_foreseen:
         return
     source = rig.foresight

@@ -9,7 +9,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from acquisition import SessionError, SettingsError
-from analysis.stance import POLICIES, StanceOutcome, StanceRequest, adapted
+from analysis.stance import (
+    LEAST_TRAVEL,
+    POLICIES,
+    StanceOutcome,
+    StanceRequest,
+    adapted,
+)
 from experiments.arguments import did_you_mean
 from experiments.session.data_files import read_json, write_json
 from experiments.session.store import STANCE_FILE, SessionFolder
@@ -58,6 +64,19 @@ class StanceTask:
     def request(self) -> StanceRequest:
         """What is asked of every stance."""
         return StanceRequest(self.peak, self.risk)
+
+    def check_travel(self, terrain: str, travel: float) -> None:
+        """Refuse a container of `travel` [m] without fresh places.
+
+        Raises:
+            SettingsError: it is too short.
+        """
+        if travel < LEAST_TRAVEL:
+            raise SettingsError(
+                f"{terrain}: a container of {travel:g} m has no fresh place for each "
+                f"of {self.count} stances; {LEAST_TRAVEL:g} m are needed.",
+                hint="Correct travel in matrix.toml. Nothing was started.",
+            )
 
     @property
     def is_foreseen(self) -> bool:

@@ -116,10 +116,11 @@ class StanceBench:
 
 
 def record(
-    bench: StanceBench, plan: StancePlan, foresight: Foresight | None = None
+    bench: StanceBench, plan: StancePlan, model: ForesightModel | None = None
 ) -> StanceSequence:
     """Return a recording of stances, made now."""
     sequence, shares = StanceSequence(plan), {}
+    foresight = None if model is None else Foresight(model, {}, RIG)
     for _ in range(_LONGEST * plan.count):
         goal = sequence.next_goal(bench.view(shares))
         if sequence.is_over:
@@ -131,17 +132,19 @@ def record(
         shares = {}
         for _ in range(TICK_CYCLES):
             bench.cycle()
-            if foresight is not None and not sequence.outcomes:
-                shares = _felt(foresight, bench) or shares
+            if model is not None and foresight is not None and not sequence.outcomes:
+                shares = _felt(foresight, model, bench) or shares
     raise AssertionError(f"a stance does not end: {sequence.state}")
 
 
-def _felt(foresight: Foresight, bench: StanceBench) -> dict[str, float]:
+def _felt(
+    foresight: Foresight, model: ForesightModel, bench: StanceBench
+) -> dict[str, float]:
     sample = FootSample(bench.cycles, bench.now_ns, bench.x, bench.F_t, bench.F_n)
     state = foresight.push(sample)
     if state is None or not state.flags & ForesightFlag.GROUND:
         return {}
-    return dict(zip(foresight.terrains, state.terrains, strict=True))
+    return dict(zip(model.terrains, state.terrains, strict=True))
 
 
 class _Draws:
@@ -222,9 +225,8 @@ def stances(
     made: list[StanceOutcome] = []
     for k in range(beds):
         rng = np.random.default_rng((seed, k, 5))
-        foresight = None if model is None else Foresight(model, {}, RIG)
         bench = StanceBench(terrain, seed, k)
-        one = record(bench, replace(plan, phase=float(rng.random())), foresight)
+        one = record(bench, replace(plan, phase=float(rng.random())), model)
         made += one.outcomes
         plan = replace(plan, scale=one.scale)
     return made
