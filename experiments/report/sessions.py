@@ -100,16 +100,13 @@ def choose_sessions(
             f"{' '.join(standing)}: of stances, without a push to study."
         )
     if not sessions:
-        raise SessionError(
-            f"There are no kept trials in {data}.",
-            hint="Record some: traction run S0 --fake --fast",
-        )
+        hint = "Record some: traction run S0 --fake --fast"
+        raise SessionError(f"There are no kept trials in {data}.", hint=hint)
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
         message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
-        raise SessionError(
-            message.what.format_map(values), hint=message.do.format_map(values)
-        )
+        hint = message.do.format_map(values)
+        raise SessionError(message.what.format_map(values), hint=hint)
     return sessions
 
 

@@ -124,7 +124,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         if source is not None:
             _foresee(source, rig, console)
         if request.stance is not None:
-            check_stances(rig, request.stance)
+            check_stances(rig, request.stance, request.data)
             console.say(request.stance.text)
         page = _check_rig(request, rig, host_faults)
         sensor = sensor_conditions(page.devices)

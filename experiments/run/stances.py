@@ -5,10 +5,12 @@ do by itself it does in hold, with joint 7 locked. Only a simulated arm takes it
 """
 
 from collections.abc import Mapping
+from pathlib import Path
 
 from acquisition import PreflightError, SettingsError
 from acquisition.control_loop import ArmState
-from analysis.foresight import ForesightFlag, RiskTable
+from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_pushes
+from analysis.foresight import ForesightFlag
 from analysis.stance import (
     FRESH_SCALE,
     POLICIES,
@@ -27,10 +29,12 @@ from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.session import (
     STANCES,
+    SessionFolder,
     StanceTask,
     TrialName,
     TrialOutcome,
     adapted_scale,
+    stance_pushes,
 )
 
 LIVE_STANCE = (
@@ -44,8 +48,27 @@ _STUCK = (
 )
 
 
-def check_stances(rig: Rig, task: StanceTask) -> None:
+def fresh_models(
+    rig: Rig, data: Path, *, but: SessionFolder | None = None
+) -> dict[str, BreakAwayModel]:
+    """Return break-away as stances of earlier sessions taught it, by terrain.
+
+    Of terrains with three recordings and enough slips. A push by hand meets stones that
+    it has pressed and pushed before; a foot that is set down does not.
+    """
+    kinds = {row.name: row.stones for row in rig.settings.matrix.terrains}
+    pushes = stance_pushes(data, but=but)
+    known = {name: of for name, of in pushes.items() if name in kinds}
+    return fit_pushes(known, kinds, BreakAwayOptions(draws=1))
+
+
+def check_stances(rig: Rig, task: StanceTask, data: Path) -> None:
     """Refuse a rig on which the task cannot be done.
+
+    Args:
+        rig: the rig, connected.
+        task: what its foot is to do.
+        data: the data folder.
 
     Raises:
         PreflightError: it is a real one.
@@ -59,10 +82,13 @@ def check_stances(rig: Rig, task: StanceTask) -> None:
         return
     source = rig.foresight
     if source is None or not source.break_away:
+        if fresh_models(rig, data):
+            return
         raise SettingsError(
             "avoid-slip needs the risk of break-away, and none is known here.",
-            hint="Record pushes on some terrains and run traction report --all, or "
-            "name a terrain database with --foresight. Nothing was started.",
+            hint="Record stances with --policy constant-mu and none, three recordings "
+            "or more; or pushes and traction report --all; or name a terrain database "
+            "with --foresight. Nothing was started.",
         )
     if not source.model.knows(rig.identity):
         raise SettingsError(
@@ -73,17 +99,20 @@ def check_stances(rig: Rig, task: StanceTask) -> None:
 
 def stance_plan(context: RunContext, task: StanceTask, name: TrialName) -> StancePlan:
     """Return the plan of a recording; what kept stances have taught goes on."""
-    source, tables = context.rig.foresight, dict[str, RiskTable]()
-    if task.is_foreseen and source is not None:
-        tables = risk_tables(source.break_away)
+    rig, folder = context.rig, context.metadata.folder
+    models, first = dict[str, BreakAwayModel](), 1.0
+    if task.is_foreseen:
+        fresh = fresh_models(rig, folder.path.parent.parent, but=folder)
+        pushed = rig.foresight.break_away if rig.foresight is not None else {}
+        models, first = {**pushed, **fresh}, 1.0 if fresh else FRESH_SCALE
     return StancePlan(
         policy=POLICIES[task.policy],
         request=task.request,
         count=task.count,
-        travel=context.rig.frame.travel,
+        travel=rig.frame.travel,
         phase=_STEP * name.number % 1.0,
-        tables=tables,
-        scale=adapted_scale(FRESH_SCALE, context.metadata.folder),
+        tables=risk_tables(models),
+        scale=adapted_scale(first, folder),
     )
 
 

@@ -43,6 +43,7 @@ from .stance_task import (
     adapted_scale,
     read_stance_task,
     stance_outcomes,
+    stance_pushes,
 )
 from .states import Event, SessionPhase, table_lines
 from .store import (
@@ -117,6 +118,7 @@ __all__ = [
     "sidecar_of",
     "sign",
     "stance_outcomes",
+    "stance_pushes",
     "table_lines",
     "trial_path",
     "write_json",

@@ -6,9 +6,11 @@ and in the events of the recording. The study of pushes leaves it out.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from acquisition import SessionError, SettingsError
+from analysis.breakaway import FootPush
 from analysis.stance import (
     LEAST_TRAVEL,
     POLICIES,
@@ -18,7 +20,7 @@ from analysis.stance import (
 )
 from experiments.arguments import did_you_mean
 from experiments.session.data_files import read_json, write_json
-from experiments.session.store import STANCE_FILE, SessionFolder
+from experiments.session.store import STANCE_FILE, SessionFolder, list_sessions
 from experiments.session.trial_files import kept_sidecars
 
 _MOST = 99
@@ -148,6 +150,30 @@ def stance_outcomes(folder: SessionFolder) -> list[tuple[str, list[StanceOutcome
                 hint="Take the file from a copy of the session. Nothing was changed.",
             ) from error
     return found
+
+
+def stance_pushes(
+    data: Path, *, but: SessionFolder | None = None
+) -> dict[str, list[list[FootPush]]]:
+    """Return what kept stances below `data` taught of fresh places, by terrain.
+
+    Trial by trial; simulated ones only, there are no others.
+
+    Args:
+        data: the data folder.
+        but: a session that is left out.
+
+    Raises:
+        SessionError: as `stance_outcomes`.
+    """
+    pushes: dict[str, list[list[FootPush]]] = {}
+    for session in list_sessions(data):
+        if session == but or not (session.is_of_stances and session.is_simulated):
+            continue
+        for _, outcomes in stance_outcomes(session):
+            taught = [p for one in outcomes if (p := one.push) is not None]
+            pushes.setdefault(session.terrain, []).append(taught)
+    return pushes
 
 
 def _rows(rows: Any) -> Sequence[Any]:  # noqa: ANN401
