@@ -103,8 +103,10 @@ def stance_plan(context: RunContext, task: StanceTask, name: TrialName) -> Stanc
     models, first = dict[str, BreakAwayModel](), 1.0
     if task.is_foreseen:
         fresh = fresh_models(rig, folder.path.parent.parent, but=folder)
-        pushed = rig.foresight.break_away if rig.foresight is not None else {}
-        models, first = {**pushed, **fresh}, 1.0 if fresh else FRESH_SCALE
+        if rig.foresight is not None:
+            models.update(rig.foresight.break_away)
+        models.update(fresh)
+        first = 1.0 if fresh else FRESH_SCALE
     return StancePlan(
         policy=POLICIES[task.policy],
         request=task.request,
