@@ -136,6 +136,12 @@ def _bounded(value: float, most: float) -> float:
     return min(max(value, -most), most)
 
 
+def _turn(rotation: Array, wanted: Array) -> tuple[float, float, float]:
+    """Return the small turn from `rotation` to `wanted`, base frame [rad]."""
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = wanted.dot(rotation.T).tolist()
+    return 0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy)
+
+
 class SoleImpedance:
     """Joint torques of the impedance, for joints 1 to 6; joint 7 has its lock."""
 
@@ -181,13 +187,13 @@ class SoleImpedance:
         twist = J.dot(reading.qd)
         x, y, z = axes.dot(position - self._origin).tolist()
         vx, vy, vz = axes.dot(twist[:3]).tolist()
-        turned = 0.5 * np.cross(rotation.T, self._rotation.T).sum(axis=0)
-        self._along.is_tipped = bool(np.abs(turned).max() > _TIPPED)
+        turned = _turn(rotation, self._rotation)
+        self._along.is_tipped = max(map(abs, turned)) > _TIPPED
         f_x, f_z = self._along.force((x, z), (vx, vz), reading.host_ns)
         f_y = _bounded(-_K_ASIDE * y, _STRONGEST) - _B_ASIDE * vy
         wrench = np.empty(6)
         wrench[:3] = axes.T.dot((f_x, f_y, f_z))
-        wrench[3:] = _K_TURN * turned - _B_TURN * twist[3:]
+        wrench[3:] = _K_TURN * np.array(turned) - _B_TURN * twist[3:]
         tau = J.T.dot(wrench)
         tau[6] = 0.0
         return tau

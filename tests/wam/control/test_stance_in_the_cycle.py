@@ -131,3 +131,25 @@ def test_a_false_position_pushes_nothing(foot_model):
     false = replace(reading(0.2), jump=jump)
     tau, gravity = law.torque(false)
     np.testing.assert_array_equal(tau, gravity)
+
+
+@pytest.mark.parametrize("turned", [-0.05, 0.05])
+def test_a_sole_that_turns_is_turned_back(turned, foot_model):
+    law = controller(foot_model)
+    law.stand(SoleGoal(0.0, 0.0, 0.0, 0.0, 0.0), reading(0.0))
+    q = DOWN.copy()
+    q[5] += turned
+    tau, gravity = law.torque(reading(0.002, q=q))
+
+    assert (tau - gravity)[5] * turned < 0.0
+    assert abs((tau - gravity)[5]) > 0.3  # 12 N m/rad, and the way of the sole
+
+
+def test_a_sole_aside_of_the_centre_line_is_drawn_back(foot_model):
+    law = controller(foot_model)
+    law.stand(SoleGoal(0.0, 0.0, 0.0, 0.0, 0.0), reading(0.0))
+    q = DOWN.copy()
+    q[0] += 0.02
+    tau, gravity = law.torque(reading(0.002, q=q))
+
+    assert (tau - gravity)[0] < -0.5
