@@ -26,7 +26,8 @@ FASTEST = 0.20  # m/s of a reference
 STALE_NS = 100_000_000  # age of a command that asks for nothing more
 _DAMPING = 40.0  # N s/m, along a force
 _K, _B, _STRONGEST = 800.0, 100.0, 25.0  # to a place: N/m, N s/m, N
-_DRAWN = 9.0  # N, the same along x for a foot that is loaded
+_DRAWN = 9.0  # N, the spring along x
+_LATERAL = 12.0  # N, spring and damper together, along x and y: see above
 _TIPPED = 0.1  # rad from where it was, beyond which a foot is pushed no more
 _K_ASIDE, _B_ASIDE = 800.0, 100.0  # N/m, N s/m
 _K_TURN, _B_TURN = 12.0, 0.8  # N m/rad, N m s/rad
@@ -74,7 +75,7 @@ class SoleAxes:
         if isnan(goal.F_t) and not isnan(before.F_t):
             self._x = x
         if isnan(goal.F_n) and not isnan(before.F_n):
-            self._z = z
+            self._x, self._z = x, z
         if not isnan(goal.F_n) and isnan(before.F_n):
             pressed = _bounded(_K * (z - self._z), _STRONGEST)
             self._F_n = min(max(pressed, 0.0), LARGEST_F_N)
@@ -96,8 +97,8 @@ class SoleAxes:
         step = 0.0 if is_stale else goal.speed * self._dt
         if isnan(goal.F_t):
             self._x = _towards(self._x, goal.x, step)
-            most = _STRONGEST if isnan(goal.F_n) else _DRAWN
-            spring = _bounded(_K * (self._x - x), 0.0 if self.is_tipped else most)
+            most = 0.0 if self.is_tipped else _DRAWN
+            spring = _bounded(_K * (self._x - x), most)
             f_x = spring - _B * vx
         else:
             is_inside = -_BEYOND <= x <= self._travel + _BEYOND
@@ -112,7 +113,7 @@ class SoleAxes:
         else:
             self._F_n = _towards(self._F_n, goal.F_n, LOAD_RATE * self._dt)
             f_z = -self._F_n - _DAMPING * vz
-        return f_x, f_z
+        return _bounded(f_x, _LATERAL), f_z
 
 
 def _check(goal: SoleGoal) -> None:
@@ -190,7 +191,7 @@ class SoleImpedance:
         turned = _turn(rotation, self._rotation)
         self._along.is_tipped = max(map(abs, turned)) > _TIPPED
         f_x, f_z = self._along.force((x, z), (vx, vz), reading.host_ns)
-        f_y = _bounded(-_K_ASIDE * y, _STRONGEST) - _B_ASIDE * vy
+        f_y = _bounded(-_K_ASIDE * y - _B_ASIDE * vy, _LATERAL)
         wrench = np.empty(6)
         wrench[:3] = axes.T.dot((f_x, f_y, f_z))
         wrench[3:] = _K_TURN * np.array(turned) - _B_TURN * twist[3:]

@@ -98,9 +98,22 @@ def test_a_tipped_foot_is_pushed_no_more(axes):
     assert given[-1] == pytest.approx((0.0, -12.0))
 
 
-def test_a_loaded_foot_is_drawn_with_nine_newtons_at_most(axes):
-    drawn = forces(axes, SoleGoal(NAN, 4.0, 0.3, 0.0, 0.2), 300)
-    carried = forces(axes, SoleGoal(NAN, NAN, 0.3, 0.0, 0.2), 10)
+@pytest.mark.parametrize("load", [NAN, 4.0])
+def test_a_foot_is_drawn_with_nine_newtons_at_most(axes, load):
+    drawn = forces(axes, SoleGoal(NAN, load, 0.3, 0.0, 0.2), 300)
 
     assert drawn[-1][0] == pytest.approx(9.0)
-    assert carried[-1][0] == pytest.approx(25.0)
+
+
+def test_a_foot_that_was_drawn_in_vain_is_lifted_without_a_jerk(axes):
+    forces(axes, SoleGoal(NAN, 4.0, 0.3, 0.0, 0.2), 300)
+    axes.aim(SoleGoal(NAN, NAN, 0.1, 0.02, 0.15), 0.1, 0.0, 600_000_000)
+
+    assert abs(axes.force((0.1, 0.0), (0.0, 0.0), 600_000_000)[0]) < 1.0
+
+
+@pytest.mark.parametrize("speed", [-0.5, 0.5])
+def test_no_damper_is_stronger_than_the_wrist(axes, speed):
+    axes.aim(SoleGoal(NAN, NAN, 0.1, 0.0, 0.1), 0.1, 0.0, 0)
+
+    assert abs(axes.force((0.1, 0.0), (speed, 0.0), 0)[0]) == 12.0
