@@ -25,11 +25,12 @@ TRACTION_RATE, RELEASE_RATE, LOAD_RATE = 20.0, 100.0, 40.0  # N/s: grow, fall; F
 FASTEST = 0.20  # m/s of a reference
 STALE_NS = 100_000_000  # age of a command that asks for nothing more
 _DAMPING = 40.0  # N s/m, along a force
-_K, _B, _STRONGEST = 800.0, 100.0, 25.0  # to a place: N/m, N s/m, N
+_K, _B, _STRONGEST = 400.0, 40.0, 25.0  # to a place: N/m, N s/m, N
+# With 100 N s/m the wrist swings at 12 Hz as soon as the foot hangs free.
 _DRAWN = 9.0  # N, the spring along x
 _LATERAL = 12.0  # N, spring and damper together, along x and y: see above
 _TIPPED = 0.1  # rad from where it was, beyond which a foot is pushed no more
-_K_ASIDE, _B_ASIDE = 800.0, 100.0  # N/m, N s/m
+_K_ASIDE, _B_ASIDE = 400.0, 40.0  # N/m, N s/m
 _K_TURN, _B_TURN = 12.0, 0.8  # N m/rad, N m s/rad
 _BEYOND = 0.05  # m past the ends of the container where traction is taken back
 

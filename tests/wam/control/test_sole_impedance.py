@@ -62,7 +62,7 @@ def test_no_traction_is_asked_for_beyond_the_container(axes):
 def test_a_place_is_approached_at_its_speed(axes):
     along, _ = forces(axes, SoleGoal(NAN, 4.0, 0.3, 0.0, 0.05), 50)[-1]
 
-    assert along == pytest.approx(800.0 * 0.05 * 0.1)
+    assert along == pytest.approx(400.0 * 0.05 * 0.1)
 
 
 def test_a_foot_that_is_lifted_begins_where_it_stands(axes):
