@@ -16,6 +16,7 @@ from experiments.arguments import add_global_options, did_you_mean
 COMMANDS = {
     "check": "is the rig fit to run? one graded page",
     "run": "record a session of trials on one terrain",
+    "stance": "let the simulated foot stand by itself, asked for traction",
     "resume": "continue the session that is not finished",
     "redo": "record any one trial of a session once more",
     "status": "the matrix board, counted from verified files",
@@ -40,6 +41,7 @@ COMMANDS = {
 _JOINED = {
     "publish": "export",
     "watch": "replay",
+    "stance": "run",
 }  # commands that share a file with another
 _OF_THE_DISK = {
     errno.EIO,

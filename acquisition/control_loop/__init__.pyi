@@ -9,7 +9,7 @@ from .faults import (
     to_plain,
     verdict_for,
 )
-from .law import ControlLaw, FootObserver
+from .law import ControlLaw, FootObserver, SoleGoal
 from .limits import GuardLimits
 from .loop import Loop, LoopStats, Tick
 from .realtime import Grant, RealtimeRequest, choose_cores, die_with_parent, request
@@ -35,6 +35,7 @@ __all__ = [
     "LoopStats",
     "RealtimeRequest",
     "ReplySilence",
+    "SoleGoal",
     "Tick",
     "choose_cores",
     "die_with_parent",

@@ -14,7 +14,7 @@ from acquisition.control_loop.faults import (
     verdict_for,
 )
 from acquisition.control_loop.guard import GuardState, Observation, check
-from acquisition.control_loop.law import ControlLaw, FootObserver
+from acquisition.control_loop.law import ControlLaw, FootObserver, SoleGoal
 from acquisition.control_loop.limits import GuardLimits, bounded_torque
 from acquisition.control_loop.loop import Tick
 from acquisition.control_loop.states import (
@@ -103,6 +103,7 @@ class Cycle:
         self._speed = 0.0
         self._requested: ArmEvent | None = None
         self._move: tuple[Vector, float] | None = None
+        self._stance: SoleGoal | None = None
         self._reported: GuardVerdict | None = None
         self.is_recording = False
         self.replies_ns = 0
@@ -115,15 +116,19 @@ class Cycle:
         are there when the pendant activates the arm, or it would fall for a moment.
         """
         self._requested = REQUESTS[state]
-        self._move = self.status.verdict = None
+        self._move = self._stance = self.status.verdict = None
 
     def move_to(self, goal: Sequence[float], speed: float) -> None:
         """Ask for a move to joint positions `goal` [rad], seven; only in hold.
 
-        No joint is faster than `speed` [rad/s] on the way. While a verdict stands no
-        move begins: hold has to be asked for before.
+        No joint is faster than `speed` [rad/s]. While a verdict stands no move begins:
+        hold has to be asked for before.
         """
         self._move = np.array(goal), speed
+
+    def stand(self, goal: SoleGoal) -> None:
+        """Ask for what the sole is to do; else as `move_to`."""
+        self._stance = goal
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Take the sensor's reading without load [N, N m], six numbers."""
@@ -185,14 +190,16 @@ class Cycle:
         self._handle(event, reading)
 
     def _begin_move(self, reading: ArmReading) -> None:
-        move = self._move
-        if move is None or reading.missing_cycles:
+        if reading.missing_cycles:
             return
-        self._move = None
+        move, stance, self._move, self._stance = self._move, self._stance, None, None
         if self.status.verdict is not None:
             return
         try:
-            self.law.move_to(*move, reading)
+            if move is not None:
+                self.law.move_to(*move, reading)
+            elif stance is not None:
+                self.law.stand(stance, reading)
         except ValueError:
             self.report(verdict_for(Fault.MOVE_REFUSED))
 

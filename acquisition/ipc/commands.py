@@ -30,6 +30,7 @@ class CommandKind(IntEnum):
     SET_BIAS = 3  # values: the sensor's reading without load, six of them
     MOVE = 4  # values: joint positions to go to, seven of them, and the speed
     LEAVE = 5  # end the loop; the arm is idle by then, or is made so
+    STAND = 6  # values: what the sole is to do, five numbers as of `SoleGoal`
 
 
 @dataclass(frozen=True, slots=True)

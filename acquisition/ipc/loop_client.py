@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from acquisition.clock import NS_PER_S, PERIOD_NS, Clock
-from acquisition.control_loop import ArmState, ControlStatus
+from acquisition.control_loop import ArmState, ControlStatus, SoleGoal
 from acquisition.ipc.commands import CommandKind, CommandQueue, LoopStatus, StatusSlot
 from acquisition.ipc.layout import ProcessRole, SharedLayout
 from acquisition.ipc.rings import RingReader
@@ -99,6 +99,10 @@ class LoopClient:
         No joint is faster than `speed` [rad/s] on the way.
         """
         self._asked = self._commands.post(CommandKind.MOVE, values=(*goal, speed))
+
+    def stand(self, goal: SoleGoal) -> None:
+        """Ask for what the sole is to do, in hold; again at least every 0.1 s."""
+        self._commands.post(CommandKind.STAND, values=goal.values)
 
     def set_bias(self, bias: Sequence[float]) -> None:
         """Tell the loop what the sensor reads without load [N, N m], six numbers."""

@@ -10,6 +10,7 @@ from acquisition.control_loop import (
     Cycle,
     Fault,
     LoopStats,
+    SoleGoal,
     Tick,
     pack_timing,
     verdict_for,
@@ -110,6 +111,8 @@ class LoopServer:
         elif kind is CommandKind.MOVE:
             *goal, speed = command.values[:8]
             cycle.move_to(tuple(goal), speed)
+        elif kind is CommandKind.STAND:
+            cycle.stand(SoleGoal(*command.values[:5]))
         else:
             self.is_over = True
         self._status.obeyed = command.number

@@ -1,6 +1,6 @@
 from .answers import AvailableForce, BreakAwayRisk
 from .censored import Family
-from .fitting import BreakAwayOptions, fit_break_away
+from .fitting import BreakAwayOptions, fit_break_away, fit_pushes
 from .model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
 from .pushes import V_SLIP, FootPush, find_pushes
 from .survival import SurvivalCurve, kaplan_meier, pit_distance, pit_limit
@@ -19,6 +19,7 @@ __all__ = [
     "SurvivalCurve",
     "find_pushes",
     "fit_break_away",
+    "fit_pushes",
     "kaplan_meier",
     "pit_distance",
     "pit_limit",

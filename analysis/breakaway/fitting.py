@@ -100,6 +100,26 @@ def fit_break_away(
     return {name: fitted[name] for name in trials if name in fitted}
 
 
+def fit_pushes(
+    pushes: Mapping[str, Sequence[Sequence[FootPush]]],
+    kinds: Mapping[str, str],
+    options: BreakAwayOptions | None = None,
+) -> dict[str, BreakAwayModel]:
+    """Return the break-away model of every terrain whose pushes are given as such.
+
+    As `fit_break_away`, but a terrain off stones of fewer than 15 slips has none.
+    """
+    options = options or BreakAwayOptions()
+    every = [_Recorded(name, (), tuple(map(tuple, of))) for name, of in pushes.items()]
+    surface = groups_of(kinds)["surface"]
+    known = [r for r in every if len(r.pushes) >= LEAST_TRIALS]
+    stones = [r for r in known if surface[r.name] == ROCKY]
+    groups = [[r for r in stones if r.slips >= LEAST_OF_STONES]]
+    groups += [[r] for r in known if r not in stones and r.slips >= LEAST_SLIPS]
+    fits = [_fit_group(group, options) for group in groups if group]
+    return {name: model for fit in fits for name, model in fit.items()}
+
+
 def _recorded(
     name: str, trials: Sequence[PreparedTrial], options: BreakAwayOptions
 ) -> _Recorded:
@@ -140,7 +160,7 @@ def _resampled(group: Sequence[_Recorded], rng: np.random.Generator) -> Array:
     return np.concatenate(
         [
             np.bincount(rng.integers(n, size=n), minlength=n).astype(np.float64)
-            for n in (len(r.trials) for r in group)
+            for n in (len(r.pushes) for r in group)
         ]
     )
 
@@ -150,7 +170,7 @@ def _family(group: Sequence[_Recorded], table: PushTable) -> Family:
 
     A fold leaves out the trial of one number of every terrain.
     """
-    number = np.concatenate([np.arange(len(r.trials)) for r in group])[table.trial]
+    number = np.concatenate([np.arange(len(r.pushes)) for r in group])[table.trial]
     scores = {
         family: _inner_score(table, family, len(group), number) for family in Family
     }
@@ -203,7 +223,7 @@ def _model(
         v_slip=options.v_slip,
         slips=recorded.slips,
         held=len(pushes) - recorded.slips,
-        trials=len(recorded.trials),
+        trials=len(recorded.pushes),
         loads=_spanned(loads),
         forces=_spanned(peaks),
         is_trial_seen=is_trial_seen,

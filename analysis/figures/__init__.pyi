@@ -12,9 +12,22 @@ from . import (
 )
 from .sections import ReportSection
 from .spec import FigureSpec
-from .style import Figure, Picture, new_figure, render, styled
+from .style import (
+    MODEL_COLOURS,
+    MODEL_HATCHES,
+    Axes,
+    Figure,
+    Picture,
+    name_ticks,
+    new_figure,
+    render,
+    styled,
+)
 
 __all__ = [
+    "MODEL_COLOURS",
+    "MODEL_HATCHES",
+    "Axes",
     "Figure",
     "FigureSpec",
     "Picture",
@@ -24,6 +37,7 @@ __all__ = [
     "curves",
     "errors",
     "excerpts",
+    "name_ticks",
     "new_figure",
     "render",
     "rig",

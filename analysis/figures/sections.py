@@ -12,6 +12,7 @@ class ReportSection(Enum):
     BEYOND = "Beyond the paper"
     FRICTION = "Friction of the drives"
     LOADS = "Loads that friction leaves"
+    STANCES = "Stances"
     HEALTH = "Rig health"
     REACH = "What this rig could have seen"
     ORIGIN = "Choices and provenance"

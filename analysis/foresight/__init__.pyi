@@ -1,4 +1,11 @@
-from .engine import EVERY, FootSample, Foresight, ForesightFlag, ForesightState
+from .engine import (
+    EVERY,
+    FootSample,
+    Foresight,
+    ForesightFlag,
+    ForesightState,
+    RiskTable,
+)
 from .ground import GroundLaw, GroundModel, GroundRecogniser
 from .held_out import ForesightRun, folds_of, foresee, hold_out
 from .logistic import RidgeLogistic, all_pairs, fit_logistic
@@ -41,6 +48,7 @@ __all__ = [
     "Provenance",
     "RidgeLogistic",
     "RigIdentity",
+    "RiskTable",
     "Signals",
     "SlipModel",
     "SlipScore",

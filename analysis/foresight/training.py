@@ -17,7 +17,7 @@ from analysis.foresight.ground import (
     GroundModel,
     log_speed,
 )
-from analysis.foresight.ground_window import WINDOWS, GroundWindow
+from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS, GroundWindow
 from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
 from analysis.foresight.model import ForesightModel, Provenance, SlipModel
 from analysis.foresight.watching import FLAT_SURFACE, ROCKY_SURFACE, WatchedTrial
@@ -205,4 +205,5 @@ def ground_windows(trial: WatchedTrial) -> dict[int, Array]:
         for size in WINDOWS:
             if window.count >= size and window.count % _EVERY_WINDOW == 0:
                 rows[size].append(window.features(size))
-    return {size: np.array(of).reshape(len(of), -1) for size, of in rows.items()}
+    width = len(GROUND_FEATURES)
+    return {size: np.array(of).reshape(-1, width) for size, of in rows.items()}

@@ -6,6 +6,7 @@ from .friction_page import (
 )
 from .page import ReportContext, write_report
 from .page_model import BedPhoto, ReportTable
+from .stance_page import StanceGroup, draw_stances, stance_html
 from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
@@ -15,12 +16,15 @@ __all__ = [
     "FrictionPage",
     "ReportContext",
     "ReportTable",
+    "StanceGroup",
     "StudyVariant",
+    "draw_stances",
     "friction_html",
     "friction_rows",
     "parse_choice",
     "parse_window",
     "plain_choice",
     "side_by_side",
+    "stance_html",
     "write_report",
 ]

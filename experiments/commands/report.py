@@ -1,9 +1,17 @@
 """traction report: fit, compare and report recorded sessions."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from experiments.arguments import add_allow_missing, add_analysis, add_seed
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from experiments.session import SessionFolder
 
 EXAMPLES = """\
   traction report S012                             one session, in its own folder
@@ -29,6 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
+    import json
+
     from experiments.operator import Console, PageRecorder
     from experiments.report import (
         ReportRequest,
@@ -42,6 +52,13 @@ def run(args: argparse.Namespace) -> int:
     choices = analysis_choices(args)
     console = PageRecorder() if args.json else Console(color=not args.no_color)
     data = Path(args.data)
+    if not args.all and (standing := _stance_sessions(data, args.sessions)):
+        tell_missing(standing, console, allow_missing=args.allow_missing)
+        page = _report_stances(standing, data)
+        names = {"sessions": [session.id for session in standing], "page": str(page)}
+        shown = json.dumps(names) if args.json else f"Open in a browser: {page}"
+        Console(color=False).say(shown)
+        return 0
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
@@ -77,3 +94,64 @@ def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:
         "notes": numbers["notes"],
     }
     return json.dumps(content, indent=1, ensure_ascii=False)
+
+
+def _stance_sessions(data: Path, names: Sequence[str]) -> list[SessionFolder]:
+    """Return the named sessions if they are of stances, none if they are of pushes.
+
+    Raises:
+        SessionError: there is no such session, or both kinds are named.
+    """
+    from acquisition import SessionError
+    from experiments.session import find_session
+
+    sessions = [find_session(data, name) for name in dict.fromkeys(names)]
+    standing = [session for session in sessions if session.is_of_stances]
+    if standing and len(standing) < len(sessions):
+        raise SessionError(
+            f"{standing[0].id} is of stances, others are of pushes.",
+            hint="Report them apart. Nothing was written.",
+        )
+    return standing
+
+
+def _report_stances(sessions: Sequence[SessionFolder], data: Path) -> Path:
+    """Write the page of sessions of stances; return it.
+
+    One session is reported into its own folder, several into `data`/stances.
+
+    Raises:
+        SessionError: no session has a kept stance, or a file is not what it was.
+    """
+    from acquisition import SessionError, SystemClock
+    from analysis.report import ReportContext, StanceGroup, stance_html
+    from experiments.session import (
+        iso_utc,
+        read_stance_task,
+        stance_outcomes,
+        write_text,
+    )
+
+    groups: list[StanceGroup] = []
+    for session in sessions:
+        task = read_stance_task(session)
+        outcomes = [one for _, of in stance_outcomes(session) for one in of]
+        if task is not None and outcomes:
+            groups.append(
+                StanceGroup(session.terrain, task.name, task.request, outcomes)
+            )
+    if not groups:
+        raise SessionError(f"{', '.join(s.id for s in sessions)}: no kept stances.")
+    count = sum(len(group.outcomes) for group in groups)
+    terrains = dict.fromkeys(group.terrain for group in groups)
+    context = ReportContext(
+        title="Traction " + (sessions[0].id if len(sessions) == 1 else "stances"),
+        subtitle=f"{count} stances on {', '.join(terrains)}",
+        is_simulated=sessions[0].is_simulated,
+        is_foreign=False,
+        generated_utc=iso_utc(SystemClock().utc_ns()),
+    )
+    own = sessions[0].path / "report" if len(sessions) == 1 else data / "stances"
+    own.mkdir(parents=True, exist_ok=True)
+    write_text(own / "index.html", stance_html(context, groups))
+    return own / "index.html"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from experiments.arguments import (
     PACES,
+    JoinedCommand,
     add_fault,
     add_simulated_arm,
     data_option,
@@ -16,7 +17,7 @@ from experiments.arguments import (
 
 if TYPE_CHECKING:
     from experiments.run import ResumeRequest, SessionRequest
-    from experiments.session import UnfinishedSession
+    from experiments.session import StanceTask, UnfinishedSession
 
 EXAMPLES = """\
   traction run S0 --fake --fast             a simulated session, ten trials
@@ -73,6 +74,11 @@ def _add_simulation(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run one session and return the exit code."""
+    return _run(args, None)
+
+
+def _run(args: argparse.Namespace, stance: StanceTask | None) -> int:
+    """Run one session of pushes, or of stances; return the exit code."""
     from experiments.operator import Console, choose_operator
     from experiments.rig import FakeOptions
     from experiments.run import OpenMode, SessionRequest, resume_session, run_session
@@ -99,6 +105,7 @@ def run(args: argparse.Namespace) -> int:
         faults=tuple(args.fault),
         can_log=args.can_log,
         foresight=args.foresight,
+        stance=stance,
     )
     unfinished = _make_room(request, is_new=args.new)
     if unfinished is not None:
@@ -169,3 +176,56 @@ def _check_arguments(args: argparse.Namespace) -> None:
         raise SettingsError(
             f"--seed {args.seed} - expected a whole number >= 0, e.g. 1.", hint=nothing
         )
+
+
+_STANCE_EXAMPLES = """\
+  traction stance S0 --fake --fast --policy constant-mu
+  traction stance S10 --policy avoid-slip --risk 0.05 --fake --fast --trials 2"""
+_STANCES_OF_A_TRIAL = 25
+
+
+def _add_stance_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `stance`."""
+    add_arguments(parser)
+    parser.add_argument(
+        "--policy",
+        choices=("avoid-slip", "constant-mu", "none", "oracle"),
+        default="avoid-slip",
+        help="what chooses normal force and traction (avoid-slip)",
+    )
+    parser.add_argument(
+        "--risk",
+        type=float,
+        default=0.05,
+        metavar="R",
+        help="share of stances that may slip, 0.01..0.5 (0.05)",
+    )
+    parser.add_argument(
+        "--peak",
+        type=float,
+        default=6.0,
+        metavar="N",
+        help="of the traction that is asked for, 4..10 (6)",
+    )
+    parser.add_argument(
+        "--stances",
+        type=int,
+        default=_STANCES_OF_A_TRIAL,
+        metavar="N",
+        help="of each recording (25)",
+    )
+
+
+def _stance(args: argparse.Namespace) -> int:
+    """Let the foot stand by itself, in the simulation only."""
+    from acquisition import PreflightError
+    from experiments.run import LIVE_STANCE
+    from experiments.session import StanceTask
+
+    task = StanceTask(args.policy, args.risk, args.peak, args.stances)
+    if not args.fake:
+        raise PreflightError(LIVE_STANCE, hint="Add --fake. Nothing was started.")
+    return _run(args, task)
+
+
+STANCE = JoinedCommand(_STANCE_EXAMPLES, _add_stance_arguments, _stance)

@@ -90,19 +90,19 @@ def choose_sessions(
         SessionError: none are named or found, or live and simulated ones are mixed.
     """
     if bool(names) == every:
-        raise SessionError(
-            "Name the sessions to report, or use --all.",
-            hint="For example: traction report S012",
-        )
+        hint = "For example: traction report S012"
+        raise SessionError("Name the sessions to report, or use --all.", hint=hint)
     if every:
-        sessions = [s for s in list_sessions(data) if s.kept_trials() or _keeps(s)]
+        pushed = [s for s in list_sessions(data) if not s.is_of_stances]
+        sessions = [s for s in pushed if s.kept_trials() or _keeps(s)]
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
+    if standing := [s.id for s in sessions if s.is_of_stances]:
+        what = f"{' '.join(standing)}: of stances, without a push to study."
+        raise SessionError(what, hint="Leave it out.")
     if not sessions:
-        raise SessionError(
-            f"There are no kept trials in {data}.",
-            hint="Record some: traction run S0 --fake --fast",
-        )
+        hint = "Record some: traction run S0 --fake --fast"
+        raise SessionError(f"There are no kept trials in {data}.", hint=hint)
     simulated = [s for s in sessions if s.is_simulated]
     if simulated and len(simulated) < len(sessions):
         message, values = CATALOGUE["mixed"], {"session": simulated[0].id}

@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import Clock, Flag, SettingsError, WrenchSample, WrenchSensor
+from acquisition import (
+    PERIOD_NS,
+    Clock,
+    Flag,
+    SettingsError,
+    WrenchSample,
+    WrenchSensor,
+)
 from acquisition.control_loop import Cycle, CycleOutputs, GuardLimits
 from acquisition.ipc import (
     FrameTape,
@@ -28,6 +35,7 @@ from wam.control import (
     FrictionCompensation,
     LockGains,
     SoftWalls,
+    SoleImpedance,
     Walls,
 )
 from wam.driver import WARNING_SHARE, ArmSettings, SafetyLimits, WamArm, health_metadata
@@ -204,17 +212,23 @@ def build_loop_server(parts: LoopConfig) -> LoopServer:
             "link": arm.counters.text(),
         }
 
+    frame = terrain_frame(parts.row)
+    law = FootController(
+        parts.law.weighed,
+        control.virtual_mass,
+        LockGains(kp=control.lock_kp, kd=control.lock_kd),
+        SoftWalls(build_walls(parts.rig, model.constants)),
+        parts.law.compensation,
+    )
+    if parts.is_simulated:  # a foot that stands by itself was never tried on an arm
+        law.impedance = SoleImpedance(
+            model, frame.axes(), np.array(frame.far_end), frame.travel, PERIOD_NS * 1e-9
+        )
     cycle = Cycle(
         parts.arm,
         parts.sensor,
-        FootController(
-            parts.law.weighed,
-            control.virtual_mass,
-            LockGains(kp=control.lock_kp, kd=control.lock_kd),
-            SoftWalls(build_walls(parts.rig, model.constants)),
-            parts.law.compensation,
-        ),
-        LiveFoot(model, payload_of(model.tool), terrain_frame(parts.row)),
+        law,
+        LiveFoot(model, payload_of(model.tool), frame),
         build_limits(parts.rig, model.constants),
         CycleOutputs(
             shared.cycles.write,

@@ -26,8 +26,17 @@ _ASIDE = frozenset({Prompt.PAUSED, Prompt.NOTE})  # the hand stays where it is
 class SimulatedHand:
     """Moves the simulated hand and pendant as the prompts ask."""
 
-    def __init__(self, simulation: SimulationControl) -> None:
+    def __init__(
+        self, simulation: SimulationControl, *, lets_stand: bool = False
+    ) -> None:
+        """Follow the prompts of one session.
+
+        Args:
+            simulation: the hand and the pendant.
+            lets_stand: the foot stands by itself; the hand puts it down nowhere.
+        """
         self._simulation = simulation
+        self._lets_stand = lets_stand
         self._seen: tuple[Prompt, int, int] | None = None
 
     def follow(self, state: PromptState) -> None:
@@ -47,8 +56,14 @@ class SimulatedHand:
             self._simulation.touch(state.trial)
         elif state.prompt is Prompt.READY:
             self._simulation.prepare(state.trial + 1000 * (state.attempt - 1))
-            self._simulation.put_down()
+            if self._lets_stand:
+                self._simulation.let_go()
+            else:
+                self._simulation.put_down()
         elif state.prompt is Prompt.RECORDING:
-            self._simulation.push()
+            if self._lets_stand:
+                self._simulation.stand()
+            else:
+                self._simulation.push()
         elif state.prompt is Prompt.REVIEW:
             self._simulation.rest()

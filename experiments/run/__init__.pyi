@@ -11,10 +11,12 @@ from .resume import (
     resume_session,
 )
 from .session import OpenMode, SessionRequest, run_session
+from .stances import LIVE_STANCE
 from .stop import ArmFaultError, StopFlag, StopRequestedError, handle_signals
 from .surroundings import read_poses
 
 __all__ = [
+    "LIVE_STANCE",
     "TICK",
     "ArmFaultError",
     "ConsoleLoop",

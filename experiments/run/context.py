@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from acquisition import TractionError
-from acquisition.control_loop import GuardVerdict
+from acquisition.control_loop import ArmState, GuardVerdict
 from acquisition.ipc import LoopClient
 from analysis.next_push import Aim
 from experiments.messages import ComputerLoad, FaultContext, fault_text
@@ -21,7 +21,15 @@ from experiments.operator import (
 from experiments.rig import Rig
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.stop import ArmFaultError, StopFlag
-from experiments.session import KEEP, REJECT, Camera, Event, Journal, TrialName
+from experiments.session import (
+    KEEP,
+    REJECT,
+    Camera,
+    Event,
+    Journal,
+    StanceTask,
+    TrialName,
+)
 from experiments.trial import SessionMetadata, TrialArchive
 
 UNDO_NS = 10_000_000_000  # a verdict can be taken back for so long [ns]
@@ -68,6 +76,7 @@ class RunContext:
         ticked: numbers of the steps of the reset that were ticked.
         camera: where photos of the bed come from.
         trial_began_utc_ns: when the newest trial began [UTC ns], by this computer.
+        stance: what the foot is to do by itself; None = it is pushed.
     """
 
     console_loop: ConsoleLoop
@@ -91,6 +100,7 @@ class RunContext:
     ticked: set[int] = field(default_factory=set[int])
     camera: Camera = field(default_factory=lambda: Camera("", None, 0.0))
     trial_began_utc_ns: int = 0
+    stance: StanceTask | None = None
 
     @property
     def loop_client(self) -> LoopClient:
@@ -108,6 +118,14 @@ class RunContext:
         kept = len(self.journal.state.kept) - self.kept_before
         missing = self.journal.state.wanted - len(self.journal.state.kept)
         return self.elapsed / kept * missing if kept > 0 else None
+
+    def await_trial(self) -> None:
+        """Ask for what the arm does until a trial begins.
+
+        It floats in the hand that puts it down; a foot that will stand is held.
+        """
+        is_held = self.stance is not None
+        self.loop_client.request(ArmState.HOLD if is_held else ArmState.FLOAT)
 
     def say(self, text: str) -> None:
         """Print one line."""
@@ -239,7 +257,10 @@ def busy_load(rig: Rig, *, is_rehearsed: bool) -> ComputerLoad | None:
 
 
 def open_context(
-    console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
+    console_loop: ConsoleLoop,
+    metadata: SessionMetadata,
+    journal: Journal,
+    stance: StanceTask | None = None,
 ) -> RunContext:
     """Return the context of a session that is opened now."""
     rig, console = console_loop.rig, console_loop.console
@@ -256,6 +277,7 @@ def open_context(
         opened_ns=rig.clock.now_ns(),
         kept_before=len(journal.state.kept),
         camera=camera_of(rig),
+        stance=stance,
     )
 
 

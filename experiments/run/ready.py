@@ -95,8 +95,9 @@ def ready_view(context: RunContext) -> ReadyView:
     """Return what the screen between two trials shows now, and remember its aim."""
     state, row = context.journal.state, context.rig.row
     folder = context.metadata.folder
+    is_pushed = context.stance is None
     push = context.console_loop.run_aside(lambda: next_push(folder, row))
-    context.aim = push.aim
+    context.aim = push.aim if is_pushed else None
     return ReadyView(
         session=folder.id,
         terrain=row.name,
@@ -107,12 +108,13 @@ def ready_view(context: RunContext) -> ReadyView:
         elapsed=context.elapsed,
         left=context.time_left,
         reset=row.reset,
-        suggestion=push.text,
-        enough=push.enough,
+        suggestion=push.text if is_pushed else "",
+        enough=push.enough if is_pushed else "",
         ticked=frozenset(context.ticked),
         table=kept_rows(folder),
         given=context.given.text if context.given is not None else "",
         undo_left=context.console_loop.undo_left,
+        arm="floating" if is_pushed else "holding; keep clear of it",
     )
 
 
@@ -200,7 +202,7 @@ def _pause(context: RunContext, name: TrialName) -> None:
             context.clear_faults(fault)  # and there is no answer: the pause goes on
     context.fault_context = before
     context.append(Event.CONTINUED)
-    context.loop_client.request(ArmState.FLOAT)
+    context.await_trial()
 
 
 def _view_last(context: RunContext, name: TrialName) -> None:

@@ -1,6 +1,7 @@
 """One trial on the loop: started, followed, ended, sealed, and what it is worth."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from experiments.rig import Rig, foresight_view
 from experiments.run.console_loop import TICK
 from experiments.run.context import RunContext
 from experiments.run.photo import take_photo
+from experiments.run.stances import follow_stances, stance_lines
 from experiments.run.stop import ArmFaultError, StopRequestedError
 from experiments.session import Event, TrialName, TrialOutcome
 from experiments.trial import (
@@ -107,6 +109,8 @@ def record_trial(context: RunContext, name: TrialName) -> TrialOutcome:
         ProcessLostError: a process has died.
     """
     header = trial_header(context.rig, context.metadata, name)
+    if context.stance is not None:
+        header = replace(header, trial={**header.trial, **context.stance.metadata()})
     outcome = TrialOutcome("bug")
     try:
         _record(context, name, header, outcome)
@@ -153,7 +157,10 @@ def _record(
     context.feedback.give(FeedbackSignal.START)
     console_loop.show(recording_screen(context.rig, name.kept, outcome))
     try:
-        _follow(context, name, outcome)
+        if context.stance is None:
+            _follow(context, name, outcome)
+        else:
+            follow_stances(context, context.stance, name, outcome)
     finally:
         console_loop.show(None)
         context.feedback.give(FeedbackSignal.DONE)
@@ -221,6 +228,10 @@ def _end(
         f"{name.kept} {outcome.status} {outcome.seconds:.2f} s · {verified.cycles} "
         "samples · written and verified"
     )
+    if outcome.status == "complete" and context.stance is not None:
+        warnings = [f" {WARNING} {line}" for line in rubbing]
+        context.say_page([written, *stance_lines(context.stance, outcome), *warnings])
+        return
     if outcome.status == "complete":
         path = context.metadata.folder.trials / f"{name.kept}.mcap"
         review = context.console_loop.run_aside(lambda: review_trial(path, context.aim))

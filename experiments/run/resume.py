@@ -33,6 +33,7 @@ from experiments.session import (
     UnfinishedSession,
     check_kept,
     open_journal,
+    read_stance_task,
     recover_session,
     refusal,
     session_lock,
@@ -244,8 +245,7 @@ def _reopen(
     details: Mapping[str, object],
 ) -> int:
     folder, console = journal.folder, request.console
-    reason = refusal(journal.state, {"event": event, **details})
-    if reason:
+    if reason := refusal(journal.state, {"event": event, **details}):
         why = f"{folder.id} cannot be opened: {reason}."
         raise SessionError(why, hint="Nothing was started.")
     before = _last_opening(journal)
@@ -264,17 +264,17 @@ def _reopen(
         faults=request.faults,
         can_log=request.can_log,
         foresight=request.foresight,
+        stance=read_stance_task(folder),
     )
-    kept = len(journal.state.kept)
-    console.say(f"session {folder.id}: {kept} of {journal.state.wanted} kept")
+    state = journal.state
+    console.say(f"session {folder.id}: {len(state.kept)} of {state.wanted} kept")
     return run_session(session, OpenMode(event, details, journal, request.is_forced))
 
 
 def _last_opening(journal: Journal) -> dict[str, Any]:
     """Return the event with which the session was opened last."""
-    events = journal.folder.events()
-    openings = [event for event in events if event.get("event") in _OPENINGS]
-    return openings[-1] if openings else {}
+    events = [e for e in journal.folder.events() if e.get("event") in _OPENINGS]
+    return events[-1] if events else {}
 
 
 def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
@@ -284,8 +284,8 @@ def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
 
 
 def _config_of(opening: Mapping[str, Any]) -> Path | None:
-    config = opening.get("config")
-    return Path(config) if isinstance(config, str) and config else None
+    config = opening.get("config") or None
+    return Path(config) if isinstance(config, str) else None
 
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:

@@ -26,7 +26,15 @@ from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
-from experiments.session import Event, Journal, TrialName, TrialOutcome, write_text
+from experiments.session import (
+    STANCES,
+    Event,
+    Journal,
+    StanceTask,
+    TrialName,
+    TrialOutcome,
+    write_text,
+)
 from experiments.trial import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
@@ -41,9 +49,13 @@ class SessionRunner:
     """Runs one session on a rig that passed its preflight."""
 
     def __init__(
-        self, console_loop: ConsoleLoop, metadata: SessionMetadata, journal: Journal
+        self,
+        console_loop: ConsoleLoop,
+        metadata: SessionMetadata,
+        journal: Journal,
+        stance: StanceTask | None = None,
     ) -> None:
-        self._context = open_context(console_loop, metadata, journal)
+        self._context = open_context(console_loop, metadata, journal, stance)
         self._faults = 0
 
     def run(self, opening: Event, **details: object) -> int:
@@ -138,7 +150,7 @@ class SessionRunner:
         number = context.journal.state.next_trial
         name = TrialName(number, context.journal.state.attempt(number) + 1)
         take_tare(context, name)
-        context.loop_client.request(ArmState.FLOAT)
+        context.await_trial()
         wait_ready(context, name)
         context.close_undo()
         outcome = record_trial(context, name)
@@ -188,7 +200,8 @@ def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> 
     """
     context.say_keys(Prompt.REVIEW)
     context.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
-    is_whole = outcome.displacement >= MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
+    least = MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
+    is_whole = outcome.displacement >= least or outcome.reason == STANCES
     is_asked = not is_whole  # one that is not whole is rejected by [q] at once
     feet = context.watch_foot()
     while True:

@@ -34,10 +34,12 @@ from experiments.rig import (
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import busy_load
 from experiments.run.runner import SessionRunner
+from experiments.run.stances import check_stances
 from experiments.run.stop import StopFlag, handle_signals
 from experiments.session import (
     Event,
     Journal,
+    StanceTask,
     create_session,
     next_steps,
     session_lock,
@@ -66,6 +68,7 @@ class SessionRequest:
         can_log: file that the bus is logged to.
         foresight: terrain database to foresee with; None = that of the study's report,
             where there is one.
+        stance: what the foot is to do by itself; None = it is pushed.
     """
 
     data: Path
@@ -79,6 +82,7 @@ class SessionRequest:
     faults: tuple[str, ...] = ()
     can_log: Path | None = None
     foresight: Path | None = None
+    stance: StanceTask | None = None
 
     @property
     def who(self) -> str:
@@ -117,10 +121,14 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         host_faults = HostFaults(rig)
         faults = plan_faults(request.faults, rig.simulation, host_faults)
         kind = "SIMULATED" if rig.is_simulated else "LIVE RIG"
-        console.say(f"traction run {request.row.name}        {kind}")
+        word = "run" if request.stance is None else "stance"
+        console.say(f"traction {word} {request.row.name}        {kind}")
         differences = _check_conditions(rig_conditions(rig), mode, console)
         if source is not None:
             _foresee(source, rig, console)
+        if request.stance is not None:
+            check_stances(rig, request.stance, request.data)
+            console.say(request.stance.text)
         try:
             page = _check_rig(request, rig, host_faults)
         except PreflightError as error:
@@ -130,7 +138,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
             raise load.blamed(error) from error
         sensor = sensor_conditions(page.devices)
         differences += _check_conditions(sensor, mode, console)
-        hand = SimulatedHand(rig.simulation) if rig.simulation else None
+        hand = _hand(request, rig)
         operator = request.operator
         with handle_signals(stop), keyboard(operator), ExitStack() as stack:
             stack.callback(host_faults.restore)
@@ -139,13 +147,20 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
                 write_conditions(journal.folder, {**rig_conditions(rig), **sensor})
             metadata = _write_metadata(request, rig, page, journal)
             console_loop = ConsoleLoop(rig, console, operator, stop, hand, faults)
-            runner = SessionRunner(console_loop, metadata, journal)
+            runner = SessionRunner(console_loop, metadata, journal, request.stance)
             code = runner.run(mode.event, **_details(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
         text = plan.to_text()
         console.say(f"▲ The fault {text} was planned, and its time never came.")
     _print_next(request, journal, code)
     return code
+
+
+def _hand(request: SessionRequest, rig: Rig) -> SimulatedHand | None:
+    """Return the hand of a simulated operator, None on a real rig."""
+    if rig.simulation is None:
+        return None
+    return SimulatedHand(rig.simulation, lets_stand=request.stance is not None)
 
 
 def _foresight_of(request: SessionRequest) -> ForesightSource | None:
@@ -224,6 +239,8 @@ def _open_journal(
     request.console.say(f"session {folder.id}: {folder.path}")
     write_text(folder.path / "config.toml", rig.settings.rig_text)
     write_text(folder.path / "matrix.toml", rig.settings.matrix_text)
+    if request.stance is not None:
+        request.stance.write(folder)
     return Journal(folder, rig.clock)
 
 

@@ -38,7 +38,14 @@ from .matrix_board import (
 )
 from .photos import Camera, PhotoError, add_photo, has_photo, photos_of
 from .reducer import KEEP, REJECT, refusal, replay
-from .sidecar import TrialOutcome, sidecar_of
+from .sidecar import STANCES, TrialName, TrialOutcome, sidecar_of
+from .stance_task import (
+    StanceTask,
+    adapted_scale,
+    read_stance_task,
+    stance_outcomes,
+    stance_pushes,
+)
 from .states import Event, SessionPhase, table_lines
 from .store import (
     SessionFolder,
@@ -54,7 +61,6 @@ from .trial_files import (
     kept_sidecars,
     write_next_tare,
 )
-from .trial_name import TrialName
 from .unfinished import UnfinishedSession, find_unfinished
 
 __all__ = [
@@ -62,6 +68,7 @@ __all__ = [
     "LOCK_FILE",
     "LONGEST_TEXT",
     "REJECT",
+    "STANCES",
     "Camera",
     "Deviation",
     "DigestCache",
@@ -72,9 +79,11 @@ __all__ = [
     "PhotoError",
     "SessionFolder",
     "SessionPhase",
+    "StanceTask",
     "TrialName",
     "TrialOutcome",
     "UnfinishedSession",
+    "adapted_scale",
     "add_note",
     "add_photo",
     "add_remark",
@@ -105,6 +114,7 @@ __all__ = [
     "parse_where",
     "photos_of",
     "read_json",
+    "read_stance_task",
     "recover_session",
     "refusal",
     "replay",
@@ -113,6 +123,8 @@ __all__ = [
     "sha256_of",
     "sidecar_of",
     "sign",
+    "stance_outcomes",
+    "stance_pushes",
     "table_lines",
     "trial_path",
     "write_json",

@@ -12,10 +12,10 @@ from experiments.session.journal import Journal, open_journal
 from experiments.session.kept_files import recorded_facts
 from experiments.session.lock import session_lock
 from experiments.session.reducer import KEEP, refusal
+from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
 from experiments.session.trial_files import add_remark, check_sidecar, find_sidecar
-from experiments.session.trial_name import TrialName
 
 LONGEST_TEXT = 2000  # characters
 _TRIAL = re.compile(r"^T?0*(?P<number>[1-9]\d?)(?P<letters>[a-z]{0,3})$")

@@ -15,7 +15,7 @@ from acquisition.trial_file import (
 )
 from experiments.session.data_files import move_file, read_json, remove_file, write_json
 from experiments.session.journal import Journal
-from experiments.session.sidecar import TrialOutcome, sidecar_of
+from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
 from experiments.session.states import OPEN, Event, SessionPhase
 from experiments.session.store import SessionFolder
 from experiments.session.trial_files import (
@@ -23,7 +23,6 @@ from experiments.session.trial_files import (
     last_decisions,
     move_trial_files,
 )
-from experiments.session.trial_name import TrialName
 
 WHO = "traction"  # author of an automatic verdict
 PATIENCE_NS = 20_000_000_000  # to write and verify the longest trial takes a few s

@@ -12,9 +12,9 @@ from acquisition.trial_file import is_there, list_folder
 from analysis.next_push import PushRecord, Stopping, stopping_of
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
+from experiments.session.sidecar import TrialName
 from experiments.session.store import JOURNAL_FILE, SessionFolder, list_sessions
 from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
-from experiments.session.trial_name import TrialName
 from experiments.settings import MatrixSettings, TerrainRow
 
 _NAMED = 6  # deviations in one message

@@ -99,6 +99,7 @@ def count_board(
                 s
                 for s in sessions
                 if s.terrain == row.name and s.is_simulated is is_simulated
+                if not s.is_of_stances
             ]
             is_wanted = not is_simulated and where.get("kind") != "simulated"
             if own or (is_wanted and not {"session", "operator"} & set(where)):
@@ -178,7 +179,9 @@ def next_steps(data: Path, matrix: MatrixSettings, *, is_simulated: bool) -> lis
     steps += [
         f"{u.text()} To go on: traction resume {u.folder.id}{option}" for u in left
     ]
-    order = suggest_order(matrix.terrains, [s.terrain for s in sessions])
+    order = suggest_order(
+        matrix.terrains, [s.terrain for s in sessions if not s.is_of_stances]
+    )
     if order:
         steps.append(f"Suggested order, randomised against drift: {' '.join(order)}")
     return steps
@@ -198,6 +201,7 @@ def enough_lines(
         s for s in _readable(list_sessions(data)) if _matches(_of_session(s), where)
     ]
     rows = [row for row in matrix.terrains if _matches(_of_row(row), where)]
+    sessions = [s for s in sessions if not s.is_of_stances]
     told = [enough_of(sessions, r, is_simulated=k) for r in rows for k in (False, True)]
     return [text for text in told if text]
 

@@ -19,9 +19,9 @@ from typing import Any, cast
 from acquisition import TrialFileError, temporary_folder
 from acquisition.trial_file import list_folder
 from experiments.session.data_files import read_json, sha256_of, write_json, write_new
+from experiments.session.sidecar import TrialName
 from experiments.session.store import SessionFolder, iso_utc
 from experiments.session.trial_files import PHOTO_SUFFIXES, find_sidecar, sidecar_path
-from experiments.session.trial_name import TrialName
 
 LARGEST = 40_000_000  # bytes of a photo
 _THUMB = (280, 210)  # pixels of a photo in a report

@@ -1,11 +1,36 @@
-"""The sidecar of a trial: what is known of a recording beside its file."""
+"""A trial on the disk: its name, and the sidecar with what is known of it."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from acquisition.trial_file import VerifiedFile
-from experiments.session.trial_name import TrialName
 
-COMPLETE = frozenset({"travel", "key", "time-limit"})
+STANCES = "stances"  # all of them were made
+COMPLETE = frozenset({"travel", "key", "time-limit", STANCES})
+
+
+@dataclass(frozen=True, slots=True)
+class TrialName:
+    """Number and attempt of a trial: T04 while it counts, T04a once rejected."""
+
+    number: int
+    attempt: int
+
+    @property
+    def kept(self) -> str:
+        """Name of the file in trials/."""
+        return f"T{self.number:02d}"
+
+    @property
+    def rejected(self) -> str:
+        """Name of the file in rejected/."""
+        letters = ""
+        rest = self.attempt
+        while rest > 0:
+            rest, digit = divmod(rest - 1, 26)
+            letters = chr(ord("a") + digit) + letters
+        return self.kept + letters
 
 
 @dataclass(slots=True)
@@ -13,14 +38,17 @@ class TrialOutcome:
     """How a recording ended.
 
     Attributes:
-        reason: "travel", "key", "time-limit", "interrupted" or a fault's name.
+        reason: "travel", "key", "time-limit", "stances", "interrupted" or a fault's
+            name.
         seconds: since the start [s].
         displacement: of the foot along the container [m].
+        stances: those that are over, as plain values; none of a push.
     """
 
     reason: str
     seconds: float = 0.0
     displacement: float = 0.0
+    stances: Sequence[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
 
     @property
     def status(self) -> str:
@@ -32,7 +60,9 @@ def sidecar_of(
     name: TrialName, verified: VerifiedFile | None, outcome: TrialOutcome
 ) -> dict[str, object]:
     """Return the sidecar of an attempt without a verdict; no file where None."""
+    stances = {"stances": list(outcome.stances)} if outcome.stances else {}
     return {
+        **stances,
         "trial": name.kept,
         "attempt": name.attempt,
         "sha256": verified.sha256 if verified else "",

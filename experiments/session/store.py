@@ -29,7 +29,7 @@ from experiments.session.data_files import (
     writing,
 )
 
-JOURNAL_FILE = "events.jsonl"
+JOURNAL_FILE, STANCE_FILE = "events.jsonl", "stance.json"
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
     r"(?P<fake>\.fake)?$"
@@ -69,6 +69,11 @@ class SessionFolder:
     def faults(self) -> Path:
         """Folder of flight records."""
         return self.path / "faults"
+
+    @property
+    def is_of_stances(self) -> bool:
+        """Whether the foot stands in its trials, instead of being pushed."""
+        return is_there(self.path / STANCE_FILE)
 
     def append_event(self, event: Mapping[str, object]) -> None:
         """Append one line to the journal and force it to the disk.

@@ -16,9 +16,9 @@ from experiments.session.data_files import (
     write_json,
 )
 from experiments.session.reducer import KEEP, REJECT
+from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
-from experiments.session.trial_name import TrialName
 
 PHOTO_SUFFIXES = (".photo.jpg", ".photo.png")
 _SUFFIXES = (".mcap", ".truth.mcap", *PHOTO_SUFFIXES)

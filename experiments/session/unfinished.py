@@ -9,10 +9,10 @@ from acquisition.trial_file import is_there, read_file, recorded_seconds
 from experiments.messages import CATALOGUE
 from experiments.session.lock import owner_of
 from experiments.session.reducer import SessionState, replay
+from experiments.session.sidecar import TrialName
 from experiments.session.states import OPEN, RESUMABLE, SessionPhase
 from experiments.session.store import SessionFolder, list_sessions
 from experiments.session.trial_files import find_sidecar
-from experiments.session.trial_name import TrialName
 
 
 @dataclass(frozen=True, slots=True)

@@ -117,6 +117,14 @@ class JamSequence:
         for stone in self._stones:
             stone.anchor = None
 
+    def begin_at(self, x: float) -> None:
+        """Meet stones that have not borne the foot, at `x` [m]."""
+        self._form(x, 0.0)
+
+    def capacity_at(self, F_n: float) -> float:
+        """Return the force that the jam can bear under `F_n` [N]; nothing ages."""
+        return self._capacity(0.0, F_n)
+
     def _capacity(self, dt: float, F_n: float) -> float:
         """Return the force that the jam can bear now [N]."""
         if self._is_loaded:
@@ -179,10 +187,17 @@ _L_S = 0.06  # slip over which the bed sinks [m]
 _FIRM = 5.0  # normal force from which it sinks fully [N]
 _STEEPEST_SLOPE = 0.5  # slope that a foot can feel
 _MU_LATERAL = 0.6
+# A foot that was in the air for this long and comes down this far away stands anew; a
+# bounce does not.
+_LIFTED, _AWAY = 0.2, 1.5  # s, d50
 
 
 class StoneBed:
-    """A bed of stones as one foot meets it in one trial."""
+    """A bed of stones as one foot meets it in one trial.
+
+    A foot that is lifted and set down elsewhere stands on stones that nothing has
+    pushed or pressed yet: a jam of its own, and no slip sinkage.
+    """
 
     def __init__(
         self, parameters: StoneParameters, incline: float, rng: np.random.Generator
@@ -204,6 +219,8 @@ class StoneBed:
         self._profile = profile.tolist()
         self._sink = 0.0
         self._sink_limit = p.s_inf * p.d50
+        self._aloft = 0.0  # since the foot was lifted [s]
+        self._stood_at: float | None = None
         self._footing = Footing(p.K_t, p.cop, 0.5 * p.d50, rng)
         self._jams = JamSequence(p, p.J0 * slope_factor(incline) * self._bed, rng)
 
@@ -220,6 +237,19 @@ class StoneBed:
     def surface(self, x: float) -> float:
         """Return the height of the undisturbed bed at `x` [m]."""
         return value_at(self._profile, x)
+
+    def capacity(self, x: float, F_n: float) -> float:
+        """Return the traction that the foot at `x` [m] can be given now [N]."""
+        del x
+        return self._jams.capacity_at(F_n)
+
+    def _land(self, x: float) -> None:
+        """Touch the ground again; far from where the foot stood it is fresh."""
+        is_lifted, self._aloft = self._aloft >= _LIFTED, 0.0
+        before = self._stood_at
+        if is_lifted and before is not None and abs(x - before) >= _AWAY * self._p.d50:
+            self._sink = 0.0
+            self._jams.begin_at(x)
 
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
@@ -238,9 +268,13 @@ class StoneBed:
         h, s = self._profile, self._slope
         depth = h[row] + share * (h[row + 1] - h[row]) - sink - z
         if depth <= 0.0:
+            self._aloft += dt
             self._footing.release()
             self._jams.lose_contact()
             return NO_CONTACT
+        if self._aloft > 0.0:
+            self._land(x)
+        self._stood_at = x
         slope = s[row] + share * (s[row + 1] - s[row])
         F_n = self._k_n * depth + self._c_n * (slope * vx - vz)
         F_n = F_n if F_n > 0.0 else 0.0

@@ -68,6 +68,10 @@ class Plate:
             "b": self._p.b,
         }
 
+    def capacity(self, x: float, F_n: float) -> float:
+        """Return the friction that the foot at `x` [m] can be given [N]."""
+        return self._p.mu_s * self._level * value_at(self._texture, x) * F_n
+
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bristle by `dt` and return the force."""
         p = self._p
@@ -108,6 +112,10 @@ class Terrain(Protocol):
 
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
+        ...
+
+    def capacity(self, x: float, F_n: float) -> float:
+        """Return the traction at which a foot at `x` [m] under `F_n` slips now [N]."""
         ...
 
     def step(self, dt: float, motion: Motion) -> Contact:
@@ -156,6 +164,10 @@ class Container:
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
         return self.ground.truth()
+
+    def capacity(self, x: float, F_n: float) -> float:
+        """Return the traction at which a foot at `x` [m] under `F_n` slips now [N]."""
+        return self.ground.capacity(x, F_n)
 
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the ground by `dt` [s]; return what it and the boards do."""

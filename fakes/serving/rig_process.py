@@ -37,7 +37,7 @@ LINGER_NS = 5_000_000_000  # an arm whose console has died is braked within this
 
 
 class PtyCable:
-    """Implements `fakes.world.rig.Cable` over a pseudo-terminal."""
+    """Implements `fakes.world.faults.Cable` over a pseudo-terminal."""
 
     def __init__(self, pty: SerialPty, clock: WorldClock) -> None:
         self._pty = pty

@@ -1,6 +1,7 @@
 """Faults of the simulated arm and its bus by the names a rehearsal calls them."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from acquisition import PERIOD_NS
 from fakes.plant import ArmPlant
@@ -165,6 +166,18 @@ class BodyFaults:
         torque = self._plant.disturbance[_JOINT_7] + _TWIST_STEP
         self._plant.disturbance[_JOINT_7] = min(torque, _TWIST)
         self._later(PERIOD_NS, self._twist)
+
+
+class Cable(Protocol):
+    """What joins a serial sensor and its reader."""
+
+    def unplug(self) -> None:
+        """Pull it out."""
+        ...
+
+    def plug_in(self) -> None:
+        """Put it in again."""
+        ...
 
 
 CLOCK_JUMP_US = 10_000_000

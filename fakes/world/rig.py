@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
+    Cable,
     bus_sensor_faults,
     clear_network_faults,
     clear_stream_faults,
@@ -91,18 +91,6 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
         f"from start_q = {start.tolist()}.",
         hint="Correct far_end or start_q of this terrain. Nothing was started.",
     )
-
-
-class Cable(Protocol):
-    """What joins a serial sensor and its reader."""
-
-    def unplug(self) -> None:
-        """Pull it out."""
-        ...
-
-    def plug_in(self) -> None:
-        """Put it in again."""
-        ...
 
 
 class FakeRig:
@@ -273,6 +261,17 @@ class LocalSimulation:
         """Let the hand push the foot across."""
         self.rig.plant.hand.push(self._pace, self.rig.random.hand)
         self.rig.plant.start_truth()
+
+    def stand(self) -> None:
+        """Let the hand let go, and begin to write the truth."""
+        self.rig.plant.hand.let_go()
+        self.rig.plant.start_truth()
+
+    def capacity(self) -> float:
+        """Return the traction that the ground can bear under the foot now [N]."""
+        plant = self.rig.plant
+        F_n = plant.contact_force[2]
+        return self.rig.ground.capacity(plant.sole_x, F_n) if F_n > 0.0 else 0.0
 
     def pendant(self, button: PendantAction) -> None:
         """Press the pendant: "activate", "idle" or "estop"."""

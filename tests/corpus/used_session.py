@@ -13,10 +13,9 @@ from acquisition.trial_file.verify import verify_file
 from experiments.__main__ import main
 from experiments.session.data_files import write_json
 from experiments.session.journal import Journal
-from experiments.session.sidecar import TrialOutcome, sidecar_of
+from experiments.session.sidecar import TrialName, TrialOutcome, sidecar_of
 from experiments.session.states import Event
 from experiments.session.store import create_session
-from experiments.session.trial_name import TrialName
 from tests.acquisition.trials import make_cycles, write_trial
 
 SOUND_CODES = {0, 2, 5, 6}

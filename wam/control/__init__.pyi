@@ -8,8 +8,11 @@ from .friction_compensation import (
 from .joint_lock import LockGains
 from .position_control import TOP_SPEED, JointMove, move_reference
 from .soft_walls import SoftWalls, Walls
+from .sole_impedance import LARGEST_F_N, LARGEST_F_T, SoleAxes, SoleImpedance
 
 __all__ = [
+    "LARGEST_F_N",
+    "LARGEST_F_T",
     "SWUNG_MOTOR",
     "TOP_SPEED",
     "FootController",
@@ -18,6 +21,8 @@ __all__ = [
     "KnownFriction",
     "LockGains",
     "SoftWalls",
+    "SoleAxes",
+    "SoleImpedance",
     "Walls",
     "known_friction",
     "move_reference",

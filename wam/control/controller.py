@@ -3,7 +3,7 @@
 import numpy as np
 
 from acquisition import ArmReading, Vector
-from acquisition.control_loop import ArmState, ControlLaw
+from acquisition.control_loop import ArmState, ControlLaw, SoleGoal
 from wam.control.friction_compensation import FrictionCompensation
 from wam.control.joint_lock import LOCKED_JOINT, JointLock, LockGains
 from wam.control.position_control import (
@@ -15,6 +15,7 @@ from wam.control.position_control import (
     move_reference,
 )
 from wam.control.soft_walls import SoftWalls
+from wam.control.sole_impedance import SoleImpedance
 from wam.model import ArmModel, VirtualMass, compensation
 
 TORQUE_SHARE = 0.9  # of the torque limits that a move or a hold may use, with gravity
@@ -32,7 +33,10 @@ class FootController(ControlLaw):
     that carries the foot. The virtual mass is ramped to 0 in all but float. Joint 7 is
     locked in all four, and soft walls stand before the stops. In hold the arm can be
     sent somewhere; joint PD then follows the move and keeps the goal until a state is
-    entered, hold included.
+    entered, hold included. In hold a foot can also stand by itself (`sole_impedance`).
+
+    Attributes:
+        impedance: of a foot that stands by itself; None = it cannot.
     """
 
     def __init__(
@@ -57,6 +61,8 @@ class FootController(ControlLaw):
         self._move_ns = 0
         self._watch = MotorWatch(model.constants)
         self._stuck_motor = 0
+        self.impedance: SoleImpedance | None = None
+        self._pushed: Vector | None = None  # of the impedance, while the foot stands
 
     def enter(self, state: ArmState, reading: ArmReading) -> None:
         """Begin `state`; torques change continuously except for the damping.
@@ -66,13 +72,14 @@ class FootController(ControlLaw):
         now = reading.host_ns
         if state not in _STANDING:
             self._hold.release()
-        elif state is self._state and self._move is None:
+        elif state is self._state and not self.is_moving():
             return
         else:
-            self._hold.begin(reading.q, self._move_spring(reading))
+            begun = self._move_spring(reading) if self._pushed is None else self._pushed
+            self._hold.begin(reading.q, begun)
         if self._friction is not None and state is not ArmState.FLOAT:
             self._friction.rest(now)
-        self._move = None
+        self._move = self._pushed = None
         self._stuck_motor = 0
         self._state = state
         self._mass.aim(self._target_mass if state is ArmState.FLOAT else 0.0, now)
@@ -109,10 +116,29 @@ class FootController(ControlLaw):
             start = reading.q + self._hold.spring(reading) / constants.kp
         self._hold.release()
         self._lock.release(now)
+        self._pushed = None
         self._move = JointMove(start, goal.copy(), speed)
         self._move_ns = now
         self._watch.begin()
         return self._move.duration
+
+    def stand(self, goal: SoleGoal, reading: ArmReading) -> None:
+        """Let the sole do what `goal` says; joint 7 stays locked. Only in hold.
+
+        Raises:
+            ValueError: the arm does not hold, moves, cannot stand, or `goal` asks for
+                what is beyond bounds.
+        """
+        if self.impedance is None:
+            raise ValueError("this arm does not stand by itself")
+        if self._state is not ArmState.HOLD or self._move is not None:
+            raise ValueError("a foot stands by itself in hold only")
+        if self._pushed is None:
+            self.impedance.begin(reading)
+        self.impedance.aim(goal, reading)
+        if self._pushed is None:
+            self._hold.release()
+            self._pushed = np.zeros(7)
 
     def torque(self, reading: ArmReading) -> tuple[Vector, Vector]:
         """Return (tau, gravity part) [N m], shapes (7,).
@@ -125,7 +151,7 @@ class FootController(ControlLaw):
         gravity = compensation(self._model, reading.q, self._mass.at(now))
         if reading.jump is not None:
             return gravity.copy(), gravity
-        if self._state in _STANDING:
+        if self._state in _STANDING and self._pushed is None:
             self._lock.follow(q7, now)
         lock = self._lock.torque(q7, reading.qd7_raw, now)
         if self._move is not None:
@@ -135,6 +161,10 @@ class FootController(ControlLaw):
             tau = np.clip(tau, -self._largest, self._largest)
             wanted, _ = move_reference(self._move, (now - self._move_ns) * 1e-9)
             self._stuck_motor = self._watch.stuck_motor(wanted, tau - gravity, reading)
+        elif self._pushed is not None and self.impedance is not None:
+            self._pushed = self.impedance.torque(reading)
+            tau = np.clip(gravity + self._pushed, -self._largest, self._largest)
+            tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         else:
             tau = gravity + self._standing_torque(reading, gravity)
             tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
@@ -145,8 +175,8 @@ class FootController(ControlLaw):
         return tau, gravity
 
     def is_moving(self) -> bool:
-        """Return whether a move is made, or its goal is kept."""
-        return self._move is not None
+        """Return whether a move or stance is made, or the goal of one is kept."""
+        return self._move is not None or self._pushed is not None
 
     def stuck_motor(self) -> int:
         """Return the motor that the move turns in vain, 1-7; 0 = none."""

@@ -10,7 +10,7 @@ from acquisition.errors import SessionError
 from experiments.operator.prompts import Prompt
 from experiments.run.console_loop import TICK
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.trial_name import TrialName
+from experiments.session.sidecar import TrialName
 from tests.experiments.run.bench import Keys, make_loop
 
 NAME = TrialName(3, 2)

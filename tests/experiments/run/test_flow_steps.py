@@ -14,9 +14,8 @@ from experiments.run.console_loop import TICK
 from experiments.run.ready import ready_view, take_note, wait_ready
 from experiments.run.runner import ask_verdict
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session.sidecar import TrialOutcome
+from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
 from tests.experiments.run.bench import Keys, make_context
 
 FIRST = TrialName(1, 1)

@@ -21,8 +21,8 @@ from experiments.run.tare import (
     take_end_tare,
     take_tare,
 )
+from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import Payload

@@ -12,9 +12,8 @@ from experiments.run.ready import wait_ready
 from experiments.run.runner import ask_verdict, judge_again
 from experiments.run.stop import StopRequestedError, UndoRequestedError
 from experiments.session.reducer import replay
-from experiments.session.sidecar import TrialOutcome
+from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
-from experiments.session.trial_name import TrialName
 from tests.experiments.program import (
     journal,
     only_session,

@@ -18,9 +18,9 @@ from experiments.session.photos import (
     photos_of,
     thumbnail,
 )
+from experiments.session.sidecar import TrialName
 from experiments.session.store import create_session
 from experiments.session.trial_files import Verdict, move_trial_files
-from experiments.session.trial_name import TrialName
 from experiments.settings.load import load_settings
 from tests.experiments.program import digest, sidecar, write_config
 from tests.experiments.run.bench import Keys, make_context

@@ -9,13 +9,13 @@ from acquisition.errors import SettingsError, TrialFileError
 from experiments.operator.console import Console
 from experiments.session import store
 from experiments.session.data_files import move_file, read_json, write_json
+from experiments.session.sidecar import TrialName
 from experiments.session.store import (
     create_session,
     find_session,
     iso_utc,
     list_sessions,
 )
-from experiments.session.trial_name import TrialName
 from experiments.trial.files import EndDetector
 
 DAY_NS = 1_800_000_000_000_000_000  # 2027-01-15T08:00:00Z

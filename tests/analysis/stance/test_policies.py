@@ -1,0 +1,167 @@
+"""The seam of a stance: what the four policies answer, and that they are pure."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition import SettingsError
+from analysis.breakaway import BREAK_AWAY, BreakAwayModel, Family, PushLaw
+from analysis.stance import (
+    BEGIN,
+    POLICIES,
+    StanceCommand,
+    StanceForesight,
+    StancePhase,
+    StanceRequest,
+    StanceSample,
+    avoid_slip,
+    constant_mu,
+    no_policy,
+    oracle,
+    planned,
+    risk_tables,
+)
+
+REQUEST = StanceRequest(6.0, 0.1)
+REST = StanceSample(0.0, False, 0.0, 0.0, 0.0, 0.0, 0.0, BEGIN)
+
+
+def model(median: float, slope: float, spread: float) -> BreakAwayModel:
+    """Return a law whose median at 3.5 N is `median`."""
+    law = PushLaw(math.log(median), slope, spread, 0.01)
+    return BreakAwayModel(
+        kind=BREAK_AWAY,
+        family=Family.LOGNORMAL,
+        law=law,
+        draws=np.array([law.values]),
+        v_slip=0.06,
+        slips=20,
+        held=20,
+        trials=10,
+        loads=(3.0, 20.0),
+        forces=(1.0, 12.0),
+    )
+
+
+TABLES = risk_tables({"stones": model(8.0, 0.1, 0.5), "plate": model(1.2, 1.0, 0.05)})
+ON_STONES = StanceForesight({"stones": 1.0, "plate": 0.0}, TABLES)
+ON_PLATE = StanceForesight({"stones": 0.0, "plate": 1.0}, TABLES)
+
+
+def test_load_is_bought_where_it_helps():
+    load, most = planned(ON_PLATE, REQUEST)
+
+    assert most == REQUEST.peak
+    assert ON_PLATE.risk(most, load) <= 0.05 < ON_PLATE.risk(most, load - 0.5)
+
+
+def test_where_load_does_not_help_the_traction_is_what_the_risk_allows():
+    load, most = planned(ON_STONES, REQUEST)
+
+    assert most < REQUEST.peak
+    assert load < 6.0  # four times that would bring a seventh more
+    assert ON_STONES.risk(most, load) == pytest.approx(REQUEST.risk, abs=1e-3)
+
+
+def test_risk_is_not_a_ratio_of_the_forces():
+    light, heavy = ON_STONES.risk(6.0, 4.0), ON_STONES.risk(12.0, 8.0)
+
+    assert heavy > light + 0.2
+
+
+def test_a_larger_scale_takes_more_and_a_smaller_one_less():
+    taken = [planned(replace(ON_STONES, scale=s), REQUEST)[1] for s in (0.5, 1.0, 1.2)]
+
+    assert taken == sorted(taken)
+    assert taken[0] == pytest.approx(0.5 * taken[1], rel=0.03)
+
+
+def test_uncertain_ground_lies_between_the_grounds():
+    mixed = StanceForesight({"stones": 0.5, "plate": 0.5}, TABLES)
+    ends = ON_STONES.risk(5.0, 10.0), ON_PLATE.risk(5.0, 10.0)
+
+    assert mixed.risk(5.0, 10.0) == pytest.approx(sum(ends) / 2.0)
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_policies_are_pure(name):
+    sample = replace(REST, t=0.2, is_loaded=True, F_n=6.0, impulse=0.4)
+    foresight = replace(ON_STONES, capacity=7.0)
+
+    answers = {POLICIES[name](sample, foresight, REQUEST) for _ in range(3)}
+
+    assert len(answers) == 1
+
+
+@pytest.mark.parametrize(
+    ("policy", "load"), [(no_policy, 4.0), (constant_mu, 12.0), (oracle, 20.0)]
+)
+def test_what_is_pressed_with_before_anything_is_asked(policy, load):
+    command = policy(REST, replace(ON_STONES, capacity=7.0), REQUEST)
+
+    assert (command.F_t, command.F_n) == (0.0, load)
+    assert command.phase is StancePhase.LOAD
+
+
+def pushing(most: float, **at: float) -> StanceSample:
+    last = StanceCommand(most, 5.0, StancePhase.PUSH, since=0.0, most=most)
+    return replace(REST, is_loaded=True, last=last, **at)
+
+
+@pytest.mark.parametrize(("x", "v_t"), [(0.011, 0.0), (0.0, 0.061)])
+def test_a_foot_that_slips_is_let_go_and_tried_with_less(x, v_t):
+    command = avoid_slip(pushing(4.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
+
+    assert command.phase is StancePhase.BACK_OFF
+    assert command.F_t == 0.0
+    assert command.most == pytest.approx(3.2)
+
+
+@pytest.mark.parametrize(("x", "v_t"), [(0.009, 0.0), (0.0, 0.059)])
+def test_a_foot_that_creeps_is_not_let_go(x, v_t):
+    command = avoid_slip(pushing(4.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
+
+    assert command.phase is StancePhase.PUSH
+
+
+def test_a_foot_that_slipped_pushes_again_once_it_rests():
+    last = StanceCommand(0.0, 5.0, StancePhase.BACK_OFF, since=0.6, most=3.2)
+    moving = replace(REST, t=0.7, is_loaded=True, v_t=0.02, last=last)
+    resting = replace(moving, t=0.76, v_t=0.0, x=0.02)
+
+    assert avoid_slip(moving, ON_STONES, REQUEST).phase is StancePhase.BACK_OFF
+    again = avoid_slip(resting, ON_STONES, REQUEST)
+    assert (again.phase, again.x0) == (StancePhase.PUSH, 0.02)
+
+
+def test_the_impulse_ends_a_stance_and_three_seconds_do():
+    nearly = avoid_slip(pushing(4.0, t=0.8, impulse=4.0), ON_STONES, REQUEST)
+    late = avoid_slip(pushing(4.0, t=3.0, impulse=1.0), ON_STONES, REQUEST)
+
+    assert nearly.phase is StancePhase.RELEASE
+    assert (late.phase, late.F_t) == (StancePhase.DONE, 0.0)
+
+
+def test_the_oracle_takes_three_quarters_of_what_is_there():
+    told = replace(ON_STONES, capacity=4.0)
+
+    assert oracle(pushing(6.0, t=0.5), told, REQUEST).F_t == pytest.approx(3.0)
+
+
+def test_what_is_asked_for_is_the_impulse():
+    ticks = np.arange(0.0, 1.2, 0.001)
+    asked = [REQUEST.asked(float(t)) for t in ticks]
+
+    assert max(asked) == REQUEST.peak
+    assert sum(asked) * 0.001 == pytest.approx(REQUEST.impulse, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("peak", "risk"),
+    [(3.9, 0.1), (10.1, 0.1), (6.0, 0.0), (6.0, 0.6), (math.nan, 0.1), (6.0, math.nan)],
+)
+def test_a_request_out_of_range_is_refused(peak, risk):
+    with pytest.raises(SettingsError, match="expected"):
+        StanceRequest(peak, risk)
