@@ -74,21 +74,24 @@ class SharedMemory:
         """Return the memory of another process of the same user, to be read only.
 
         It is opened anew, for reading, through /proc: nothing is asked of its owner,
-        and nothing can be written. None where the process has none, or has gone.
+        and nothing can be written. Of several it is the newest. None where the process
+        has none, or has gone.
 
         Raises:
             PermissionError: the process belongs to somebody else.
         """
         folder = Path(f"/proc/{pid}/fd")
-        try:
-            names = sorted(os.listdir(folder), key=int)  # noqa: PTH208
-            for name in names:
+        found: list[tuple[int, int, Path]] = []
+        with suppress(FileNotFoundError, ProcessLookupError):
+            for place in folder.iterdir():
                 with suppress(FileNotFoundError):
-                    if os.readlink(folder / name).startswith(_MEMORY_LINK):  # noqa: PTH115
-                        flags = os.O_RDONLY | os.O_CLOEXEC
-                        return cls(os.open(folder / name, flags), is_writable=False)
-        except (FileNotFoundError, ProcessLookupError):
-            pass
+                    if os.readlink(place).startswith(_MEMORY_LINK):  # noqa: PTH115
+                        made_ns = place.stat().st_ctime_ns
+                        found.append((made_ns, int(place.name), place))
+            if found:
+                *_, place = max(found)
+                descriptor = os.open(place, os.O_RDONLY | os.O_CLOEXEC)
+                return cls(descriptor, is_writable=False)
         return None
 
     def touch(self) -> None:

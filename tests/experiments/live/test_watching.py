@@ -61,6 +61,16 @@ def test_the_memory_of_a_process_is_found_and_cannot_be_written(shared):
     looked_up.close()
 
 
+def test_of_several_memories_the_newest_is_looked_at(shared):
+    written(shared, 1)
+    newer = SharedLayout.create()
+    record = written(newer, 2)
+    looked_up = SharedLayout.of_process(os.getpid())
+    assert looked_up.cycles.last(1).tobytes() == record.tobytes()
+    looked_up.close()
+    newer.close()
+
+
 def test_a_process_without_memory_or_that_has_gone_gives_none():
     assert SharedLayout.of_process(2**22 + 1) is None
 

@@ -6,8 +6,8 @@ from acquisition.clock import PERIOD_NS
 from acquisition.devices import SafetyMode
 from acquisition.errors import SettingsError
 from experiments import arguments
+from fakes.plant.cables import CABLES
 from fakes.plant.hand import HandPhase
-from fakes.plant.model import PlantOptions
 from fakes.plant.push import PACES
 from fakes.pucks.options import NetworkOptions
 from fakes.randomness import (
@@ -292,6 +292,6 @@ def test_trials_of_other_terrains_or_numbers_have_other_generators():
     assert trial_generator(1, "S0", 1).random() in draws
 
 
-def test_the_commands_offer_the_paces_and_the_friction_of_the_simulation():
+def test_the_commands_offer_the_paces_and_the_cables_of_the_simulation():
     assert tuple(PACES) == arguments.PACES
-    assert PlantOptions().friction == arguments.FRICTION
+    assert (CABLES.low, CABLES.high) == arguments.CABLES
