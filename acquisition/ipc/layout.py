@@ -139,8 +139,11 @@ class SharedLayout:
         memory = SharedMemory.of_process(pid)
         if memory is None:
             return None
-        if len(memory.view) != _SIZE or memory.view[:8].cast("Q")[0] != _IDENTITY:
+        identity = memory.view[:8].cast("Q")[0]
+        if len(memory.view) != _SIZE or identity != _IDENTITY:
             memory.close()
+            if not identity:  # it is being made
+                return None
             raise LinkError(
                 f"Process {pid} runs another version of this program.",
                 hint="Look on with the version that records.",

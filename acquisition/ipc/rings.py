@@ -91,7 +91,9 @@ class SharedMemory:
             if found:
                 *_, place = max(found)
                 descriptor = os.open(place, os.O_RDONLY | os.O_CLOEXEC)
-                return cls(descriptor, is_writable=False)
+                if os.fstat(descriptor).st_size:
+                    return cls(descriptor, is_writable=False)
+                os.close(descriptor)  # it is being made
         return None
 
     def touch(self) -> None:

@@ -75,8 +75,17 @@ def test_a_process_without_memory_or_that_has_gone_gives_none():
     assert SharedLayout.of_process(2**22 + 1) is None
 
 
+def test_memory_that_is_being_made_is_none_yet():
+    descriptor = os.memfd_create("traction memory")
+    assert SharedLayout.of_process(os.getpid()) is None
+    os.truncate(descriptor, 4096)
+    assert SharedLayout.of_process(os.getpid()) is None
+    os.close(descriptor)
+
+
 def test_memory_of_another_version_is_refused():
     memory = SharedMemory.create(4096)
+    memory.view[0] = 1
     with pytest.raises(LinkError, match="another version"):
         SharedLayout.of_process(os.getpid())
     memory.close()
