@@ -23,7 +23,7 @@ from acquisition.errors import PreflightError
 from acquisition.sample import Record
 
 _MEMORY_NAME = "traction"
-_MEMORY_LINK = f"/memfd:{_MEMORY_NAME}"
+_MEMORY_LINK = f"/memfd:{_MEMORY_NAME} (deleted)"  # as /proc shows it
 ORDERED_MACHINES = frozenset({"x86_64", "AMD64", "i386", "i686"})
 
 
@@ -85,7 +85,7 @@ class SharedMemory:
         with suppress(FileNotFoundError, ProcessLookupError):
             for place in folder.iterdir():
                 with suppress(FileNotFoundError):
-                    if os.readlink(place).startswith(_MEMORY_LINK):  # noqa: PTH115
+                    if os.readlink(place) == _MEMORY_LINK:  # noqa: PTH115
                         made_ns = place.stat().st_ctime_ns
                         found.append((made_ns, int(place.name), place))
             if found:

@@ -65,10 +65,12 @@ def test_of_several_memories_the_newest_is_looked_at(shared):
     written(shared, 1)
     newer = SharedLayout.create()
     record = written(newer, 2)
+    words = os.memfd_create("traction-control")  # what a process says goes there
     looked_up = SharedLayout.of_process(os.getpid())
     assert looked_up.cycles.last(1).tobytes() == record.tobytes()
     looked_up.close()
     newer.close()
+    os.close(words)
 
 
 def test_a_process_without_memory_or_that_has_gone_gives_none():
@@ -76,7 +78,7 @@ def test_a_process_without_memory_or_that_has_gone_gives_none():
 
 
 def test_memory_that_is_being_made_is_none_yet():
-    descriptor = os.memfd_create("traction memory")
+    descriptor = os.memfd_create("traction")
     assert SharedLayout.of_process(os.getpid()) is None
     os.truncate(descriptor, 4096)
     assert SharedLayout.of_process(os.getpid()) is None
