@@ -15,7 +15,7 @@ from experiments.session.store import create_session
 from tests.acquisition.ros import decode
 from tests.experiments.live.test_watching import written
 from tests.experiments.live.viewer import Viewer
-from tests.processes.watching import CLOCK, START, until
+from tests.processes.watching import CLOCK, START, running_trial, until
 
 pytest.importorskip("foxglove")
 pytestmark = pytest.mark.wall_clock
@@ -99,3 +99,12 @@ def test_a_killed_server_leaves_the_memory_as_it_was(session):
     assert bytes(shared.memory.view) == before
     record = written(shared, 3)
     assert shared.cycles.last(1).tobytes() == record.tobytes()
+
+
+@pytest.mark.timeout(240)
+def test_the_memory_of_a_session_in_processes_is_found(tmp_path):
+    with running_trial(tmp_path) as seen:
+        looked_up = SharedLayout.of_process(seen.process.pid)
+        assert looked_up is not None
+        assert len(looked_up.cycles.last(1)) == 1
+        looked_up.close()
