@@ -66,7 +66,7 @@ def odd(tmp_path_factory):
         # what is said is tested here; pictures cost seconds, see the long test
         patch.setattr(
             "analysis.report.page.render",
-            lambda key, *_: Picture(key, b"png", b"pdf"),
+            lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
         patch.setattr("analysis.study.jobs.available_cores", lambda: 1)
         patch.setattr("analysis.report.page.available_cores", lambda: 1)

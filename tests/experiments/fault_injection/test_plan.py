@@ -75,7 +75,8 @@ def test_a_stale_sensor_interrupts_the_trial_and_it_is_redone(stale):
 def test_a_stale_sensor_is_told_with_age_limit_and_what_the_arm_does(stale):
     (line,) = stale.done.err.splitlines()
     assert line.startswith("T01 stopped at 1.0 s: F/T sample 21 ms old (limit 20).")
-    assert "ARM: holding. [r]edo when the sensor is back." in line
+    assert "ARM: holding. When the sensor is back: lift the foot for the tare; " in line
+    assert "[space] records again." in line
 
 
 def test_an_interrupted_trial_is_kept_among_the_rejected(stale):
