@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import io
+import os
 import shlex
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -17,13 +18,14 @@ from tempfile import gettempdir
 from typing import Any, cast
 
 from acquisition import TrialFileError, temporary_folder
-from acquisition.trial_file import list_folder
-from experiments.session.data_files import read_json, sha256_of, write_json, write_new
+from acquisition.trial_file import list_folder, open_data
+from experiments.session.data_files import read_json, write_json, write_new
 from experiments.session.sidecar import TrialName
 from experiments.session.store import SessionFolder, iso_utc
 from experiments.session.trial_files import PHOTO_SUFFIXES, find_sidecar, sidecar_path
 
 LARGEST = 40_000_000  # bytes of a photo
+MOST_PIXELS = 50_000_000
 _THUMB = (280, 210)  # pixels of a photo in a report
 _QUALITY = 55
 _TYPES: Mapping[bytes, str] = {b"\xff\xd8\xff": ".jpg", b"\x89PNG": ".png"}
@@ -179,13 +181,31 @@ def _shown(
     if suffix not in PHOTO_SUFFIXES:
         raise PhotoError("has no file name")
     path = sidecar.with_suffix(suffix)
-    if not path.is_file():
-        raise PhotoError("is missing")
-    if sha256_of(path) != photo.get("sha256"):
+    content = _kept(path)
+    if hashlib.sha256(content).hexdigest() != photo.get("sha256"):
         raise PhotoError("is not the one that was taken: its checksum is wrong")
     taken, digest = str(photo.get("taken_utc", "?")), str(photo["sha256"])
     caption = f"{taken}, {path.name}, SHA-256 {digest[:16]}…"
-    return title, caption, thumbnail(path.read_bytes())
+    return title, caption, thumbnail(content)
+
+
+def _kept(path: Path) -> bytes:
+    """Return a photo of a session, which may be from elsewhere.
+
+    Raises:
+        PhotoError: it is missing, cannot be read, or is too large.
+        TrialFileError: it is no regular file of the session.
+    """
+    try:
+        with os.fdopen(open_data(path), "rb") as file:
+            content = file.read(LARGEST + 1)
+    except FileNotFoundError as error:
+        raise PhotoError("is missing") from error
+    except OSError as error:
+        raise PhotoError(f"cannot be read ({error.strerror})") from error
+    if len(content) > LARGEST:
+        raise PhotoError(f"has more than {LARGEST} bytes")
+    return content
 
 
 def thumbnail(content: bytes) -> bytes:
@@ -198,8 +218,13 @@ def thumbnail(content: bytes) -> bytes:
 
     try:
         with Image.open(io.BytesIO(content), formats=("JPEG", "PNG")) as image:
+            if image.width * image.height > MOST_PIXELS:
+                raise PhotoError(f"has more than {MOST_PIXELS} pixels")
+            image.draft("RGB", _THUMB)  # a JPEG is not unpacked whole
             small = image.convert("RGB")
             small.thumbnail(_THUMB)
+    except PhotoError:
+        raise
     except Exception as error:  # whatever a foreign file makes the library raise
         raise PhotoError(f"cannot be read ({type(error).__name__})") from error
     out = io.BytesIO()

@@ -141,6 +141,24 @@ def test_a_sidecar_cannot_lead_a_photo_elsewhere(folder, suffix):
     assert len(problems) == 1
 
 
+def test_a_photo_behind_a_link_is_not_opened(folder, tmp_path):
+    add_photo(folder, FIRST, photo(), 0, "command")
+    path = folder.trials / "T01.photo.jpg"
+    path.rename(tmp_path / "elsewhere.jpg")
+    path.symlink_to(tmp_path / "elsewhere.jpg")
+    shown, (problem,) = photos_of([folder])
+    assert shown == []
+    assert "T01" in problem
+
+
+def test_a_small_file_of_too_many_pixels_is_not_unpacked():
+    out = io.BytesIO()
+    Image.new("1", (10_000, 6_000)).save(out, "PNG")
+    assert len(out.getvalue()) < 100_000
+    with pytest.raises(PhotoError, match="pixels"):
+        thumbnail(out.getvalue())
+
+
 def test_a_damaged_photo_is_no_picture():
     with pytest.raises(PhotoError, match="cannot be read"):
         thumbnail(photo()[:100])
