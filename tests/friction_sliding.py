@@ -113,10 +113,11 @@ def page_part(folders: Sequence[Path], found: dict[float, list[SlidLoad]]) -> st
         columns = np.array([(arm.rest, *arm.sliding) for arm in arms]).T
         cells = [f"{np.mean(c):+.2f} ({np.abs(c).max():.2f})" for c in columns]
         lines.append(f"| {share:g} | {' | '.join(cells)} |")
+    arms = "one arm" if len(folders) == 1 else f"{len(folders)} arms"
     return (
-        "`python -m tests.friction_sliding --write docs/friction.md`: "
-        f"{len(folders)} arms with the whole friction, a plate, virtual mass {MASS}. "
-        f"F_n less {_WEIGHT:.2f} N [N]: mean, and the largest of the arms without sign."
+        "`python -m tests.friction_sliding FOLDER... --write docs/friction.md`: "
+        f"{arms} with the whole friction, put down on a plate and slid. F_n less the "
+        f"{_WEIGHT:.2f} N that were set [N]: mean (largest of the arms, without sign)."
         "\n\n" + "\n".join(lines) + f"\n\nThe goal while sliding is {MOST:g} N.\n"
     )
 
