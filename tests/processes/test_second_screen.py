@@ -57,7 +57,7 @@ def end(server):
 
 
 @pytest.mark.timeout(3 * STALLED)
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_client_that_stops_reading_costs_the_others_nothing(session):
     data, shared = session
     server, port = watching(data)
