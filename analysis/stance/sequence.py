@@ -36,6 +36,8 @@ _BELOW = 0.02  # m, where a foot that is lowered aims at
 _LOWERING, _CARRYING = 0.05, 0.15  # m/s
 _TOUCH = 1.0  # N
 _CLOSE, _SLOW = 0.004, 0.02  # m, m/s: a foot has arrived
+# An arm that rubs stops short of its spot; there it stands as well.
+_NEAR, _RESTED = 0.04, 15  # m, ticks at rest
 _WITHIN, _SETTLED, _LONGEST_LOADING = 0.1, 5, 1.5  # of F_n, ticks, s
 _MARGIN = 0.03  # m of the container that is not stood on, at both ends
 _GOLDEN = 0.618034
@@ -176,7 +178,9 @@ class StanceSequence:
         """Lift where it is, then carry."""
         is_aloft = view.z > _ALOFT
         x = self._goal_x
-        if is_aloft and abs(view.x - x) < _CLOSE and abs(v_t) < _SLOW:
+        is_calm = is_aloft and abs(view.x - x) < _NEAR and abs(v_t) < _SLOW
+        self._calm = self._calm + 1 if is_calm else 0
+        if self._calm >= _RESTED or (is_calm and abs(view.x - x) < _CLOSE):
             self._enter(StanceStep.LOWER)
         return SoleGoal(nan, nan, x if is_aloft else view.x, HEIGHT, _CARRYING)
 

@@ -57,6 +57,7 @@ class SessionRunner:
     ) -> None:
         self._context = open_context(console_loop, metadata, journal, stance)
         self._faults = 0
+        self._stuck = 0
 
     def run(self, opening: Event, **details: object) -> int:
         """Record until nothing is left to record; return the exit code.
@@ -154,7 +155,17 @@ class SessionRunner:
         wait_ready(context, name)
         context.close_undo()
         outcome = record_trial(context, name)
-        ask_verdict(context, name, outcome)
+        if outcome.status == "complete":
+            self._stuck = 0
+            ask_verdict(context, name, outcome)
+            return
+        self._stuck += 1  # a stance that did not get on: nothing to be judged
+        if self._stuck >= FAULTS_IN_A_ROW:
+            raise TractionError(
+                f"The foot got stuck in {self._stuck} recordings in a row.",
+                hint="Look at the foot and at the friction of the arm. To go on: "
+                f"traction resume {context.metadata.folder.id}",
+            )
 
     # --- messages -----------------------------------------------------------------
 

@@ -188,8 +188,8 @@ _FIRM = 5.0  # normal force from which it sinks fully [N]
 _STEEPEST_SLOPE = 0.5  # slope that a foot can feel
 _MU_LATERAL = 0.6
 # A foot that was in the air for this long and comes down this far away stands anew; a
-# bounce does not.
-_LIFTED, _AWAY = 0.2, 1.5  # s, d50
+# bounce or a hop of the pushed foot (up to 0.7 s and 1.4 d50 in a trial) does not.
+_LIFTED, _AWAY = 1.0, 3.0  # s, d50
 
 
 class StoneBed:

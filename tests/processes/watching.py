@@ -194,26 +194,33 @@ class StallWitness:
 
     def __init__(self, folder):
         folder.mkdir(parents=True, exist_ok=True)
-        self._path = folder / "stalls.txt"
-        self._out = self._path.open("w")
-        self._processes = [self._watch(core) for core in os.sched_getaffinity(0)]
+        self._paths = []  # a file for each core: two writers of one file tear its lines
+        self._processes = [
+            self._watch(core, folder / f"stalls-{core}.txt")
+            for core in os.sched_getaffinity(0)
+        ]
 
-    def _watch(self, core):
+    def _watch(self, core, path):
         command = [sys.executable, "-c", WITNESS, str(STALL)]
-        process = subprocess.Popen(command, stdout=self._out)
+        with path.open("w") as out:
+            process = subprocess.Popen(command, stdout=out)
         os.sched_setaffinity(process.pid, {core})
+        self._paths.append(path)
         return process
 
     def stalls_since(self, t_ns):
         """Return how often a core stood still since `t_ns` [monotonic ns]."""
-        lines = self._path.read_text().splitlines()
-        return sum(int(line) > t_ns for line in lines)
+        return sum(
+            int(line) > t_ns
+            for path in self._paths
+            for line in path.read_text().splitlines(keepends=True)
+            if line.strip() and line.endswith("\n")  # not one that is being written
+        )
 
     def close(self):
         for process in self._processes:
             process.kill()
             process.wait()
-        self._out.close()
 
 
 @contextmanager

@@ -4,7 +4,15 @@ from itertools import pairwise
 
 import pytest
 
-from analysis.stance import POLICIES, StancePlan, StanceRequest, risk_tables, totals
+from analysis.stance import (
+    POLICIES,
+    SoleView,
+    StancePlan,
+    StanceRequest,
+    StanceSequence,
+    risk_tables,
+    totals,
+)
 from tests.fakes.stance_bench import (
     TRAVEL,
     StanceBench,
@@ -56,6 +64,18 @@ def test_a_fresh_place_has_a_fresh_jam():
 
     assert len({round(one.force, 6) for one in made.outcomes}) == 2
     assert made.is_over
+
+
+@pytest.mark.parametrize(("short", "is_lowered"), [(0.015, True), (0.06, False)])
+def test_a_foot_that_rests_short_of_its_spot_stands_there(short, is_lowered):
+    asked = plan("none", 1)
+    sequence = StanceSequence(asked)
+    at = SoleView(x=asked.spot(0) - short, z=0.022, F_t=0.0, F_n=0.0)
+
+    goals = [sequence.next_goal(at) for _ in range(400)]
+
+    assert (goals[30].z < 0.0) is is_lowered
+    assert sequence.is_stuck
 
 
 @pytest.mark.slow

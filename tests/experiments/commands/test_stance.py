@@ -81,6 +81,21 @@ def test_a_short_container_has_no_fresh_places(tmp_path):
 
 
 @pytest.mark.slow
+def test_a_foot_that_gets_stuck_each_time_ends_the_session(tmp_path, monkeypatch):
+    monkeypatch.setattr("analysis.stance.sequence._LONGEST_STEP", 0.2)
+    done = traction(
+        *("stance", "TF", "--fake", "--fast", "--operator-script", "auto"),
+        *("--policy", "none", "--stances", 1, "--trials", 1, "--data", tmp_path),
+    )
+
+    assert done.code == 1
+    assert "The foot got stuck in 5 recordings in a row." in done.err
+    assert "ARM: idle" in done.out + done.err
+    rejected = [path.name for path in tmp_path.glob("sessions/*/rejected/*.mcap")]
+    assert {f"T01{letter}.mcap" for letter in "abcde"} <= set(rejected)
+
+
+@pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_a_session_of_stances_from_tare_to_page(tmp_path):
     asked = ("--policy", "constant-mu", "--stances", 3, "--trials", 1)
