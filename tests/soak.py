@@ -1,11 +1,13 @@
 """Simulated hours of sessions with random faults; what has to hold is checked.
 
-python tests/soak.py --hours 1 --seed 1
+python tests/soak.py --hours 1 --seed 1 [--record FILE]
+python tests/soak.py --write docs/soak.md FILE ...
 
-Every session is run, and resumed until it is complete, as a person would. Before each
-trial the journal, session.json and the verified files have to agree; after each
-command the exit code and every message have to be known, the arm at rest, and nothing
-left behind: descriptors, children, shared memory, memory.
+A run that is stopped counts for as long as it ran: its record is written after every
+session. Every session is run, and resumed until it is complete, as a person would.
+Before each trial the journal, session.json and the verified files have to agree; after
+each command the exit code and every message have to be known, the arm at rest, and
+nothing left behind: descriptors, children, shared memory, memory.
 """
 
 import argparse
@@ -19,14 +21,17 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from string import Formatter
+from subprocess import run
 
 import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from acquisition.clock import NS_PER_S, SystemClock
 from acquisition.devices import SafetyMode
 from experiments.messages import CATALOGUE
 from experiments.operator.prompts import AutoOperator, Prompt
@@ -43,6 +48,7 @@ from tests.experiments.program import (
     write_config,
 )
 
+TEXT = {"capture_output": True, "text": True}
 TRIALS = 3
 CODES = {0, 3, 4, 5, 6}
 FAULT_SHARE = 0.7  # of the sessions
@@ -271,14 +277,91 @@ def tell(soak: Soak) -> None:
         print(" · ".join(summary(soak)[:1] + summary(soak)[-5:]))  # noqa: T201
 
 
+def recorder(path: Path, seed: int) -> Callable[[Soak], None]:
+    """Return what writes down, after every session, what a run came to."""
+    today = datetime.fromtimestamp(SystemClock().utc_ns() / NS_PER_S, UTC)
+    commit = run(["git", "rev-parse", "--short", "HEAD"], check=True, **TEXT).stdout
+
+    def record(soak: Soak) -> None:
+        tell(soak)
+        fields = {
+            "seed": seed,
+            "commit": commit.strip(),
+            "date": f"{today:%Y-%m-%d}",
+            "hours": round(soak.simulated_ns / 3.6e12, 3),
+            "counts": dict(sorted(soak.counts.items())),
+            "descriptors": [soak.base[0] if soak.base else None, descriptors()],
+            "memory_kb": [soak.base[1] if soak.base else None, resident_kb()],
+        }
+        path.with_suffix(".new").write_text(json.dumps(fields, indent=1) + "\n")
+        path.with_suffix(".new").replace(path)
+
+    return record
+
+
+PAGE = """# Soak
+
+Simulated sessions with random faults, one after the other in one process. After every
+session journal, session.json and verified files have to agree; exit code and messages
+have to be known; the arm has to be braked; no child, shared memory or descriptor may be
+left, and the process must not grow by more than {growth} MB after its first sessions. A
+run ends at the first of these that does not hold. {hours:.1f} simulated hours in {runs}
+processes:
+
+| {titles} |
+|{lines}|
+{rows}
+
+Measured by `python tests/soak.py --seed N --hours H --record FILE` for each row; this
+page by `python tests/soak.py --write docs/soak.md FILE ...`. Descriptors and memory
+(MB): after the first sessions, and at the end.
+"""
+TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")
+TITLES += ("resumes", "descriptors", "memory")
+
+
+def page(records: list[dict]) -> str:
+    """Return the page of the runs whose records are given."""
+    rows = [_row(record) for record in records]
+    hours = sum(record["hours"] for record in records)
+    return PAGE.format(
+        titles=" | ".join(TITLES),
+        lines="|".join(["---"] * len(TITLES)),
+        rows="\n".join(rows),
+        hours=hours,
+        runs=len(rows),
+        growth=GROWTH_KB // 1000,
+    )
+
+
+def _row(record: dict) -> str:
+    counts = record["counts"]
+    faults = sum(n for name, n in counts.items() if name.startswith("fault "))
+    numbers = [counts.get(name, 0) for name in ("sessions", "trials")]
+    numbers += [faults, counts.get("resumes", 0)]
+    first, last = record["descriptors"]
+    grown = [f"{kb / 1000:.1f}" for kb in record["memory_kb"]]
+    cells = [record["seed"], record["commit"], record["date"]]
+    cells += [f"{record['hours']:.2f}", *numbers, f"{first}, {last}", ", ".join(grown)]
+    return f"| {' | '.join(map(str, cells))} |"
+
+
 def main() -> None:
-    """Soak as long as the command line says and print a summary."""
+    """Soak as long as the command line says, or write the page of earlier runs."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--hours", type=float, default=1.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--record", type=Path, metavar="FILE")
+    parser.add_argument("--write", type=Path, metavar="PAGE")
+    parser.add_argument("records", type=Path, nargs="*", metavar="FILE")
     given = parser.parse_args()
+    if given.write:
+        records = [json.loads(path.read_text()) for path in given.records]
+        given.write.write_text(page(records))
+        return
+    report = recorder(given.record, given.seed) if given.record else tell
     with tempfile.TemporaryDirectory(prefix="soak-") as place:
-        soak = soaked(given.hours, given.seed, Path(place), tell)
+        soak = soaked(given.hours, given.seed, Path(place), report)
     print("\n".join(summary(soak)))  # noqa: T201
 
 
