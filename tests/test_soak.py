@@ -39,7 +39,7 @@ def test_the_page_adds_up_its_runs():
         "memory_kb": [1e5, 1.1e5],
     }
 
-    text = page([record, {**record, "hours": 2.5}])
+    text = page([record, {**record, "hours": 2.5}]).replace("\n", " ")
 
     assert "3.8 simulated hours in 2 processes" in text
     row = "| 1 | abc | 2026-01-01 | 1.25 | 3 | 9 | 3 | 0 | 6, 6 | 100.0, 110.0 |"
