@@ -58,7 +58,7 @@ _STONES = "small", "big"
 KINDS = {name: stones for name, (stones, _, _) in GROUNDS.items()}
 TRAINING = 10_000  # trials of this number and more teach
 _PROBES, _BEDS, _STANCES = 6, 8, 25  # that teach, of every terrain
-_CARRIED, _ALOFT = 0.014, 0.3  # m, s
+_CARRIED, _ALOFT = 0.014, 2.0  # m, s, as the arm takes
 _LONGEST = 2000  # ticks of a stance and the way to it
 
 
