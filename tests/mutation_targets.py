@@ -54,6 +54,10 @@ TESTS = {
         f"{_CONTROL_TESTS}/test_joint_lock.py",
         f"{_CONTROL_TESTS}/test_controller.py",
     ),
+    f"{_CONTROL}/friction_compensation.py": (
+        f"{_CONTROL_TESTS}/test_friction_compensation.py",
+    ),
+    f"{_CONTROL}/sole_impedance.py": (f"{_CONTROL_TESTS}/test_sole_impedance.py",),
     f"{_CONTROL}/soft_walls.py": (f"{_CONTROL_TESTS}/test_soft_walls.py",),
     f"{_DRIVER}/transmission.py": (f"{_DRIVER_TESTS}/test_transmission.py",),
     f"{_DRIVER}/status_poller.py": (
@@ -120,7 +124,84 @@ _BODIES = (
     "('the wrist', (6, coal.Sphere(0.065), _at(0.0, 0.0, 0.0))), "
     "('the foot', (7, *_capsule(0.045, 0.0, end, x, y)))]"
 )
+_UNREAD = "overwritten before it is read"
+_EIGHTH = "there is no eighth motor that would read it"
 EQUIVALENT: dict[tuple[str, str], str] = {
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._borne = [0.0] * 7 -> self._borne = [0.0] * 8",
+    ): _UNREAD,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._rested_ns = -_FADE_NS -> self._rested_ns = +_FADE_NS",
+    ): "what fades before anything was pushed is 0 all the time",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "if load and (less := (load_at - abs(borne))) > 0.0: -> "
+        "if load and (less := (load_at - abs(borne))) >= 0.0:",
+    ): "a load that is less by nothing takes nothing",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "if z * step > 0.0 and (bent := abs(z)) > ELASTIC: -> "
+        "if z / step > 0.0 and (bent := abs(z)) > ELASTIC:",
+    ): "a quotient has the sign of the product",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 1 if z > _BENT else -1 if z <= -_BENT else 0",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "if len(turned) == _SWINGS and now_ns - turned[0] < _SWING_NS: -> "
+        "if len(turned) == _SWINGS and now_ns - turned[0] <= _SWING_NS:",
+    ): _BELOW,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "tau *= np.where(self._j2mp != 0.0, free, 1.0).min(axis=1) -> "
+        "tau *= np.where(self._j2mp != 0.0, free, 2.0).min(axis=1)",
+    ): "every motor turns a joint, and no joint is freer than 1",
+    (
+        f"{_CONTROL}/sole_impedance.py",
+        "rate = TRACTION_RATE if wanted > self._F_t else RELEASE_RATE -> "
+        "rate = TRACTION_RATE if wanted >= self._F_t else RELEASE_RATE",
+    ): "a force that is as wanted stays, at every rate",
+    (
+        f"{_CONTROL}/sole_impedance.py",
+        "self._goal = SoleGoal(nan, nan, x, z, 0.0) -> "
+        "self._goal = SoleGoal(nan, nan, x, z, 1.0)",
+    ): "a reference that is where it is to be goes nowhere, at every speed",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._fading = np.zeros(7) -> self._fading = np.zeros(8)",
+    ): _UNREAD,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._bent = [0] * 7 -> self._bent = [0] * 8",
+    ): _EIGHTH,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._turned: list[list[int]] = [[] for _ in range(7)] -> "
+        "self._turned: list[list[int]] = [[] for _ in range(8)]",
+    ): _EIGHTH,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "self._borne = [0.0] * 7 -> self._borne = [1.0] * 7",
+    ): _UNREAD,
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "if z * step > 0.0 and (bent := abs(z)) > ELASTIC: -> "
+        "if z * step > 0.0 and (bent := abs(z)) >= ELASTIC:",
+    ): "where a bristle begins to slide its plastic share is 0",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "level = forward if z > 0.0 else backward -> "
+        "level = forward if z >= 0.0 else backward",
+    ): "a bristle that is not bent pushes nothing, whatever its level",
+    (
+        f"{_CONTROL}/friction_compensation.py",
+        "way = 1 if z > _BENT else -1 if z < -_BENT else 0 -> "
+        "way = 1 if z > _BENT else -2 if z < -_BENT else 0",
+    ): "a mark of the other way; nothing reckons with it",
     (
         f"{_CONTROL}/position_control.py",
         "if t <= 0.0: -> if t < 0.0:",

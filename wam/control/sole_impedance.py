@@ -53,10 +53,8 @@ class SoleAxes:
         """
         self._travel = travel
         self._dt = dt
-        self._goal = SoleGoal(nan, nan, 0.0, 0.0, 0.0)
-        self._aimed_ns = 0
-        self._x = self._z = self._F_t = self._F_n = 0.0
         self.is_tipped = False
+        self.begin(0.0, 0.0, 0)
 
     def begin(self, x: float, z: float, now_ns: int) -> None:
         """Stay at a place [m] until a goal comes."""

@@ -17,7 +17,7 @@ from wam.control.friction_compensation import (
 )
 from wam.control.soft_walls import SoftWalls, Walls
 from wam.model.constants import load_constants
-from wam.model.friction import joint_coulomb
+from wam.model.friction import joint_coulomb, motor_turns
 
 CONSTANTS = load_constants()
 COUNTS = np.array(CONSTANTS.cts)
@@ -241,3 +241,144 @@ def test_a_motor_that_does_not_answer_goes_no_step():
     before = after(compensation, angles)[-1]
     silent = after(compensation, np.tile(angles[-1], (5, 1)), 200)[-1]
     assert np.allclose(silent, before)
+
+
+REACH = np.array([4.0, 4.0, 4.0, 4.0, 8.0, 8.0, 8.0]) * 1e-3  # rad of the joint
+
+
+def of_motors(tau):
+    """Return what torques of the joints are at the motors [N m]."""
+    return np.linalg.solve(CONSTANTS.j2mp.T, tau)
+
+
+@pytest.mark.parametrize("motor", range(7))
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_bristle_bends_as_far_as_its_motor_turned(motor, way):
+    angles = np.zeros((2, 7))
+    angles[1, motor] = way * 0.5 * REACH[motor] * motor_turns(CONSTANTS)[motor]
+    tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
+
+    wanted = np.zeros(7)
+    wanted[motor] = way * 0.5 * 0.7 * TRUE.coulomb[motor]
+    counted = 2.0 * np.pi / COUNTS[motor] / (REACH * motor_turns(CONSTANTS))[motor]
+    assert of_motors(tau) == pytest.approx(wanted, abs=counted * TRUE.coulomb[motor])
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_a_jump_of_a_motor_bends_its_bristle_once(way):
+    angles = np.zeros((2, 7))
+    angles[1, 1] = way * 3.0 * REACH[1] * motor_turns(CONSTANTS)[1]
+    tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)[-1]
+
+    assert of_motors(tau)[1] == pytest.approx(way * 0.7 * TRUE.coulomb[1])
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_each_sense_of_motion_has_its_own_friction(way):
+    known = replace(KNOWN, forward=TRUE.coulomb, backward=0.5 * TRUE.coulomb)
+    angles = np.zeros((2, 7))
+    angles[1, 3] = way * 3.0 * REACH[3] * motor_turns(CONSTANTS)[3]
+    tau = after(FrictionCompensation(CONSTANTS, known, 0.7), angles)[-1]
+
+    share = 0.7 if way > 0.0 else -0.35
+    assert of_motors(tau)[3] == pytest.approx(share * TRUE.coulomb[3])
+
+
+@pytest.mark.parametrize(
+    ("depth", "left"), [(0.0, 1.0), (0.005, 0.75), (-0.01, 0.5), (0.02, 0.0)]
+)
+def test_it_fades_over_the_first_20_milliradians_of_a_wall(depth, left):
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    whole = after(compensation, turning(1, 0.3))[-1]
+    inside = np.zeros(7)
+    inside[1] = depth
+    now = reading(200, turning(1, 0.3)[-1])
+
+    tau = compensation.torque(now, NOTHING, inside)
+    assert tau[1] == pytest.approx(left * whole[1])
+
+
+@pytest.mark.parametrize(
+    ("turns", "gap", "is_over"), [(11, 40, False), (12, 45, True), (12, 46, False)]
+)
+def test_twelve_turns_within_a_second_are_a_swing(turns, gap, is_over):
+    """A bristle goes to its other end every `gap` cycles of 2 ms."""
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    end = 3.0 * REACH[2] * motor_turns(CONSTANTS)[2]
+    angles = np.zeros((turns * gap + 1, 7))
+    for turn in range(turns):
+        angles[1 + turn * gap : 1 + (turn + 1) * gap, 2] = end * (turn % 2 == 0)
+    after(compensation, angles, 1000)
+
+    assert (compensation.swung_motor == 3) is is_over
+    assert compensation.metadata()["friction:swung_motor"] == str(3 * is_over)
+
+
+def test_what_is_left_fades_evenly_for_a_tenth_of_a_second():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    whole = after(compensation, turning(1, 0.3))[-1]
+    compensation.rest(10**9)
+    left = [compensation.resting(10**9 + k * 25_000_000) for k in range(5)]
+
+    for share, tau in zip((1.0, 0.75, 0.5, 0.25), left, strict=False):
+        assert tau == pytest.approx(share * whole)
+    assert left[4] is None
+
+
+def test_the_doubt_is_95_percent_and_both_add_as_squares():
+    known = known_friction(TRUE, 0.03 * TRUE.coulomb, 0.04 * TRUE.coulomb)
+
+    assert known.forward == pytest.approx((1.0 - 1.96 * 0.05) * TRUE.coulomb)
+    assert known.backward == pytest.approx((1.0 - 1.96 * 0.05) * TRUE.coulomb)
+    assert known.error == pytest.approx(np.full(7, 1.96 * 0.03))
+
+
+def test_a_bristle_that_is_bent_far_slides_more_and_more():
+    """z grows by the step up to 0.7, and by less and less up to 1."""
+    way = 0.1 * REACH[1] * motor_turns(CONSTANTS)[1]
+    angles = np.zeros((13, 7))
+    angles[:, 1] = way * np.arange(13)
+    tau = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), angles)
+
+    z = [0.0]
+    for _ in range(12):
+        share = max((z[-1] - 0.7) / 0.3, 0.0)
+        z.append(z[-1] + 0.1 * (1.0 - share * z[-1]))
+    bent = np.linalg.solve(CONSTANTS.j2mp.T, tau.T)[1] / (0.7 * TRUE.coulomb[1])
+    counted = 0.1 * 2.0 * np.pi / COUNTS[1] / way  # share of a count
+    assert bent == pytest.approx(np.array(z), abs=1.5 * counted)
+
+
+def test_both_motors_of_a_differential_let_go_and_no_other():
+    way = turning(0, 0.3) + turning(1, 0.3) + turning(2, 0.3) + turning(3, 0.3)
+    free = after(FrictionCompensation(CONSTANTS, KNOWN, 0.7), way)[-1]
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    after(compensation, way)
+    depth = np.array([0.0, 0.03, 0.0, 0.0, 0.0, 0.0, 0.0])
+    tau = compensation.torque(reading(200, way[-1]), NOTHING, depth)
+
+    assert tau[[0, 3]] == pytest.approx(free[[0, 3]])
+    assert tau[1:3] == pytest.approx([0.0, 0.0])
+
+
+def test_a_bristle_that_is_bent_one_way_again_and_again_swings_not():
+    compensation = FrictionCompensation(CONSTANTS, KNOWN, 0.7)
+    angles = np.zeros((400, 7))
+    back = -REACH[2] * motor_turns(CONSTANTS)[2]
+    angles[:, 2] = np.where(np.arange(400) // 10 % 2, 0.9 * back, 0.0)
+    after(compensation, angles)
+
+    assert compensation.swung_motor == 0
+
+
+def test_a_ripple_takes_its_share_of_what_the_load_adds():
+    ripple = replace(
+        TRUE,
+        load=np.full(7, 0.03),
+        ripple_sin=np.full(7, 0.06),
+        ripple_cos=np.full(7, 0.08),
+    )
+    known = known_friction(ripple, NOTHING, NOTHING)
+
+    assert known.load == pytest.approx(np.full(7, 0.03 * 0.9))
+    assert known.forward == pytest.approx(0.9 * TRUE.coulomb)
