@@ -24,6 +24,7 @@ from experiments.run.context import RunContext, open_context
 from experiments.run.photo import collect_photo
 from experiments.run.ready import activate, take_note, wait_ready
 from experiments.run.record import record_trial
+from experiments.run.stances import StuckFootError
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
 from experiments.session import (
@@ -161,11 +162,7 @@ class SessionRunner:
             return
         self._stuck += 1  # a stance that did not get on: nothing to be judged
         if self._stuck >= FAULTS_IN_A_ROW:
-            raise TractionError(
-                f"The foot got stuck in {self._stuck} recordings in a row.",
-                hint="Look at the foot and at the friction of the arm. To go on: "
-                f"traction resume {context.metadata.folder.id}",
-            )
+            raise StuckFootError(self._stuck, context.metadata.folder.id)
 
     # --- messages -----------------------------------------------------------------
 

@@ -7,7 +7,7 @@ do by itself it does in hold, with joint 7 locked. Only a simulated arm takes it
 from collections.abc import Mapping
 from pathlib import Path
 
-from acquisition import PreflightError, SettingsError
+from acquisition import PreflightError, SettingsError, TractionError
 from acquisition.control_loop import ArmState
 from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_pushes
 from analysis.foresight import ForesightFlag
@@ -46,6 +46,18 @@ _STUCK = (
     "The foot does not get on with what it is to do ({state}). The arm holds. Look at "
     "the foot; then the recording is made again."
 )
+
+
+class StuckFootError(TractionError):
+    """A foot that did not get on, recording after recording."""
+
+    def __init__(self, times: int, session: str) -> None:
+        """Say how often in a row, in the session of that name."""
+        super().__init__(
+            f"The foot got stuck in {times} recordings in a row.",
+            hint="Look at the foot and at the friction of the arm. To go on: "
+            f"traction resume {session}",
+        )
 
 
 def fresh_models(
