@@ -156,12 +156,11 @@ class SessionRunner:
         wait_ready(context, name)
         context.close_undo()
         outcome = record_trial(context, name)
-        if outcome.status == "complete":
-            self._stuck = 0
+        is_stuck = outcome.status != "complete"  # in a stance: nothing to be judged
+        self._stuck = self._stuck + 1 if is_stuck else 0
+        if not is_stuck:
             ask_verdict(context, name, outcome)
-            return
-        self._stuck += 1  # a stance that did not get on: nothing to be judged
-        if self._stuck >= FAULTS_IN_A_ROW:
+        elif self._stuck >= FAULTS_IN_A_ROW:
             raise StuckFootError(self._stuck, context.metadata.folder.id)
 
     # --- messages -----------------------------------------------------------------
