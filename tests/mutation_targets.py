@@ -44,6 +44,8 @@ TESTS = {
     f"{_CONTROL}/controller.py": (
         f"{_CONTROL_TESTS}/test_controller.py",
         f"{_CONTROL_TESTS}/test_move_in_the_cycle.py",
+        f"{_CONTROL_TESTS}/test_stance_in_the_cycle.py",
+        f"{_CONTROL_TESTS}/test_friction_compensation.py",
     ),
     f"{_CONTROL}/position_control.py": (
         f"{_CONTROL_TESTS}/test_position_hold.py",

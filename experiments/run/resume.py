@@ -120,7 +120,6 @@ class ResumeRequest:
         operator: name; empty = the one of the session.
         script: of an operator; None = the keyboard.
         can_log: file that the bus is logged to.
-        foresight: as of `SessionRequest`.
         faults: to be injected into the simulation.
     """
 
@@ -134,7 +133,6 @@ class ResumeRequest:
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
-    foresight: Path | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -249,7 +247,7 @@ def _reopen(
         why = f"{folder.id} cannot be opened: {reason}."
         raise SessionError(why, hint="Nothing was started.")
     before = _last_opening(journal)
-    settings = load_settings(config := request.config or _config_of(before))
+    settings = load_settings(config := request.config or _path_of(before, "config"))
     fake = fake_of(before, request) if folder.is_simulated else None
     operator = choose_operator(request.script, is_fake=folder.is_simulated)
     session = SessionRequest(
@@ -263,7 +261,7 @@ def _reopen(
         console=console,
         faults=request.faults,
         can_log=request.can_log,
-        foresight=request.foresight,
+        foresight=_path_of(before, "foresight"),
         stance=read_stance_task(folder),
     )
     state = journal.state
@@ -283,9 +281,9 @@ def _person_of(opening: Mapping[str, Any], operator: OperatorInput) -> str:
     return "" if NO_PERSONS & {name, operator.who} else name
 
 
-def _config_of(opening: Mapping[str, Any]) -> Path | None:
-    config = opening.get("config") or None
-    return Path(config) if isinstance(config, str) else None
+def _path_of(opening: Mapping[str, Any], name: str) -> Path | None:
+    written = opening.get(name) or None
+    return Path(written) if isinstance(written, str) else None
 
 
 def fake_of(opening: Mapping[str, Any], request: ResumeRequest) -> FakeOptions:

@@ -115,7 +115,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
         SessionError: the conditions are not those of the session.
     """
     console, stop = request.console, StopFlag()
-    source = _foresight_of(request)
+    source = _foresight_of(request, mode)
     rig = connect_rig(request.settings, request.row, request.fake)
     with logging_bus(rig, request.can_log, console):
         host_faults = HostFaults(rig)
@@ -163,18 +163,20 @@ def _hand(request: SessionRequest, rig: Rig) -> SimulatedHand | None:
     return SimulatedHand(rig.simulation, lets_stand=request.stance is not None)
 
 
-def _foresight_of(request: SessionRequest) -> ForesightSource | None:
+def _foresight_of(request: SessionRequest, mode: OpenMode) -> ForesightSource | None:
     """Return what the session is foreseen with, None where nothing was learnt yet.
 
     Raises:
-        SettingsError: the file that was named cannot be used.
+        SettingsError: the file that was named now cannot be used.
     """
-    if request.foresight is not None:
-        return read_foresight(request.foresight)
-    path = request.data / STUDY_DATABASE
+    named = request.foresight
+    path = named or request.data / STUDY_DATABASE
     try:
-        return read_foresight(path) if is_there(path) else None
-    except TractionError as error:  # it is in the way of nothing
+        return read_foresight(path) if named or is_there(path) else None
+    except TractionError as error:
+        if named is not None and mode.journal is None:
+            raise
+        # It is in the way of nothing: a trial needs no foresight.
         request.console.say(f"{WARNING} Nothing is foreseen. {error}")
         return None
 
@@ -267,6 +269,7 @@ def _details(
         **mode.details,
         "operator": request.who,
         "config": str(request.config.resolve()) if request.config else "",
+        "foresight": str(request.foresight.resolve()) if request.foresight else "",
         "fake": asdict(request.fake) if request.fake is not None else None,
     }
     return {**details, "differences": differences} if differences else details

@@ -1,4 +1,5 @@
-"""When a fault may come: the phases of a session, and a move of the arm by itself."""
+"""When a fault may come: the phases of a session, and what the arm does by itself."""
 
 PHASES = ("preflight", "idle", "tare", "ready", "recording", "review", "end")
 MOVING = "moving"  # the arm by itself, between two poses of a calibration
+STANDING = "standing"  # the arm by itself, its foot pressed on the ground in a stance

@@ -1,16 +1,27 @@
 """Foresight in a process of its own reads the ring and says what the record gives."""
 
+import os
+import signal
+
 import numpy as np
 import pytest
 
 from acquisition.ipc.child import Child
 from acquisition.ipc.layout import SharedLayout
 from acquisition.schema import CYCLE
+from acquisition.trial_file.reader import TrialReader
 from experiments.rig.foresight import read_foresight, state_record, states_of
 from tests.acquisition.trials import make_cycles
 from tests.analysis.foresight.databases import write_database
 from tests.analysis.foresight.made import RIG, STONES, trial
-from tests.processes.watching import until
+from tests.processes.watching import (
+    children_of,
+    is_running,
+    judged,
+    session,
+    until,
+    wait,
+)
 
 pytestmark = pytest.mark.wall_clock
 ALONG = [1.0, 0.0, 0.0]
@@ -67,3 +78,33 @@ def test_a_process_at_rest_says_nothing(tmp_path, cycles):
         child.stop()
         shared.close()
     assert not np.isnan(cycles["foot_position"]).any()
+
+
+def test_a_session_goes_on_when_its_foresight_is_killed(tmp_path):
+    path = write_database(tmp_path / "terrains.json")
+    is_kept, share = judged(tmp_path, lambda data: kept_without(data, path))
+
+    assert is_kept
+    assert 0.0 < share < 1.0
+
+
+def kept_without(data, path):
+    """Return whether the trial was kept, and how much of it was foreseen.
+
+    None where the machine stood still.
+    """
+    with session(data, "--foresight", str(path)) as seen:
+        if not seen.wait_for_trial():
+            return None
+        wait(2.0)
+        if seen.has_trial_ended():
+            return None
+        os.kill(children_of(seen.process.pid)["traction-foresi"], signal.SIGKILL)
+        assert until(lambda: not is_running(seen.process.pid), 60.0), seen.output()
+        if seen.has_stalled():
+            return None
+        assert seen.process.wait(1) == 0, seen.output()
+    (kept,) = data.glob("sessions/*/trials/T01.mcap")
+    reader = TrialReader(kept)
+    cycles, states = reader.cycles().data, reader.foresight().data
+    return seen.journal()[-1]["reason"] == "complete", 5 * len(states) / len(cycles)

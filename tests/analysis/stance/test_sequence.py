@@ -79,6 +79,7 @@ def test_a_foot_that_rests_short_of_its_spot_stands_there(short, is_lowered):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)
 def test_avoid_slip_slips_as_asked_and_slides_less_than_constant_mu():
     pushes = {name: taught(name, 5) for name in ("S0", "B15", "TF")}
     learnt = learn_break_away(pushes)

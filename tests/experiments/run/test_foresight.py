@@ -138,3 +138,21 @@ def test_a_damaged_database_of_the_study_does_not_stop_a_session(tmp_path, confi
     assert done.code == 0, done.err
     assert "Nothing is foreseen" in done.out
     assert not TrialReader(only_session(tmp_path) / "trials" / "T01.mcap").has_foresight
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_session_that_is_opened_again_is_foreseen_as_before(
+    config, tmp_path, is_there
+):
+    data = tmp_path / "data"
+    path = write_database(tmp_path / "terrains.json")
+    assert run_short(config, data, STONES, 1, "--foresight", path).code == 0
+    if not is_there:
+        path.unlink()
+
+    auto = ("--operator-script", "auto", "--data", data)
+    done = traction("redo", "S001", "T01", "--reason", "again", *auto)
+    assert done.code == 0, done.err
+    trial = only_session(data) / "trials" / "T01.mcap"
+    assert TrialReader(trial).has_foresight is is_there
+    assert ("Nothing is foreseen." in done.out) is not is_there
