@@ -85,7 +85,7 @@ def test_other_models_do_not_pass_for_those_of_the_record(foreseen, tmp_path):
     )
     assert done.code == 1
     assert "other models" in done.err
-    assert "first other state" in done.err
+    assert "first state that differs" in done.err
 
 
 def test_a_session_without_a_database_records_no_foresight(first_trial):
