@@ -35,10 +35,10 @@ def read_text(path: Path) -> str:
 
     Raises:
         OSError: it cannot be read.
-        ValueError: it is no file, larger than 1 MB, or no text.
+        ValueError: it is not a file, larger than 1 MB, or no text.
     """
     if not stat.S_ISREG(path.stat().st_mode):
-        raise ValueError("it is no file")
+        raise ValueError("it is not a file")
     with path.open("rb") as file:
         data = file.read(_LARGEST + 1)
     if len(data) > _LARGEST:
@@ -46,7 +46,7 @@ def read_text(path: Path) -> str:
     try:
         return io.TextIOWrapper(io.BytesIO(data), encoding="utf-8").read()
     except UnicodeDecodeError as error:
-        raise ValueError("it is no text") from error
+        raise ValueError("it is not text") from error
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def temporary_folder(prefix: str, parent: Path) -> Generator[Path]:
 def remove_abandoned(prefix: str, parent: Path) -> None:
     """Remove the folders PREFIX-PID-... in `parent` that a killed process left.
 
-    Folders of other users, and of processes that run, stay; so does what is no folder.
+    Folders of other users, and of processes that run, stay; so do other files.
     """
     with suppress(OSError):
         for path in parent.glob(f"{prefix}-*-*"):

@@ -9,20 +9,21 @@ SESSIONS, SLIDING = "## Sessions", "## Sliding at a constant speed"
 CALIBRATIONS = "## Calibrations"
 _HEAD = """# Friction of the drives
 
-What dry friction does to this experiment, and what its compensation can take off. All
+What dry friction does to this experiment, and how much of it can be compensated. All
 of it is simulated: the friction of `fakes/plant/friction.py` at a share of what was
 identified on another arm (OWD), break-away and Stribeck speed ASSUMED. Simulated arms
 have 0.4 of it (ASSUMED, between that arm and what others put into their models) unless
-`--friction` says otherwise; `--cables HZ` lets the joints swing on cables of that
-resonance, 8 to 25 Hz (ASSUMED: none is published). The parts below are written by their
-commands and by nobody else.
+`--friction` says otherwise; `--cables HZ` sets the resonance of the joints on their
+cables, 8 to 25 Hz (ASSUMED: none is published). The parts below are written
+by their commands.
 
-With 1.2 times the friction taken for granted, torques 4 ms late and cables of 8, 15 and
-20 Hz, at joints 2, 4 and 6, without a hand, in a loose and in a stiff one, nothing
-swings (`pytest -m slow tests/fakes/world/test_compensated_float.py`).
+With 1.2 times the true friction assumed by the compensation, torques 4 ms late and
+cables of 8, 15 and 20 Hz, at joints 2, 4 and 6, without a hand, in a loose and in a
+stiff one, nothing oscillates
+(`pytest -m slow tests/fakes/world/test_compensated_float.py`).
 
 F_t and F_n are measured at the wrist, below every drive, and v_t at the joints: models
-of the ground do not suffer from friction. What suffers is which loads and speeds a
+of the ground are not biased by joint friction. It limits the loads and speeds that a
 trial reaches: F_n at rest, the push, and whether a slip goes back.
 """
 _SESSIONS = """
@@ -44,17 +45,17 @@ The goal is a mean within 10 % of the load and a deviation of 0.3 N at most:
 
 {goals}
 
-At 0.02 the calibration is refused: such a friction is hardly above what gravity and
-inertia leave unexplained, and needs no compensation.
+At 0.02 the calibration is refused: such a friction is hardly above the residual
+of gravity and inertia, and needs no compensation.
 
-What the compensation cannot reach: it takes off at most {most:g} of the *lower end* of
-what slides, at the worst place of a motor's turn, because more would drive an arm whose
-cables have worn in. Of the break-away of a joint it leaves a third to a half. The foot
-comes to rest on its way down, so what is left tends to hold it up: the shortfall has
-one sign and does not average out over put-downs. Without compensation the whole
-friction holds part of what the hand had pressed: no weight, but more than with it. A
-mean within 10 % of the load takes a heavier virtual mass (`traction check` prints it)
-or an arm that rubs less.
+What the compensation cannot reach: it subtracts at most {most:g} of the *lower bound*
+of sliding friction, at the worst place of a motor's turn, because more would drive an
+arm whose cables have worn in. Of the break-away of a joint it leaves a third to a half.
+The foot comes to rest on its way down, so what is left tends to hold it up: the
+shortfall has one sign and does not average out over put-downs. Without compensation the
+whole friction holds part of what the hand had pressed: no weight, but more than with
+it. A mean within 10 % of the load needs a heavier virtual mass (`traction check` prints
+it) or an arm with less friction.
 """
 _MOST = 0.8
 

@@ -11,32 +11,36 @@ from pathlib import Path
 from typing import NoReturn
 
 from acquisition import TractionError
-from experiments.arguments import add_global_options, did_you_mean
+from experiments.arguments import (
+    add_global_options,
+    did_you_mean,
+    with_present_names,
+)
 
 COMMANDS = {
-    "check": "is the rig fit to run? one graded page",
+    "check": "check that the rig is ready: one graded page",
     "run": "record a session of trials on one terrain",
-    "stance": "let the simulated foot stand by itself, asked for traction",
-    "resume": "continue the session that is not finished",
-    "redo": "record any one trial of a session once more",
+    "stance": "record stances: the simulated foot stands and is asked for traction",
+    "resume": "continue an unfinished session",
+    "redo": "record one trial of a session again",
     "status": "the matrix board, counted from verified files",
     "note": "write a remark on a session or a trial",
-    "verdict": "keep or reject a recorded trial, days later",
+    "verdict": "change the verdict on a recorded trial",
     "zero": "set the home position after confirmation",
-    "bench": "what the loop achieves on this machine",
+    "bench": "measures the control loop on this machine",
     "calibrate": "guided calibrations of the rig",
     "fake": "serve the simulated arm to other programs over CAN",
-    "replay": "show a trial again, or a bus log in words",
+    "replay": "replay a trial, or decode a bus log",
     "watch": "serve the running session to a second screen, read only",
-    "export": "trials as CSV or Parquet tables with units and checksums",
-    "publish": "recordings, tables and results as an RO-Crate to be archived",
+    "export": "write trials as CSV or Parquet tables with units and checksums",
+    "publish": "write recordings, tables and results as an RO-Crate for an archive",
     "init": "write rig.toml and matrix.toml to be edited",
-    "verify": "hold kept trials, or a publication, against their checksums",
-    "recover": "save what is sound of trials that were not ended",
-    "rehearse": "the whole study simulated, held against what it has to show",
+    "verify": "verify kept trials, or a publication, by their checksums",
+    "recover": "recover the readable part of unfinished trial files",
+    "rehearse": "simulate the whole study and check it against its bands",
     "report": "fit and compare models of recorded sessions, write the report",
-    "identify": "which terrain is this? probabilities over time",
-    "fit": "the same for external data, npz or CSV",
+    "identify": "classify the terrain of a trial: probabilities over time",
+    "fit": "fit and compare models of external data, npz or CSV",
 }
 _JOINED = {
     "publish": "export",
@@ -57,13 +61,13 @@ Traction measures how a robotic foot grips loose stones. To try it without hardw
 
   traction run S0 --fake --trials 1           one simulated trial, you press the keys
   traction run S0 --fake --fast --trials 3    three more, as fast as the machine can
-  traction status                             what is kept, what comes next
+  traction status                             kept trials, next terrain
   traction report --all                       models, comparison and figures on one page
 
 With an arm:
 
   traction init lab                           rig.toml and matrix.toml, to be edited
-  traction check --config lab/rig.toml        is the rig fit? nothing moves
+  traction check --config lab/rig.toml        is the rig ready? nothing moves
 
 traction --help lists all commands, traction COMMAND --help shows examples of one.
 Complete names with the tab key, bash or zsh:
@@ -141,7 +145,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         argcomplete.autocomplete(parser, default_completer=NameCompleter())
     except ImportError:
         pass
-    args = parser.parse_args(arguments)
+    line = sys.argv[1:] if arguments is None else arguments
+    args = parser.parse_args(with_present_names(line))
     try:
         code = args.run(args)
     except TractionError as error:

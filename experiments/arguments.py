@@ -3,12 +3,21 @@
 import math
 import shlex
 from argparse import SUPPRESS, ArgumentParser, ArgumentTypeError, Namespace
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 FRICTION = 0.4  # of the simulated joints, as a share of another arm's; ASSUMED
 CABLES = (8.0, 25.0)  # Hz, resonance of joints on cables; ASSUMED
+_SEED = {"--seed": "--points-seed"}
+_FORMER: Mapping[str, Mapping[str, str]] = {  # names that scripts may still use
+    "calibrate": {"--out": "--to"},
+    "export": _SEED,
+    "fit": {"--out": "--to", **_SEED},
+    "identify": {"--models": "--terrain-db", "--window": "--samples"},
+    "publish": _SEED,
+    "report": _SEED,
+}
 PACES = ("steady", "slow", "fast", "clumsy")  # of the simulated person
 
 
@@ -39,7 +48,7 @@ def add_global_options(
     left_out = SUPPRESS if is_after_command else None
     group = parser.add_argument_group("global options")
     group.add_argument(
-        "--config", type=Path, default=left_out, metavar="FILE", help="a rig.toml"
+        "--config", type=Path, default=left_out, metavar="FILE", help="rig.toml to use"
     )
     group.add_argument(
         "--data",
@@ -53,18 +62,31 @@ def add_global_options(
         "--verbose",
         action="store_true",
         default=left_out or False,
-        help="name the cause of an error",
+        help="show the cause of an error",
     )
     group.add_argument(
         "--no-color", action="store_true", default=left_out or False, help="plain text"
     )
 
 
+def with_present_names(arguments: Sequence[str]) -> list[str]:
+    """Return a command line in which former names of options are the present ones."""
+    command = next((each for each in arguments if each in _FORMER), None)
+    if command is None:
+        return list(arguments)
+    start = arguments.index(command)
+    line = [*arguments[:start]]
+    for each in arguments[start:]:
+        name, sign, value = each.partition("=")
+        line.append(_FORMER[command].get(name, name) + sign + value)
+    return line
+
+
 def whole_number(text: str) -> int:
     """Return a seed from the command line.
 
     Raises:
-        ArgumentTypeError: it is no whole number of at least 0.
+        ArgumentTypeError: it is not a whole number of at least 0.
     """
     if not (text.isascii() and text.isdigit() and len(text) <= 18):
         raise ArgumentTypeError(f"{text!r} - expected a whole number >= 0, e.g. 1")
@@ -92,13 +114,13 @@ def number_within(least: float, most: float, wanted: str) -> Callable[[str], flo
 def add_simulated_arm(parser: ArgumentParser) -> None:
     """Declare which simulated arm it is."""
     parser.add_argument(
-        "--seed", type=int, default=1, metavar="N", help="of the simulation (1)"
+        "--seed", type=int, default=1, metavar="N", help="seed of the simulation (1)"
     )
     parser.add_argument(
         "--friction",
         type=float,
         metavar="SHARE",
-        help="of the simulated joints: 1 = as identified on another arm "
+        help="friction of the simulated joints: 1 = as identified on another arm "
         f"({FRICTION:g})",
     )
     parser.add_argument(
@@ -123,7 +145,7 @@ def friction_share(args: Namespace) -> float:
     nothing = "Nothing was started."
     if getattr(args, "twin", None):
         raise SettingsError(
-            "--friction and --twin each say how the arm rubs.",
+            "--friction and --twin both set the friction of the joints.",
             hint=f"Leave one of them out. {nothing}",
         )
     if not 0.0 <= args.friction <= 2.0:
@@ -138,11 +160,12 @@ def friction_share(args: Namespace) -> float:
 def add_seed(parser: ArgumentParser) -> None:
     """Declare the seed of the rows that a Gaussian process is trained on."""
     parser.add_argument(
-        "--seed",
+        "--points-seed",
+        dest="seed",
         type=whole_number,
         default=0,
         metavar="N",
-        help="of the choice of points (0)",
+        help="seed of the choice of training points (0)",
     )
 
 
@@ -162,12 +185,14 @@ def add_analysis(parser: ArgumentParser) -> None:
         help="one sample of N is kept, samples at 500 Hz (5: 10 ms)",
     )
     group.add_argument(
-        "--window", metavar="LOW:HIGH", help="velocities that count [m/s] (0.005:0.2)"
+        "--window",
+        metavar="LOW:HIGH",
+        help="velocities that are kept [m/s] (0.005:0.2)",
     )
     group.add_argument(
         "--bounds",
         metavar="NAME=LOW:HIGH,..",
-        help="box of the Tustin fit: mu, F_s, v_s, delta_s, b",
+        help="bounds of the Tustin fit: mu, F_s, v_s, delta_s, b",
     )
     group.add_argument(
         "--what-if",
@@ -183,16 +208,19 @@ def add_analysis(parser: ArgumentParser) -> None:
 def add_reopening(parser: ArgumentParser) -> None:
     """Declare what every command takes that opens a session once more."""
     parser.add_argument(
-        "--fake", action="store_true", help="only a simulated session is meant"
+        "--fake", action="store_true", help="accept a simulated session only"
     )
     parser.add_argument(
         "--fast", action="store_true", help="stepped time, only if simulated"
     )
     parser.add_argument(
-        "--operator", default="", metavar="NAME", help="who pushes (as before)"
+        "--operator",
+        default="",
+        metavar="NAME",
+        help="name of the operator (as before)",
     )
     parser.add_argument(
-        "--force", action="store_true", help="record under other conditions, too"
+        "--force", action="store_true", help="record although conditions have changed"
     )
     parser.add_argument(
         "--operator-script",
@@ -229,7 +257,10 @@ def add_fault(parser: ArgumentParser) -> None:
 def add_author(parser: ArgumentParser) -> None:
     """Declare whose word a note or a verdict is."""
     parser.add_argument(
-        "--operator", default="", metavar="NAME", help="who says so (your login)"
+        "--operator",
+        default="",
+        metavar="NAME",
+        help="name of the operator (your login)",
     )
 
 

@@ -100,9 +100,9 @@ _BY_CONDITION = {
 }
 BUS_WORDS = {  # of a bus on which nothing can be asked
     BusCondition.DOWN: "The CAN interface refuses to send and receive.",
-    BusCondition.FULL: "Nobody on the CAN bus acknowledges: its queue is full.",
+    BusCondition.FULL: "No device on the CAN bus acknowledges: its queue is full.",
     BusCondition.OFF: "The CAN controller has left the bus (bus-off).",
-    BusCondition.UNHEARD: "Nobody on the CAN bus acknowledges.",
+    BusCondition.UNHEARD: "No device on the CAN bus acknowledges.",
 }
 _HEARTBEAT = "heartbeat"  # the monitor of the loop's traffic
 _BUTTON = "other"  # the monitor that a pressed E-stop button shows

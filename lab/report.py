@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from lab.results import ScenarioResult, Verdict
 
-_TITLE = "# The program beside the real kernel's drivers\n"
+_TITLE = "# Laboratory: the program with the real kernel's drivers\n"
 _HEAD = """
 Made by `make lab-page` (`python -m lab --write docs/lab.md`). Each scenario runs the
 unmodified program in an emulated machine: Debian's kernel, its `kvaser_pci` (SJA1000)
@@ -18,7 +18,7 @@ none of them. `processor s` is what the emulation of a scenario took of the host
 |---|---|---|---|---|
 """
 _FIGURES = """
-## The figures
+## Figures
 
 `exchange`: from the request to the seventh position, median and 99th percentile, with
 how many of 100 exchanges were incomplete. `cycles`, `missed`, `gap`: cycles of the kept
@@ -27,7 +27,7 @@ counted only where `traction verify` accepts it. Where a fault of docs/faults.md
 raised, the exit code is the one that this page promises for the phase.
 """
 _NOT_SHOWN = """
-## What is not shown
+## Not covered
 
 - Bit time, arbitration, missing acknowledgement, error frames and bus-off: the emulated
   bus has none of them. Their handling is tested against `slcan` and simulated buses.

@@ -156,7 +156,9 @@ def report_ground(
         lines.append(judge.at_least(f"right after {after}", begun, least))
         lines.append(judge.at_least(f"right after {after}, anywhere", anew, least))
     lines += [
-        judge.at_most("sure and wrong", ground.sure_and_wrong, MOST_SURE_AND_WRONG),
+        judge.at_most(
+            "confident and wrong", ground.sure_and_wrong, MOST_SURE_AND_WRONG
+        ),
         judge.at_most("calibration of the surface", ground.calibration, 0.05),
         judge.at_most("back after a change [s]", ground.back, MOST_BACK)
         + f", slowest {ground.slowest:.2f} s",

@@ -35,10 +35,10 @@ TRIALS = 10  # of a session
 FIRST = (0, 1, 0, 1, 2, 1, 0, 1, 0)  # worth of aims: the middle one, then beside it
 TARGETS = ("grid", "corner", "break-away")
 SAVED = {"grid": 0.05, "corner": 0.08}  # shares of the trials, at least
-NOISE = 0.02  # log N; NLPD after as many trials may differ by this
+NOISE = 0.02  # nat; NLPD after as many trials may differ by this
 CORNER = (5.0, 0.045)  # N, m/s from which on a sample belongs to the corner
 SPEED_EDGES, LOAD_EDGES = (0.0, 0.01, 0.05, 0.2, 9.0), (-9.0, 2.0, 5.0, 10.0, 99.0)
-MOST_REGRET = 0.02  # log N
+MOST_REGRET = 0.02  # nat
 
 Choice = Callable[[Sequence[PushRecord], np.random.Generator], Sequence[float]]
 
@@ -97,7 +97,7 @@ class Session:
     Attributes:
         sd: of the function at the target [N], rms; for break-away the geometric mean
             of the standard deviations of its two parameters.
-        nlpd: of left-out samples of the target [log N]; for break-away what the two
+        nlpd: of left-out samples of the target [nat]; for break-away what the two
             parameters add to it.
         enough: after how many trials it was enough; all where never.
     """
@@ -150,7 +150,7 @@ def spread_of(known: Knowledge, target: str) -> float:
 
 
 def density(known: Knowledge, target: str, left: Sequence[np.ndarray]) -> float:
-    """Return the NLPD of left-out samples, each trial with the same weight [log N]."""
+    """Return the NLPD of left-out samples, each trial with the same weight [nat]."""
     if target == "break-away":
         left_open = np.linalg.inv(slip_information(known.records))
         ends = np.array([[1.0, 1.0], np.log([0.5, 2.0])])  # at 1.75 and 7 N
@@ -267,7 +267,7 @@ def table(every: Every) -> list[str]:
         )
         lines.append(
             f"enough for {target} after {np.mean(stops):.1f} trials, costs "
-            f"{with_error(lost)} log N; {terrains}"
+            f"{with_error(lost)} nat; {terrains}"
         )
     return lines
 

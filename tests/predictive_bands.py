@@ -41,8 +41,8 @@ BEFORE, EFFECT, NEW = "noise chosen", "trial effect alone", "new trial"
 MODELS = (BEFORE, EFFECT, NEW)
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
 SAME_TOP = 1e-3  # of the log likelihood
-LEAST_GAIN = 0.10  # log N, on stones over the noise chosen
-NO_WORSE = 0.01  # log N: a difference below is noise with twenty trials
+LEAST_GAIN = 0.10  # nat, on stones over the noise chosen
+NO_WORSE = 0.01  # nat: a difference below is noise with twenty trials
 LEAST_HITS = 0.95  # of the fits that end at the best of all starts
 
 

@@ -32,15 +32,15 @@ from analysis.study import (
 from tests.predictive_bands import load_study
 
 OPTIONS = FitOptions(models=(GP_SE_TRIAL,), draws=0)
-MOST_BEHIND_OWN = 0.05  # log N, the nine-trial fit before the joint one
-MOST_LOSS = 0.03  # log N, to the three trials alone
-LEAST_GAIN = 0.05  # log N, mean over the stones
+MOST_BEHIND_OWN = 0.05  # nat, the nine-trial fit before the joint one
+MOST_LOSS = 0.03  # nat, to the three trials alone
+LEAST_GAIN = 0.05  # nat, mean over the stones
 INCLINE_BAND = (0.85, 0.95)  # share of samples in a band of 90 %
 
 
 @dataclass(frozen=True)
 class Figures:
-    """One terrain: means over its draws [log N], the band of it never recorded."""
+    """One terrain: means over its draws [nat], the band of it never recorded."""
 
     terrain: str
     is_plate: bool

@@ -26,7 +26,7 @@ _SCORE_UNITS = {
     "mae": "N",
     "mae_error": "N",
     "rmse": "N",
-    "nlpd": "log N",
+    "nlpd": "nat",
     "crps": "N",
     "coverage90": "1",
 }
@@ -115,7 +115,7 @@ class ModelScore:
         mae: mean absolute error [N].
         mae_error: standard error of `mae` over the trials [N].
         rmse: root mean square error [N].
-        nlpd: mean negative log predictive density [log N].
+        nlpd: mean negative log predictive density [nat].
         crps: mean continuous ranked probability score [N].
         coverage90: share of measurements inside the 90 % band.
     """

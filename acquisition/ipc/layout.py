@@ -146,7 +146,7 @@ class SharedLayout:
                 return None
             raise LinkError(
                 f"Process {pid} runs another version of this program.",
-                hint="Look on with the version that records.",
+                hint="Use the version that records.",
             )
         return cls(memory)
 

@@ -195,7 +195,7 @@ class RpcServer:
     def _carry_out(self, name: object, arguments: object) -> Any:  # noqa: ANN401
         method = self._methods.get(name) if isinstance(name, str) else None
         if method is None:
-            raise RemoteCallError(f"{name!r} is no method of this process.")
+            raise RemoteCallError(f"{name!r} is not a method of this process.")
         return method(arguments)
 
 

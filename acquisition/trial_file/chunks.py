@@ -55,7 +55,7 @@ def read_file(path: Path) -> bytes:
     """Return the whole file; a pipe or device is not waited for.
 
     Raises:
-        TrialFileError: it cannot be read, is no regular file, or is beyond all size.
+        TrialFileError: it cannot be read, is not a regular file, or is beyond all size.
     """
     with as_trial_file_error(path):
         return read_data(path)

@@ -120,7 +120,7 @@ def open_data(path: Path, flags: int = os.O_RDONLY) -> int:
     """Return a descriptor of the regular file `path`; nothing is waited for.
 
     Raises:
-        TrialFileError: it is no regular file, has a name outside the session, or is
+        TrialFileError: it is not a regular file, has a name outside the session, or is
             larger than its kind may be.
         OSError: it is missing, or cannot be opened.
     """
@@ -181,7 +181,7 @@ def check_folders(session: Path) -> None:
     """Refuse a session whose folders lead elsewhere.
 
     Raises:
-        TrialFileError: trials/, rejected/ or faults/ is no folder.
+        TrialFileError: trials/, rejected/ or faults/ is not a folder.
     """
     for name in SUBFOLDERS:
         path = session / name
@@ -217,7 +217,7 @@ def _check_kind(path: Path, status: os.stat_result, *, is_folder: bool = False) 
         if is_kind(status.st_mode):
             raise TrialFileError(path, what, hint=_HINT)
     if is_folder:
-        raise TrialFileError(path, "is no folder", hint=_HINT)
+        raise TrialFileError(path, "is not a folder", hint=_HINT)
 
 
 def _check_open(descriptor: int, path: Path) -> None:

@@ -70,7 +70,7 @@ def check_query(**forces: float) -> None:
     """
     for name, force in forces.items():
         if not math.isfinite(force):
-            raise SettingsError(f"{name} = {force} is no finite number.")
+            raise SettingsError(f"{name} = {force} is not a finite number.")
         if force < 0.0:
             raise SettingsError(
                 f"{name} = {force:g} N is negative.", hint="Give a force of 0 or more."

@@ -38,10 +38,10 @@ class PushLaw:
     """Parameters of one terrain's law.
 
     Attributes:
-        level: b0 [log N] or a [N].
+        level: b0 [nat] or a [N].
         slope: b1, by log(F_n / 3.5 N), or b [N/N].
-        spread: s [log N] or [N].
-        trial_sd: standard deviation of the effect of the trial, su [log N] or [N].
+        spread: s [nat] or [N].
+        trial_sd: standard deviation of the effect of the trial, su [nat] or [N].
     """
 
     level: float
@@ -129,7 +129,7 @@ class BreakAwayModel:
             risk: probability of a slip, above 0 and below 1.
 
         Raises:
-            SettingsError: a value is no finite number, F_n is negative or the risk is
+            SettingsError: a value is not a finite number, F_n is negative or the risk
                 not between 0 and 1.
         """
         check_query(F_n=F_n)
@@ -221,7 +221,7 @@ class BreakAwayModel:
         """
         kind = str(content["kind"])
         if kind not in (BREAK_AWAY, SLIDING):
-            raise ValueError(f"{kind!r} is no kind of break-away model")
+            raise ValueError(f"{kind!r} is not a kind of break-away model")
         draws = np.array(content["draws"], dtype=np.float64).reshape(-1, 4)
         if len(draws) > _MOST_DRAWS:
             raise ValueError(f"more than {_MOST_DRAWS} draws")
@@ -273,7 +273,7 @@ def _rounded(values: Sequence[float]) -> list[float]:
 def _laws(rows: Any) -> Array:  # noqa: ANN401
     laws = np.array(rows, dtype=np.float64).reshape(-1, 4)
     if not bool((np.abs(laws) <= _LARGEST_PARAMETER).all()):  # nor is NaN
-        raise ValueError("a parameter is no number that a force can have")
+        raise ValueError("a parameter is not a number that a force can have")
     if bool((laws[:, 2] < _LEAST_SPREAD).any() or (laws[:, 3] < 0.0).any()):
         raise ValueError("a spread is not positive")
     return laws

@@ -53,7 +53,7 @@ class PushTable:
     """Pushes of several trials and terrains as columns; a trial's rows are together.
 
     Attributes:
-        log_peak: logarithm of the peak [log N], shape (n,).
+        log_peak: logarithm of the peak [nat], shape (n,).
         load: log(max(F_n, 1 N) / 3.5 N), shape (n,).
         is_held: right-censored, shape (n,).
         terrain: number of the terrain, from 0, shape (n,).

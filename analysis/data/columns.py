@@ -93,7 +93,7 @@ def factor(name: str, stated: str, asked: str) -> float:
     unit = stated or asked
     if unit and unit not in UNITS[name]:
         raise SettingsError(
-            f"{name} is in {unit!r}, which is no unit of it.",
+            f"{name} is in {unit!r}, which is not a unit of it.",
             hint=f"It may be in {', '.join(UNITS[name])}.",
         )
     return UNITS[name][unit] if unit else 1.0
@@ -145,7 +145,7 @@ def load_csv(path: Path, columns: Mapping[str, str], rate: float | None) -> CsvT
             rows = (line for line in lines if line.strip())
             first = next(rows, None)
             if first is None:
-                hint = "Check that it was copied whole."
+                hint = "Check that it was copied completely."
                 raise refusal(path, "a header but no rows", hint)
             table = _numbers(path, chain([first], rows), places, delimiter)
     except UnicodeDecodeError as error:
@@ -195,7 +195,7 @@ def _places(
         if column in header or column in names:
             among = header if column in header else names
             if among.count(column) > 1:
-                raise refusal(path, f"column {column} stands there twice", _NAMED)
+                raise refusal(path, f"column {column} occurs twice", _NAMED)
             place = among.index(column)
             places.append(place)
             stated[name] = bare[place][1]

@@ -178,14 +178,14 @@ class PackagedTable:
             with os.fdopen(descriptor, "rb") as file:
                 status = os.fstat(descriptor)
                 if not stat.S_ISREG(status.st_mode):
-                    raise SettingsError(f"{self.path}: it is no regular file.")
+                    raise SettingsError(f"{self.path}: it is not a regular file.")
                 if status.st_size != self.entry.bytes:
                     raise self._changed(f"{status.st_size} bytes", self.entry.bytes)
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
         except OSError as error:
             raise SettingsError(
                 f"{self.path}: cannot be read ({error.strerror}).",
-                hint=f"{DESCRIPTOR} names it. Was the folder copied whole?",
+                hint=f"{DESCRIPTOR} names it. Was the folder copied completely?",
             ) from error
         if f"sha256:{digest}" != self.entry.hash:
             raise self._changed(f"SHA-256 {digest[:12]}...", self.entry.hash[7:19])
@@ -214,7 +214,7 @@ def packaged_tables(path: Path) -> Iterator[PackagedTable]:
         relative = PurePosixPath(entry.path)
         if relative.is_absolute() or ".." in relative.parts or "\\" in entry.path:
             raise SettingsError(
-                f"{descriptor}: {entry.path[:60]!r} leads out of the folder.",
+                f"{descriptor}: {entry.path[:60]!r} points outside the folder.",
                 hint="Nothing was read.",
             )
         file = descriptor.parent / relative
@@ -242,7 +242,8 @@ def _check_folders(top: Path, file: Path) -> None:
             return
         if folder.is_symlink():
             raise SettingsError(
-                f"{folder} is a symbolic link.", hint="A package is not read over one."
+                f"{folder} is a symbolic link.",
+                hint="A data package is not read through a link.",
             )
 
 
@@ -251,7 +252,7 @@ def _read(path: Path) -> DataPackage:
         descriptor = os.open(path, _NO_LINKS)
         with os.fdopen(descriptor, "rb") as file:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise SettingsError(f"{path}: it is no regular file.")
+                raise SettingsError(f"{path}: it is not a regular file.")
             text = file.read(_LARGEST + 1)
         if len(text) > _LARGEST:
             raise SettingsError(f"{path}: it is larger than {_LARGEST / 1e6:.0f} MB.")
@@ -265,6 +266,6 @@ def _read(path: Path) -> DataPackage:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"])
         raise SettingsError(
-            f"{path}: it is no data package of tables ({place}: {first['msg']}).",
+            f"{path}: it is not a data package of tables ({place}: {first['msg']}).",
             hint="Make it with: traction export SESSION --to DIR.",
         ) from error

@@ -56,7 +56,7 @@ def inertial_force(
         raise SettingsError(
             f"Samples every {period * 1e3:.1f} ms show no acceleration: the foot's "
             f"motion is smoothed over {window * 1e3:.0f} ms.",
-            hint="It takes the cycles of a recording, about 500 each second.",
+            hint="It needs the cycles of a recording, about 500 a second.",
         )
     even = t[0] + np.arange(count) * period  # a lost row is no jerk
     evenly = CubicSpline(t, position)(even)

@@ -215,7 +215,7 @@ def load_trial(path: Path | str) -> RecordedTrial:
     try:
         trial.series()
     except SettingsError as error:
-        raise TrialFileError(path, f"is of no use ({error.message})") from error
+        raise TrialFileError(path, f"is unusable ({error.message})") from error
     return trial
 
 
@@ -297,4 +297,4 @@ def _text(reader: TrialReader, name: str) -> str:
     try:
         return content.decode()
     except UnicodeDecodeError as error:
-        raise TrialFileError(reader.path, f"{name} is no text") from error
+        raise TrialFileError(reader.path, f"{name} is not text") from error

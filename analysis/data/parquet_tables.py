@@ -95,7 +95,7 @@ def read_parquet(path: Path, names: Sequence[str]) -> ParquetTable:
         first = str(error).splitlines()[0][:200] if str(error) else repr(error)
         raise SettingsError(
             f"{path}: not a readable Parquet table of numbers ({first}).",
-            hint="Check that it was copied whole.",
+            hint="Check that it was copied completely.",
         ) from error
     units = {name: _unit(schema.field(name).metadata) for name in wanted}
     return ParquetTable(values, units, schema.names, _origin(schema.metadata))

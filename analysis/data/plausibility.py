@@ -134,7 +134,7 @@ def _timing(trial: PreparedTrial) -> Iterator[Doubt]:
     if not trial.is_prepared and _is_swapped(trial):
         yield Doubt(
             "swapped",
-            "the foot rests with more force along the way than on it",
+            "F_t exceeds F_n while the foot rests",
             "the columns F_t and F_n are swapped",
             "--columns F_n=...,F_t=...",
         )
@@ -212,12 +212,12 @@ def _way(recorded: RecordedTrial, moving: NDArray[np.bool_]) -> Iterator[Doubt]:
         for other in (aside, above)
     )
     for name, angle, limit, what in (
-        ("heading", turned, HEADING, "the container stands askew, or its heading is"),
+        ("heading", turned, HEADING, "the container is rotated, or its heading is"),
         (
             "incline",
             tilted,
             INCLINE,
-            "the plane is inclined otherwise, or its incline is",
+            "the incline differs, or was",
         ),
     ):
         beside = float(np.ptp(ahead)) * np.tan(np.radians(abs(angle)))
@@ -254,7 +254,8 @@ def _free_moment(force: Array, moment: Array) -> Iterator[Doubt]:
             "moment",
             f"moment along the force {pitch * 1e3:.0f} mm times the force "
             f"(limit {FREE_MOMENT * 1e3:.0f})",
-            "axes of the moment are swapped, or the sensor's calibration is another's",
+            "axes of the moment are swapped, or the calibration belongs to another "
+            "sensor",
         )
 
 
@@ -273,7 +274,7 @@ def _pressure(recorded: RecordedTrial, wrench: Array) -> Iterator[Doubt]:
     if distance > FARTHEST:
         yield Doubt(
             "pressure",
-            f"the ground presses {distance * 1e3:.0f} mm beside the sole's centre "
+            f"the force acts {distance * 1e3:.0f} mm from the sole's centre "
             f"(limit {FARTHEST * 1e3:.0f})",
             "a moment of the sensor has the other sign, or another foot is mounted",
         )

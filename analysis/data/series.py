@@ -121,7 +121,7 @@ class TractionSeries:
 def _check_name(terrain: str, name: str) -> None:
     if not 0 < len(terrain) <= LONGEST_NAME or not terrain.isprintable():
         raise SettingsError(
-            f"{name}: {terrain[:LONGEST_NAME]!r} is no name for a terrain "
+            f"{name}: {terrain[:LONGEST_NAME]!r} is not a name for a terrain "
             f"(1 to {LONGEST_NAME} printable characters).",
             hint="Give a short name such as S0.",
         )

@@ -151,7 +151,7 @@ def _first_bytes(path: Path) -> bytes:
         status = path.stat()
         size = status.st_size
         if not stat.S_ISREG(status.st_mode):
-            raise refusal(path, "it is no regular file", "Give tables of trials.")
+            raise refusal(path, "it is not a regular file", "Give tables of trials.")
         with path.open("rb") as file:
             start = file.read(4)
     except OSError as error:
@@ -159,7 +159,7 @@ def _first_bytes(path: Path) -> bytes:
             f"{path}: cannot be read ({error.strerror}).", hint="Check the name."
         ) from error
     if size == 0:
-        raise refusal(path, "the file is empty", "Check that it was copied whole.")
+        raise refusal(path, "the file is empty", "Check that it was copied completely.")
     _check_size(path, size)
     return start
 

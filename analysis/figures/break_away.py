@@ -96,10 +96,10 @@ def caption_risk(results: StudyResults) -> str:
         if found.limit is not None
     ]
     return (
-        "Steps: share of pushes that slipped below a force, those that held counted "
-        "up to their peak (Kaplan and Meier); line: the model at the loads of the same "
-        "pushes. Largest difference of the probability transforms, and what chance "
-        f"exceeds in 5 %: {', '.join(parts) or 'none'}."
+        "Steps: share of pushes that slipped below a force, those that held censored "
+        "at their peak (Kaplan-Meier); line: the model at the loads of the same "
+        "pushes. Largest difference of the probability transforms, and its critical "
+        f"value at 5 %: {', '.join(parts) or 'none'}."
     )
 
 
@@ -166,7 +166,7 @@ def _legend(figure: Figure, axes: list[Axes]) -> None:
 FIGURES = (
     FigureSpec(
         "break_away",
-        "From rest: the force available over the load",
+        "From rest: available force over normal force",
         "Peaks of traction force over normal force, pushes that slipped and pushes "
         "that held, with curves of the force available at three risks, one panel per "
         "terrain.",
@@ -175,9 +175,9 @@ FIGURES = (
     ),
     FigureSpec(
         "break_away_risk",
-        "From rest: the risk of a slip over the force asked for",
-        "Probability of a slip over the traction force that is asked for, as steps of "
-        "Kaplan and Meier and as the model gives it, one panel per terrain.",
+        "From rest: slip probability over required force",
+        "Probability of a slip over the traction force that is asked for, by "
+        "Kaplan-Meier and by the model, one panel per terrain.",
         draw_risk,
         caption_risk,
     ),

@@ -130,7 +130,7 @@ def _bands_below_zero(chosen: Sequence[Panel]) -> str:
     if not parts:
         return ""
     return (
-        " A normal band is symmetric and does not know that traction is rarely "
+        " A normal band is symmetric, although traction is rarely "
         f"negative: it goes below zero (dotted line) on {', '.join(parts)}."
     )
 
@@ -148,8 +148,8 @@ def caption_new_trial(results: StudyResults) -> str:
         for low, high in [np.median(np.diff(panel.band, axis=0), axis=1)]
     ]
     return (
-        "First fold of each terrain: median and the band from 5 to 95% of a trial that "
-        f"nobody has recorded yet, at the median F_n. It reaches {'; '.join(reach)}."
+        "First fold of each terrain: median and the 5 to 95% band of "
+        f"a new trial, at the median F_n. It reaches {'; '.join(reach)}."
     )
 
 
@@ -287,7 +287,7 @@ FIGURES = (
     ),
     FigureSpec(
         "new_trial",
-        "What a new trial may show",
+        "Predictive bands of a new trial",
         "Samples of traction force over slip velocity with the median and the band "
         "that holds 90 percent of a new trial, one panel per terrain.",
         draw_new_trial,

@@ -146,8 +146,8 @@ def caption_cross(results: StudyResults) -> str:
         if study.cross(model)
     ]
     return (
-        "Whiskers are standard errors over the trials tested. Error of a foreign model "
-        f"over that of the terrain's own. {' '.join(values)}"
+        "Whiskers are standard errors over the trials tested. Error of another "
+        f"terrain's model over that of the terrain's own. {' '.join(values)}"
     )
 
 
@@ -256,7 +256,7 @@ FIGURES = (
     ),
     FigureSpec(
         "fig10_cross_bars",
-        "Fig. 10 Every model on every terrain",
+        "Fig. 10 Cross-terrain errors",
         "Grouped bars of mean absolute error: groups are the terrains tested on, bars "
         "the terrains of the models.",
         draw_cross_bars,
@@ -265,7 +265,7 @@ FIGURES = (
     ),
     FigureSpec(
         "fig10_cross_map",
-        "Fig. 10 as a map",
+        "Fig. 10 as a heat map",
         "Heat maps of mean absolute error: rows are the terrains of the models, "
         "columns the terrains tested on.",
         draw_cross_map,

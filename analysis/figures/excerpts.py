@@ -114,7 +114,7 @@ def _describe_window(window: TimeWindow) -> str:
     bounced = sum(slip.has_bounce for slip in slips)
     return (
         f"{where}: {_count(len(slips), 'slip')}, F_t falling from {peak:.1f} N before "
-        f"to {floor:.1f} N during one (medians); the foot is thrown back after "
+        f"to {floor:.1f} N during one (medians); bounce-back after "
         f"{bounced}."
     )
 

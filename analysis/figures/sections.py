@@ -7,15 +7,15 @@ class ReportSection(Enum):
     """A section of the report; the value is its heading, the order that of the page."""
 
     SUMMARY = "Summary"
-    CHANGED = "Under another choice"
+    CHANGED = "Sensitivity to analysis choices"
     PAPER = "The paper's table and figures"
     BEYOND = "Beyond the paper"
     FRICTION = "Friction of the drives"
-    LOADS = "Loads that friction leaves"
+    LOADS = "Load limits by joint friction"
     STANCES = "Stances"
     HEALTH = "Rig health"
-    REACH = "What this rig could have seen"
-    ORIGIN = "Choices and provenance"
+    REACH = "Measurement limits"
+    ORIGIN = "Analysis settings and provenance"
 
     @property
     def anchor(self) -> str:

@@ -50,8 +50,8 @@ def caption_mean(results: StudyResults) -> str:
     ]
     return (
         "First fold of each terrain, the same colours everywhere; dots are samples. "
-        "Faded: no sample within a cell of the coverage map, the process falls back to "
-        f"its mean there. {'; '.join(values)}.{_below_zero(results)}"
+        "Faded: no sample within a cell of the coverage map, the process reverts to "
+        f"its prior mean there. {'; '.join(values)}.{_below_zero(results)}"
     )
 
 
@@ -61,8 +61,8 @@ def _below_zero(results: StudyResults) -> str:
     if not lowest:
         return ""
     return (
-        f" The mean falls below zero on {', '.join(lowest)}: nothing in the process "
-        "keeps a force from being negative."
+        f" The mean falls below zero on {', '.join(lowest)}: the process does not "
+        "constrain the force to be positive."
     )
 
 

@@ -132,10 +132,10 @@ def caption_trends(results: StudyResults) -> str:
         "Mean over the kept samples of each trial, in the order of recording; dashed: "
         "least-squares line, its slope with standard error. "
         + (
-            f"More than two standard errors: {', '.join(changing)}. By chance alone, "
-            "about one terrain in thirteen shows such a slope in ten trials."
+            f"More than two standard errors: {', '.join(changing)}. With ten trials, "
+            "about one terrain in thirteen shows such a slope by chance."
             if changing
-            else "No slope exceeds two standard errors: no wear is seen."
+            else "No slope exceeds two standard errors: no wear is detected."
         )
     )
 
@@ -178,8 +178,8 @@ def caption_stick_slip(results: StudyResults) -> str:
         else:
             values.append(f"{result.terrain}: no slip")
     return (
-        "The trial with most slips of one terrain per class: force builds up over "
-        f"millimetres and breaks down in a slip (shaded). {'; '.join(values)}."
+        "The trial with most slips of one terrain per class: force rises over "
+        f"millimetres and drops in a slip (shaded). {'; '.join(values)}."
     )
 
 
@@ -229,7 +229,7 @@ def _draw_trend(ax: Axes, trend: Trend) -> None:
 FIGURES = (
     FigureSpec(
         "trials",
-        "All trials side by side",
+        "All trials",
         "Small curves of traction force over the way of each trial, one row per "
         "terrain.",
         draw_trials,
@@ -238,14 +238,14 @@ FIGURES = (
     ),
     FigureSpec(
         "trends",
-        "From the first trial to the last",
+        "Trend over trials",
         "Mean traction of every trial in order, with a straight line per terrain.",
         draw_trends,
         caption_trends,
     ),
     FigureSpec(
         "stick_slip",
-        "Sticking and slipping: force over displacement",
+        "Stick-slip: force over displacement",
         "Traction force over the displacement of the sole for one trial per class of "
         "terrain; slips are shaded.",
         draw_stick_slip,

@@ -76,8 +76,8 @@ def caption_calibration(results: StudyResults) -> str:
             f"{high[3]:.0%} ({high[1]}, {TITLES[high[2]]})"
         )
     return (
-        "Share of held-out samples inside the central band, mean over trials; dashed: "
-        "what the band promises; whiskers: standard error over trials. "
+        "Coverage: share of held-out samples inside the central band, mean over "
+        "trials; dashed: nominal coverage; whiskers: standard error over trials. "
         f"{'; '.join(parts)}."
     )
 
@@ -126,7 +126,7 @@ def caption_noise(results: StudyResults) -> str:
         "constant, log-linear in F_n and v_t, or that with heavy tails (Student's t). "
         "On the right: how many folds chose what, and NLPD before and after on trials "
         "left out; whiskers: standard error over trials. "
-        + (f"Gain: {', '.join(better)}." if better else "It brings nothing here.")
+        + (f"Gain: {', '.join(better)}." if better else "No gain in this study.")
     )
 
 
@@ -160,9 +160,9 @@ def caption_shares(results: StudyResults) -> str:
     return (
         "Probability integral transform: the share of the distribution predicted for a "
         "new trial that lies below a sample of a trial left out, in ten bins; dashed: "
-        "even, as it is where the distribution is right. High ends: bands too narrow; "
+        "uniform, as for a calibrated distribution. High ends: bands too narrow; "
         "a slope: a bias. Mean over trials, whiskers: standard error over trials. "
-        f"Farthest from even: {'; '.join(values)}."
+        f"Largest deviation from uniform: {'; '.join(values)}."
     )
 
 
@@ -222,15 +222,15 @@ def _has(model: str):  # noqa: ANN202
 FIGURES = (
     FigureSpec(
         "calibration",
-        "Calibration: do the bands hold what they promise?",
+        "Calibration: coverage of the predictive bands",
         "Share of held-out samples inside the 50, 90 and 95 percent band for every "
-        "terrain and model, with the promised share as a dashed line.",
+        "terrain and model, with the nominal coverage as a dashed line.",
         draw_calibration,
         caption_calibration,
     ),
     FigureSpec(
         "noise",
-        "Noise that depends on the inputs",
+        "Input-dependent noise",
         "Gain in log predictive density by chosen noise for every terrain with its "
         "standard error, and the number of folds per choice.",
         draw_noise,
@@ -238,7 +238,7 @@ FIGURES = (
     ),
     FigureSpec(
         "shares",
-        "Does the distribution of a new trial hold?",
+        "Calibration: probability integral transform of a new trial",
         "Histogram of the share of the predicted distribution below every held-out "
         "sample with its standard error over trials, one panel per terrain.",
         draw_shares,
@@ -246,7 +246,7 @@ FIGURES = (
     ),
     FigureSpec(
         "residuals",
-        "What the models leave unexplained",
+        "Residuals",
         "Quantiles of measured minus predicted force over slip velocity for Tustin and "
         "Gaussian process, one panel per terrain.",
         draw_residuals,

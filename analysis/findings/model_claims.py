@@ -235,7 +235,7 @@ def flat_or_rocky(evidence: PaperEvidence) -> ClaimResult | None:
         return None
     parts = [f"{share:.0%} of windows of {s:g} s" for s, share in shares.items()]
     best = max(shares.values())
-    text = f"By the smallest error, {', '.join(parts)} are taken for the right one."
+    text = f"By the smallest error, {', '.join(parts)} are classified correctly."
     numbers = {f"{seconds:g} s": share for seconds, share in shares.items()}
     return ClaimResult(text, graded(best > 0.8, is_partly=best > 0.6), numbers)
 

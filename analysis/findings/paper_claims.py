@@ -66,7 +66,7 @@ def _held(evidence: PaperEvidence, statement: _Statement) -> PaperClaim:
     place, text, needs, show = statement
     shown = show(evidence)
     if shown is None:
-        missing = f"This study cannot show it: it takes {needs}."
+        missing = f"Not testable in this study: it needs {needs}."
         return PaperClaim(place, text, missing, Agreement.OPEN, {})
     return PaperClaim(place, text, *shown)
 
@@ -178,7 +178,7 @@ _STATEMENTS: Sequence[_Statement] = (
     ),
     _Statement(
         "IV, Fig. 4",
-        "The foot is thrown back after slips (two of the three printed).",
+        "The foot bounces back after slips (two of the three printed).",
         "slips on stones",
         _bounce,
     ),
@@ -280,7 +280,7 @@ _STATEMENTS: Sequence[_Statement] = (
     ),
     _Statement(
         "IV-D",
-        "Flat and rocky can be told apart by the smallest error.",
+        "Flat and rocky ground can be distinguished by the smallest error.",
         "stones and plates",
         model_claims.flat_or_rocky,
     ),
@@ -292,7 +292,7 @@ _STATEMENTS: Sequence[_Statement] = (
     ),
     _Statement(
         "V",
-        "Noise that depends on the inputs may help on stones.",
+        "Input-dependent noise may help on stones.",
         "stones, and the model with chosen noise",
         model_claims.noise_by_input,
     ),

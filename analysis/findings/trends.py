@@ -205,7 +205,7 @@ class NoiseSummary:
     Attributes:
         terrain: its terrain.
         counts: folds that chose each noise, by its name.
-        before: NLPD with constant noise [log N], mean over trials.
+        before: NLPD with constant noise [nat], mean over trials.
         after: NLPD with the chosen noise.
         paired: the second minus the first, trial by trial.
     """

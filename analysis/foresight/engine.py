@@ -1,7 +1,7 @@
 """Foresight: one sample after the other in, a state every 10 ms out.
 
 The same object runs beside the recorder and over a record, sample by sample, so that
-the same samples give the same bits. A missing cycle lets the filters begin anew; more
+the same samples give the same bits. A missing cycle restarts the filters; more
 than 0.1 s missing, or a foot in the air for 0.2 s, the recognition of the ground too.
 """
 

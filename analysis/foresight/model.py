@@ -142,7 +142,7 @@ class ForesightModel:
             raise ValueError(f"foresight of version {content['version']!r}"[:60])
         names = (tuple(content["features"]), tuple(content["ground_features"]))
         if names != (FEATURES, GROUND_FEATURES):
-            raise ValueError("foresight was learnt from other features")
+            raise ValueError("foresight was trained on other features")
         slip = content["slip"]
         laws = tuple(_law(dict(one)) for one in content["laws"])
         if not 0 < len(laws) <= MOST_TERRAINS:
@@ -232,5 +232,5 @@ def _numbers(values: Sequence[Any], count: int) -> tuple[float, ...]:
 
 def _word(value: object) -> str:
     if not isinstance(value, str) or len(value) > _LONGEST or not value.isprintable():
-        raise ValueError("a name of foresight is no short text")
+        raise ValueError("a name of foresight is not a short text")
     return value

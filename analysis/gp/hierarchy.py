@@ -204,7 +204,7 @@ class GroundPosterior:
     def __init__(self, rows: GroundRows, unit: float = 1.0) -> None:
         if rows.y.size < 2:
             raise SettingsError(
-                "One model for all ground needs samples.", hint="Record some trials."
+                "A model of all terrains needs samples.", hint="Record some trials."
             )
         self.rows, self.centre = rows, rows.inputs.mean(axis=0)
         scale = rows.inputs.std(axis=0)

@@ -1,7 +1,7 @@
 """Pushes that a person can aim at, and what becomes of them.
 
-Nine aims, three loads by three velocities. Nobody meets an aim: by how much this
-operator misses is learnt from the earlier trials that had one. The rows of a push are
+Nine aims, three loads by three velocities. No operator meets an aim exactly: the error
+is estimated from the operator's earlier trials that had one. The rows of a push are
 those of the two trials nearest to it, moved to where it would come out.
 """
 

@@ -146,11 +146,11 @@ def friction_tables(page: FrictionPage) -> list[ReportTable]:
 
 
 _LOAD_SENTENCES = (
-    "F_t and F_n are measured at the wrist, below every drive, and v_t at the joints: "
-    "models of the ground do not suffer from friction. What suffers is which loads and "
-    "speeds a trial reaches.",
-    "F_n at rest lies anywhere within the interval, by the way in which the foot was "
-    "put down; a hand that puts it down from above leaves it at the low end.",
+    "F_t and F_n are measured at the wrist, below every drive, and v_t at the "
+    "joints: models of the ground are not biased by joint friction. It limits the "
+    "loads and speeds that a trial reaches.",
+    "F_n at rest lies anywhere within the interval, depending on how the foot was put "
+    "down; a hand that puts it down from above leaves it at the lower bound.",
 )
 
 
@@ -161,8 +161,9 @@ def change_sentences(page: FrictionPage) -> list[str]:
     last = page.earlier[-1]
     changes = friction_changes(page.model.constants, last.fit, page.calibration.fit)
     return [
-        f"Joint {joint} rubs {abs(share):.0%} {'more' if share > 0.0 else 'less'} than "
-        f"on {last.measured_utc}, beyond both intervals: look at its cables."
+        f"Friction of joint {joint} is {abs(share):.0%} "
+        f"{'higher' if share > 0.0 else 'lower'} than on {last.measured_utc}, beyond "
+        "both intervals: check its cables."
         for joint, share in changes.items()
     ]
 
@@ -172,7 +173,7 @@ def _values(page: FrictionPage) -> ReportTable:
     note = (
         "Coulomb: sliding friction at the torque that the joint bore in the "
         "calibration. Asymmetry: half of forwards less backwards. Break-away: of a "
-        "joint at rest; joint 7 turns at 0.5 rad/s whatever the way, so its "
+        "joint at rest; joint 7 turns at 0.5 rad/s on every sweep, so its "
         "break-away and its slow friction are extrapolated."
     )
     return ReportTable(
@@ -193,10 +194,10 @@ def _comparison(page: FrictionPage) -> list[ReportTable]:
         pairs = zip(coulomb, doubt, strict=True)
         cells = [f"{value:.3f} ± {spread:.3f}" for value, spread in pairs]
         rows.append([calibration.measured_utc, *cells])
-    note = "With 95 % intervals. A joint that rubs more from one to the next wears."
+    note = "With 95 % intervals. Growing friction indicates wear."
     header = ("Coulomb [N m]", *FRICTION_HEADER[1:])
     return [
-        ReportTable("Against earlier ones", header, rows, note, ReportSection.FRICTION)
+        ReportTable("Earlier calibrations", header, rows, note, ReportSection.FRICTION)
     ]
 
 
@@ -204,12 +205,12 @@ def _quality(page: FrictionPage) -> ReportTable:
     fit = page.calibration.fit
     share = fit.lower_bound / fit.friction.coulomb
     rows = [
-        _row("unexplained, of Coulomb", fit.residual),
-        _row("lower end, of Coulomb", share),
+        _row("residual, of Coulomb", fit.residual),
+        _row("lower bound, of Coulomb", share),
         ["rows", *(str(count) for count in fit.rows)],
     ]
     header = ("", *(f"motor {motor}" for motor in range(1, 8)))
-    note = "Unexplained: rms on the way that was kept back from the fit."
+    note = "Residual: rms on the sweep held out from the fit."
     return ReportTable("Quality", header, rows, note, ReportSection.FRICTION)
 
 
@@ -234,7 +235,7 @@ def _loads(page: FrictionPage) -> ReportTable:
             "F_n at rest ± [N]",
             "F_n sliding, shifted by [N]",
             "hand's push beyond F_t [N]",
-            "surely down from [kg]",
+            "reliable contact from [kg]",
             "F_n within 50 % from [kg]",
             "within 10 % from [kg]",
         ),
@@ -251,12 +252,12 @@ def _figure(page: FrictionPage) -> ReportFigure:
     picture = render("friction", drawn, page.calibration.is_simulated)
     return ReportFigure(
         ReportSection.FRICTION,
-        "Torque against the speed of each joint",
+        "Friction torque over joint speed",
         "Torque that resists a joint over its speed, a panel for each of the seven "
         "joints, with a 95 % band and the torque of break-away.",
         "Line: identified, mean of both ways, with its 95 % band. Triangle: "
         "break-away. Grey: earlier calibrations."
-        + (" Black: what the simulated arm really has." if page.truth else ""),
+        + (" Black: true friction of the simulated arm." if page.truth else ""),
         picture,
         is_filed=False,
     )

@@ -63,7 +63,7 @@ def lag_table(study: Study) -> ReportTable:
         ends = f"{min(lags):.1f} to {max(lags):.1f}"
         rows.append([name, shown, f"{median(lags):.1f}", ends, f"{stamps:.1f}"])
     return ReportTable(
-        name="Force against motion",
+        name="Delay of force relative to motion",
         header=(
             "terrain",
             "trials that show it",
@@ -94,11 +94,11 @@ def uncertainty(study: Study) -> ReportTable:
         name="Predicted uncertainty",
         header=("terrain", "model", *_HEADS),
         rows=rows,
-        note="Means over the trials left out ± their standard error: a share is no "
-        "surer than that, however many samples it counts. NLPD: negative log density; "
-        "CRPS: continuous ranked probability score; both reward an honest spread, less "
-        "is better. A band that holds much less than it promises is too narrow. The "
-        "variance is that of a measurement, noise included.",
+        note="Means over the held-out trials ± standard error over trials, not over "
+        "samples. NLPD: negative log density; CRPS: continuous ranked probability "
+        "score; both reward a calibrated spread, less is better. A band whose "
+        "coverage is far below its nominal share is too narrow. The variance is that "
+        "of a measurement, noise included.",
         section=ReportSection.BEYOND,
     )
 
@@ -123,15 +123,15 @@ def independent_samples(results: StudyResults) -> ReportTable:
             "terrain",
             "model",
             "kept samples",
-            "correlation of neighbours",
+            "lag-1 autocorrelation",
             "autocorrelation time [samples]",
             "independent samples",
         ),
         rows=rows,
-        note="Of measured minus predicted force on trials left out. Independent: kept "
-        "samples over the integrated autocorrelation time, summed until the "
-        "correlation falls below 0.05. Standard errors in this report therefore count "
-        "trials, never samples.",
+        note="Residuals, measured minus predicted force, of held-out trials. "
+        "Independent: kept samples over the integrated autocorrelation time, summed "
+        "until the correlation falls below 0.05. Standard errors in this report "
+        "therefore count trials, never samples.",
         section=ReportSection.BEYOND,
     )
 
@@ -148,12 +148,12 @@ def paired_table(study: Study, key: str, unit: str) -> ReportTable:
     cells, width = paired_cells(pairs), len(others)
     rows = [[n, *cells[k * width : (k + 1) * width]] for k, n in enumerate(names)]
     return ReportTable(
-        name=f"{key.upper()} against {TITLES[first]}, trial by trial",
+        name=f"{key.upper()} difference to {TITLES[first]}, paired by trial",
         header=("terrain", *(f"{TITLES[model]} [{unit}]" for model in others)),
         rows=rows,
         note=f"Difference to {TITLES[first]} ± its standard error over the trials; "
-        "below zero is better. p: how often chance alone makes a difference as large, "
-        f"by all patterns of signs. {_holm_note(pairs)}",
+        "below zero is better. p: exact permutation test over the signs "
+        f"of the differences. {_holm_note(pairs)}",
         section=ReportSection.BEYOND,
     )
 
@@ -229,7 +229,7 @@ def trend_table(results: StudyResults) -> ReportTable:
             ]
         )
     return ReportTable(
-        name="Repeatability, and change from first to last trial",
+        name="Repeatability and trend over trials",
         header=(
             "terrain",
             "trials",

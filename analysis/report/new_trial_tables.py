@@ -23,7 +23,9 @@ from analysis.study import (
 )
 
 _ENOUGH = 10  # trials that the level is stated for
-_LEAST = 0.01  # of the residual within a trial: smaller noise is not told apart from 0
+_LEAST = (
+    0.01  # of the residual within a trial: smaller noise is not distinguishable from 0
+)
 
 
 def new_trial_tables(results: StudyResults) -> list[ReportTable]:
@@ -59,11 +61,11 @@ def family_table(study: Study) -> ReportTable:
             ]
         )
     return ReportTable(
-        name="Distribution of a new trial",
+        name="Predictive distribution of a new trial",
         header=(
             "terrain",
             "family by folds",
-            "with a shape on top",
+            "with shape by folds",
             "rows clipped",
             "NLPD [nat]",
             "gain over chosen noise [nat]",
@@ -94,24 +96,23 @@ def worth_table(study: Study) -> ReportTable:
         if (of := result.components) is not None
     ]
     return ReportTable(
-        name="What another trial is worth",
+        name="Variance components",
         header=(
             "terrain",
             "between trials",
             "within a trial",
-            "its time",
+            "correlation time",
             "measurement",
-            "independent values a trial",
+            "independent values per trial",
             "level after one trial [N]",
             f"after {_ENOUGH} [N]",
         ),
         rows=rows,
-        note="Standard deviations with 95% intervals from trials drawn again. Between: "
-        "a level of its own in every trial. Within: a residual that lasts for its "
-        "time and averages out along a trial. Measurement: what the next row does not "
-        "share. The last columns are how well the terrain's level is known. A spread "
-        "between trials that gains less than 1.4 in log likelihood is not told apart "
-        "from 0.",
+        note="Standard deviations with 95% bootstrap intervals over trials. Between: "
+        "level of each trial. Within: correlated residual along a trial, with its "
+        "correlation time. Measurement: uncorrelated between rows. Last columns: "
+        "standard error of the terrain's level. A spread between trials that gains "
+        "less than 1.4 in log likelihood is not distinguishable from 0.",
         section=ReportSection.BEYOND,
     )
 
@@ -133,7 +134,7 @@ def relatives_table(study: Study) -> ReportTable:
         for name, of in study.relatives.items()
     ]
     return ReportTable(
-        name="What other terrains tell",
+        name="Transfer from other terrains",
         header=(
             "terrain",
             "relatives",
@@ -142,7 +143,7 @@ def relatives_table(study: Study) -> ReportTable:
             "of all its other trials",
             "used",
             "never recorded: NLPD",
-            "its 90% band holds",
+            "coverage of its 90% band",
             "below 0 N: force, measured force, samples",
         ),
         rows=rows,
@@ -168,9 +169,9 @@ def few_relatives(outcomes: Sequence[RelativesOutcome]) -> str:
         for of in few
     )
     return (
-        f"Too few relatives to know how far they differ: {listed}. There the three "
-        "trials, each left out in turn, decide whether relatives are used, and a band "
-        "of a terrain never recorded rests on the prior."
+        f"Too few related terrains to estimate how far they differ: {listed}. There "
+        "the three trials, each left out in turn, decide whether relatives are used, "
+        "and a band of a terrain never recorded rests on the prior."
     )
 
 
@@ -187,13 +188,13 @@ def oracle_table(results: StudyResults) -> ReportTable:
         for band in of.oracle
     ]
     return ReportTable(
-        name="Bands that assume no distribution",
-        header=("terrain", "band", "holds", "width over the model's"),
+        name="Distribution-free bands (conformal)",
+        header=("terrain", "band", "coverage", "width over the model's"),
         rows=rows,
-        note="A band around the median as wide as the other trials left out need it, "
-        "each trial counting as one (conformal over trials). It has to hold its share "
-        "at least; a width near 1 says that the model's own band is honest. Ten trials "
-        "cannot show a band of 95%: that needs nineteen.",
+        note="A band around the median, its width calibrated on the other held-out "
+        "trials, one score per trial (conformal over trials). Its coverage has to "
+        "reach the nominal share; a width near 1 means that the model's own band is "
+        "calibrated. A 95% band needs at least nineteen trials.",
         section=ReportSection.BEYOND,
     )
 
@@ -215,13 +216,13 @@ def _below_zero(of: Dissipation) -> str:
 
 def _between(of: TrialComponents) -> str:
     if not of.is_told_apart:
-        return f"not told apart from 0 (gain {of.gain:.1f})"
+        return f"not distinguishable from 0 (gain {of.gain:.1f})"
     return f"{_with_interval(of, 'between', 'N')} (gain {of.gain:.1f})"
 
 
 def _measurement(of: TrialComponents) -> str:
     if of.measurement < _LEAST * of.within:  # the search ends there
-        return "not told apart from 0"
+        return "not distinguishable from 0"
     return _with_interval(of, "measurement", "N")
 
 

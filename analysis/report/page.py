@@ -157,9 +157,7 @@ __all__ = ["ReportContext", "ReportTable", "write_report"]
 
 _MOST_DRAWING = 4  # processes
 _MANY_TERRAINS = 4  # from which on they pay
-_NO_RIG = (
-    "The tables do not tell how the rig behaved: its health and its limits are unknown."
-)
+_NO_RIG = "External data have no record of the rig: health and limits are unknown."
 
 
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:

@@ -82,11 +82,11 @@ def parameters(study: Study) -> ReportTable:
         name="Tustin parameters of all trials, with 95% intervals",
         header=("terrain", *units, "flags"),
         rows=rows,
-        note="Intervals from whole trials drawn with replacement: samples of one trial "
-        "repeat each other. A wide interval means that the curve is known, not the "
-        "parameter. ≤ and ≥: the search ended at the edge of its range, so the value "
-        "may lie beyond. Open: the profile of the squared error (95%, counting "
-        "independent samples) reaches an edge or spans more than a factor of ten.",
+        note="Bootstrap intervals over whole trials, because samples of one trial "
+        "are correlated. Wide intervals: the curve is identified, the parameter "
+        "is not. ≤ and ≥: the fit ended at a bound, the value may "
+        "lie beyond. Open: the profile of the squared error (95%, counting "
+        "independent samples) reaches a bound or spans more than a factor of ten.",
         section=ReportSection.SUMMARY,
     )
 
@@ -137,8 +137,8 @@ def table_one(study: Study) -> ReportTable:
 def statements(results: StudyResults) -> ReportTable:
     """Return the paper's statements beside what the study shows."""
     return ReportTable(
-        name="What the paper says",
-        header=("in", "the paper says", "this study shows", "agrees?"),
+        name="Findings of the paper",
+        header=("in", "paper", "this study", "agrees?"),
         rows=[_statement_row(claim) for claim in results.claims],
         note="Errors: mean absolute errors on trials left out. Beyond chance: paired "
         "over the trials, p below 0.05 for all comparisons of the row together (Holm).",
@@ -158,7 +158,7 @@ def velocity_shares(study: Study) -> ReportTable:
         moving = means[0] / (1.0 - means[1]) if means[1] < 1.0 else None
         rows.append([name, *(f"{mean:.1%}" for mean in means), _percent(moving)])
     return ReportTable(
-        name="Where the samples lie",
+        name="Distribution of the samples",
         header=("terrain", "window", "sticking", "backward", "too fast", "of moving"),
         rows=rows,
         note="Means over trials. Only the window is fitted and tested; the last column "
@@ -234,11 +234,11 @@ def _verdict(result: TerrainResult) -> Iterator[tuple[str, str]]:
 
 def _flag_legend() -> str:
     return (
-        "Flags: “at lower/upper bound” - the search ended at the edge of its range, so "
-        f"the value is that edge; “{NEGATIVE_B}” - force falls with speed, which is no "
-        "viscosity; "
+        "Flags: “at lower/upper bound” - the fit ended at a bound, so the "
+        f"value is that bound; “{NEGATIVE_B}” - force falls with speed, which is not "
+        "a viscosity; "
         f"“{NO_STRIBECK}” - a straight line in F_n and v_t does as well; "
-        f"“{NOT_IDENTIFIABLE}” - the parameters can be exchanged for each other. When "
+        f"“{NOT_IDENTIFIABLE}” - the parameters are not identifiable separately. When "
         "flagged, compare curves, not parameters. v_s is given as its absolute value. "
         f"A fit needs {MINIMUM_ROWS} samples."
     )

@@ -14,20 +14,20 @@ from analysis.tustin import SYMBOLS
 _SATURATED = 1e-9  # share of cycles
 
 _REACH_NOTE = (
-    "Measurable: by the sensor's ranges and the lever of the foot; – where it "
-    "did not say them: without a sample out of range it is at least what was seen. "
+    "Measurable: by the sensor's ranges and the lever of the foot; – where "
+    "unknown: without a sample out of range it is at least the largest observed. "
     "Uncertainty: standard uncertainty of a trial's mean F_t and F_n, "
     "from the changes between the tares of its session; "
     "with the zero between two tares (drift=interpolated) "
     "it is four fifths of that. Floor: mean |error| of smoothed "
     "F_t by these changes and by the noise at rest, which no model can be better than; "
     "by the noise alone where a session has one tare only. "
-    "Drag: what the joints' Coulomb friction takes from the hand's push, by the "
-    "calibration of friction that was recorded, less what was compensated; without "
-    "one, if they rub as the arm model says. At rest F_n lies within ± of the set "
+    "Drag: Coulomb friction of the joints as seen by the hand's push, "
+    "from the recorded friction calibration, less the compensation; "
+    "without a calibration, from the arm model. At rest F_n lies within ± of the set "
     "load by friction, anywhere; – without a calibration. F_t and F_n are measured at "
-    "the wrist, below the joints, and v_t at the joints: friction falsifies no model, "
-    "but it takes loads and speeds out of reach. Medians over trials."
+    "the wrist, below the joints, and v_t at the joints: friction biases no model, but "
+    "limits the loads and speeds that are reached. Medians over trials."
 )
 
 
@@ -106,10 +106,10 @@ def reach(results: StudyResults) -> ReportTable:
             )
         )
     return ReportTable(
-        "Limits of the rig beside its results",
+        "Limits of the rig and results",
         (
             "terrain",
-            "largest |F_t| seen [N]",
+            "largest |F_t| observed [N]",
             "measurable [N]",
             "sensor floor [N]",
             "drift of the tare [N]",
@@ -118,7 +118,7 @@ def reach(results: StudyResults) -> ReportTable:
             "error over floor",
             "F_n above set load [N]",
             "drag of the joints [N]",
-            "F_n at rest open ± [N]",
+            "F_n at rest uncertain ± [N]",
         ),
         rows,
         note=_REACH_NOTE,

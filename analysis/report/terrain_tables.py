@@ -36,7 +36,7 @@ def break_away_table(results: StudyResults) -> ReportTable:
         '"sliding": too few pushes slipped, the force is that of slow motion. In '
         "motion: the force at the slowest velocity of the window is below it with that "
         "probability, by GP-SE. F_n: median of the pushes. Distance: of the model from "
-        "Kaplan and Meier's curve, and what chance exceeds in 5 %. The effect of the "
+        "the Kaplan-Meier curve, and its critical value at 5 %. The effect of the "
         "trial is the standard deviation of log force between trials, of force where "
         "sliding.",
         section=ReportSection.BEYOND,
@@ -60,7 +60,7 @@ def _break_away_row(found: TerrainBreakAway) -> list[str]:
         *(f"{a.force:.1f} ({a.low:.1f} to {a.high:.1f})" for a in answers),
         *("–" if force is None else f"{force:.1f}" for force in motion),
         distance,
-        trial_sd if model.is_trial_seen else "not told apart from 0",
+        trial_sd if model.is_trial_seen else "not distinguishable from 0",
     ]
 
 
@@ -111,13 +111,13 @@ def surface_table(identification: Identification) -> ReportTable:
         for size in identification.sizes
     ]
     return ReportTable(
-        name="Flat, rocky or none of the known",
+        name="Flat, rocky or unknown ground",
         header=(
             "window",
-            "flat or rocky, right",
+            "flat or rocky, accuracy",
             "calibration error",
-            "sure (98 %)",
-            "sure and wrong",
+            "98 % confident",
+            "confident and wrong",
             "known, called none",
             "flat, only rocky known: none",
             "rocky, only flat known: none",
@@ -164,8 +164,8 @@ def _stones_note(identification: Identification) -> str:
         return ""
     size = max(shares)
     return (
-        "Terrains of stones are a family: which one it is comes out right in "
+        "Terrains of stones are a family: the single terrain is correct in "
         f"{shares[size]:.2f} of their windows of {size / KEPT_PER_SECOND:g} s "
-        f"({1.0 / identification.stones:.2f} by chance), so the name of a single one "
-        "is no answer; flat or rocky is."
+        f"({1.0 / identification.stones:.2f} by chance), so only the class flat or "
+        "rocky is identifiable, not the single terrain."
     )

@@ -119,7 +119,7 @@ def parse_choice(text: str) -> StudyVariant:
         return _PARSERS[key](value)
     except (ValueError, SettingsError) as error:
         raise SettingsError(
-            f"--what-if {text[:60]!r}: {value[:30]!r} is no value of {key}.",
+            f"--what-if {text[:60]!r}: {value[:30]!r} is not a value of {key}.",
             hint=f"Give {VALUES[key]}.",
         ) from error
 

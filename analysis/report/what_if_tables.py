@@ -36,12 +36,13 @@ def side_by_side(choice: StudyVariant, before: Study, after: Study) -> ReportTab
         name=f"What if {choice.text}?",
         header=("terrain", "model", *heads),
         rows=rows,
-        note="The study as it is, then repeated under the choice, with the same points "
-        "and the same trials left out. Means over trials; difference ± its standard "
-        "error over the trials that both have, below zero is better under the choice; "
-        "p by all patterns of signs. Smoothing and window change what models are "
-        "fitted to; they are tested on the samples of the study as it is. Frame, lag, "
-        "drift and inertia change the data themselves, and with them what is "
+        note="The study as it is, then repeated under the choice, with the same "
+        "points and the same trials left out. Means over trials; difference ± its "
+        "standard error over the trials that both have, below zero is better under "
+        "the choice; p by the exact permutation test over signs. Smoothing and "
+        "window change what models are fitted to; they are tested on the samples of "
+        "the study as it is. Frame, lag, drift and inertia change the data "
+        "themselves, and with them what is "
         "tested." + choice.remark,
         section=ReportSection.CHANGED,
     )

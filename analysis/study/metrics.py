@@ -190,7 +190,7 @@ def clearly_best(nlpd: Array, least: float = 0.0) -> int:
     """Return which column of NLPD, (trials, k), is least, or 0 where that is not clear.
 
     Another than the first must be better by one standard error over the trials, and by
-    `least` [log N].
+    `least` [nat].
     """
     gain = nlpd[:, :1] - nlpd
     error = gain.std(axis=0, ddof=1) / np.sqrt(len(gain)) if len(gain) > 1 else 0.0

@@ -5,7 +5,7 @@ that changes with the inputs, and normal noise around a warped force z = c log(y
 The choice is made among the training trials only, by the log density (of y) of each of
 them left out in turn: the hyperparameters stay, its rows are taken out and the rest is
 factorised again. Another family than the normal one must be better by one standard
-error over the trials and by 0.05 log N. So must a `ShapeMap` on top of the chosen one
+error over the trials and by 0.05 nat. So must a `ShapeMap` on top of the chosen one
 be, by one standard error; every trial is scored by the shape of the others.
 """
 
@@ -44,7 +44,7 @@ FAMILIES = (NORMAL, LOGLINEAR, WARPED)
 LEVEL, RATIO, BOTH = "constant", "proportional", "both"
 EFFECTS = (LEVEL, RATIO, BOTH)
 
-LEAST_GAIN = 0.05  # log N; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
+LEAST_GAIN = 0.05  # nat; stones gain 0.06 to 0.28 by the warp, plates up to 0.04
 _BENDS = (1.0, 3.0, 9.0)  # N, c of the warp
 _THIN = 5  # of the rows of a trial left out every fifth is scored
 
@@ -55,7 +55,7 @@ class FamilyChoice(NamedTuple):
     Attributes:
         chosen: its name.
         nlpd: mean negative log density of training trials left out, by family.
-        shape_gain: by how much a shape on top raised it [log N].
+        shape_gain: by how much a shape on top raised it [nat].
         clipped: chosen rows below -0.95 c, where the warp has an end.
     """
 

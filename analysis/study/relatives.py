@@ -1,4 +1,4 @@
-"""What other terrains tell about one, measured on its own trials.
+"""Transfer from other terrains about one, measured on its own trials.
 
 With three of its trials known, and with none, its other trials are predicted by the
 model of all ground and held against a model of these three alone. A terrain with one
@@ -40,7 +40,7 @@ from analysis.study.new_trial import NewTrialModel, fit_new_trial
 
 KNOWN = 3  # trials of a terrain that are known
 FEW = 2  # relatives below which the spread between them is the prior's
-_OWN_GAIN = 0.05  # log N, inner, from which on the own trials are used alone
+_OWN_GAIN = 0.05  # nat, inner, from which on the own trials are used alone
 _CLEAR_OWN_GAIN = 0.25  # the same where there are enough relatives
 _INNER = 150  # rows of a terrain when own trials are left out in turn
 _THIN = 5  # of the rows that are predicted every fifth

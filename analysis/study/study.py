@@ -233,7 +233,7 @@ def _contradictions(trials: Mapping[str, Sequence[TractionSeries]]) -> list[str]
     }
     return [
         f"{terrain}: its trials state different stones ({', '.join(sizes)}). It "
-        "counts as a kind of its own."
+        "is treated as a class of its own."
         for terrain, sizes in stated.items()
         if len(sizes) > 1
     ]
@@ -265,7 +265,7 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
         warnings.append(
             f"{result.terrain}: too short to count - under {MINIMUM_KEPT} kept samples"
             f"{', or the container not crossed' if has_container else ''} - in "
-            f"{len(short)} of {len(result.trials)} trials, analysed all the same "
+            f"{len(short)} of {len(result.trials)} trials, analysed nevertheless "
             f"(trial {', '.join(map(str, short))})."
         )
     dropped = sum(trial.dropped_rows for trial in result.trials)
@@ -273,12 +273,12 @@ def _warnings(result: TerrainResult, has_container: bool) -> list[str]:
         warnings.append(f"{result.terrain}: {dropped} rows were not finite; dropped.")
     repeated = sum(trial.repeated_rows for trial in result.trials)
     if repeated:
-        warnings.append(f"{result.terrain}: {repeated} rows were there twice; dropped.")
+        warnings.append(f"{result.terrain}: {repeated} duplicate rows were dropped.")
     constant = [name for name in ("F_n", "v_t") if _is_constant(result.trials, name)]
     if constant:
         warnings.append(
-            f"{result.terrain}: {' and '.join(constant)} never varies, so no model "
-            "can tell what it does."
+            f"{result.terrain}: {' and '.join(constant)} never varies, so its effect "
+            "is not identifiable."
         )
     return warnings
 

@@ -1,4 +1,4 @@
-"""What another trial is worth: how trials of a terrain differ, and how rows repeat.
+"""Variance components: how trials of a terrain differ, and how rows repeat.
 
 A Gaussian process with three components besides its function is fitted to rows of all
 trials: a level of every trial (between), an Ornstein-Uhlenbeck residual along it

@@ -53,7 +53,7 @@ def load(path: Path | str) -> TerrainDatabase:
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
-            raise ValueError("it is no regular file")
+            raise ValueError("it is not a regular file")
         if status.st_size > _LARGEST:
             raise ValueError(f"it is larger than {_LARGEST / 1e6:.0f} MB")
         return _database(json.loads(path.read_bytes()))
@@ -65,7 +65,7 @@ def load(path: Path | str) -> TerrainDatabase:
     except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as error:
         what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise SettingsError(
-            f"{path} is no terrain database: {what}.",
+            f"{path} is not a terrain database: {what}.",
             hint="Make it with: traction export --terrain-db FILE.",
         ) from error
 

@@ -116,7 +116,7 @@ class KnownTerrain:
         velocity outside the table is marked by `is_extrapolated` of the answer.
 
         Raises:
-            SettingsError: a value is no finite number.
+            SettingsError: a value is not a finite number.
         """
         _check_finite(required=required, F_n=F_n, v_t=v_t)
         table = self._table("")
@@ -138,11 +138,11 @@ def _check_finite(**values: float) -> None:
     """Refuse a value that no table can be asked for.
 
     Raises:
-        SettingsError: one is no finite number.
+        SettingsError: one is not a finite number.
     """
     for name, value in values.items():
         if not math.isfinite(value):
-            raise SettingsError(f"{name} = {value} is no finite number.")
+            raise SettingsError(f"{name} = {value} is not a finite number.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,7 @@ def roughness_in(parts: Parts) -> dict[int, float]:
     """Return the least roughness by window [kept samples], empty where not known."""
     limits = {int(k): float(v) for k, v in dict(parts.get(ROUGHNESS_PART, {})).items()}
     if not all(math.isfinite(limit) for limit in limits.values()):
-        raise ValueError("a roughness is no finite number")
+        raise ValueError("a roughness is not a finite number")
     return limits
 
 

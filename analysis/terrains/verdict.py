@@ -67,7 +67,7 @@ class WindowLimits:
     """What hardly any of a terrain's own windows of one size goes beyond.
 
     Attributes:
-        roughness: smallest log sd of F_t about a line in F_n [log N].
+        roughness: smallest log sd of F_t about a line in F_n [nat].
         strain: largest mean squared error over the predicted variance.
     """
 

@@ -140,7 +140,7 @@ class FrictionGuide:
         self._console.table(list(FRICTION_HEADER), rows)
         shares = ", ".join(f"{share:.2f}" for share in fit.residual)
         self._console.say(
-            f"unexplained on the way that was kept back, of Coulomb friction: {shares} "
+            f"residual on the held-out sweep, share of Coulomb friction: {shares} "
             "(motors 1 to 7)"
         )
 

@@ -124,8 +124,8 @@ class GravityGuide:
             )
         ]
         self._console.say(
-            f"errors of the zero by the torques [degrees]: {', '.join(joints)}; those "
-            "of joints 1, 6 and 7 do not show"
+            f"zero errors estimated from torques [degrees]: {', '.join(joints)}; "
+            "joints 1, 6 and 7 are not observable"
         )
 
     def _say_residuals(self, fit: MomentFit, measured: list[MeasuredMoments]) -> None:

@@ -25,8 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "what",
         choices=tuple(_WORK),
-        help="what the arm weighs; what resists its motors; how the sensor is mounted "
-        "and what its foot weighs; another foot; where a container stands",
+        help="gravity of the arm; friction of its drives; mounting and "
+        "foot of the sensor; another foot; frame of a container",
     )
     parser.add_argument(
         "--terrain",
@@ -39,19 +39,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_simulated_arm(parser)
     parser.add_argument(
-        "--operator-script", metavar="auto", help="who answers, only with --fake"
+        "--operator-script", metavar="auto", help="simulated operator, only with --fake"
     )
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="where it is written (beside rig.toml)"
+        "--to",
+        type=Path,
+        metavar="FILE",
+        help="file that is written (beside rig.toml)",
     )
     parser.add_argument(
-        "--poses", type=int, default=12, metavar="N", help="how many poses (12)"
+        "--poses", type=int, default=12, metavar="N", help="number of poses (12)"
     )
     parser.add_argument(
         "--pose-file",
         type=Path,
         metavar="FILE",
-        help="poses of your own instead of chosen ones (TOML)",
+        help="TOML file with the poses to use",
     )
     parser.add_argument(
         "--force", action="store_true", help="accept a fit that is refused as bad"
@@ -71,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     settings = load_settings(args.config)
     row = settings.row(args.terrain or settings.matrix.terrains[0].name)
     settings, row = _without_old(args.what, settings, row)
-    out = args.out or _place(args.what, settings, row, is_fake=args.fake)
+    out = args.to or _place(args.what, settings, row, is_fake=args.fake)
     for path in _written(args, out):
         _check_out(path)
     args.chosen = _chosen_poses(args, settings, row)
@@ -110,7 +113,7 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
     from wam.model import friction_of
 
     rig, console = console_loop.rig, console_loop.console
-    console.say(f"To and fro around {CENTRES} poses, each motor slowly and fast.")
+    console.say(f"Back and forth about {CENTRES} poses, each motor slow and fast.")
     guide = FrictionGuide(console_loop)
     result = guide.run(is_forced=args.force)
     write_new_text(out, friction_to_toml(result, rig.model.constants))
@@ -121,11 +124,11 @@ def _friction(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) ->
         load_at = result.fit.friction.load_at
         text = truth_to_toml(true, load_at, rig.model.constants)
         write_new_text(_truth_path(out), text)
-        where = f"What the simulated arm really has: {_truth_path(out)}."
+        where = f"True friction of the simulated arm: {_truth_path(out)}."
         console.say(where)
     page = guide.page(result, out, true)
     write_new_text(_page_path(out), console_loop.run_aside(lambda: friction_html(page)))
-    console.say(f"Its page: {_page_path(out)}.")
+    console.say(f"Report: {_page_path(out)}.")
 
 
 def _page_path(out: Path) -> Path:
@@ -266,10 +269,10 @@ def _check_out(out: Path) -> None:
     if out.exists():
         raise SettingsError(
             f"{out} exists and is never overwritten.",
-            hint="Move it away or choose another name with --out. Nothing was started.",
+            hint="Move it away or choose another name with --to. Nothing was started.",
         )
     if not out.parent.is_dir():
         raise SettingsError(
             f"There is no folder {out.parent} for the calibration.",
-            hint="Make it, or choose another name with --out. Nothing was started.",
+            hint="Make it, or choose another name with --to. Nothing was started.",
         )

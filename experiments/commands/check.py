@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--loop-test",
         type=number_within(0.1, 3600, "seconds, e.g. 5"),
         metavar="SECONDS",
-        help="how long the loop is measured (test_time of rig.toml)",
+        help="duration of the loop test (test_time of rig.toml)",
     )
     parser.add_argument(
         "--bus",
@@ -102,7 +102,7 @@ def _check(args: argparse.Namespace, settings: Settings, console: Console) -> No
     console.say("traction check        " + ("SIMULATED" if fake else "LIVE RIG"))
     with logging_bus(rig, args.can_log, console):
         run_preflight(rig, Path(args.data), console, args.loop_test)
-    console.say("Fit to run. No torque was sent.")
+    console.say("The rig is ready. No torque was sent.")
 
 
 def _as_json(args: argparse.Namespace, settings: Settings) -> int:
@@ -151,7 +151,7 @@ def _listen(
 
     if is_fake:
         raise SettingsError(
-            "A simulated bus is inside its own process: nobody can listen.",
+            "A simulated bus is inside its own process and cannot be listened to.",
             hint="Serve one with traction fake --can traction-fake:PATH and name it in "
             "[can] of rig.toml.",
         )
@@ -183,7 +183,7 @@ def _say_traffic(
     from wam.bus import describe_id
 
     if not counts:
-        console.check(GOOD, "traffic", "silent, as an arm is that nobody asks")
+        console.check(GOOD, "traffic", "silent, as an arm is while no host polls it")
         return
     rate = sum(counts.values()) / seconds
     console.check(GOOD, "traffic", f"{rate:.1f} frames/s, about {load:.0%} of the bus")

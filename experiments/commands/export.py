@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=("csv", "parquet"),
         default="csv",
-        help="of the tables (csv); parquet needs the extra traction[parquet]",
+        help="format of the tables (csv); parquet needs the extra traction[parquet]",
     )
     parser.add_argument(
         "--terrain-db", type=Path, metavar="FILE", help="the terrain database, JSON"
@@ -94,9 +94,11 @@ def _add_publish_arguments(parser: argparse.ArgumentParser) -> None:
         help='"Family, Given" or "Family, Given <ORCID>"; can be repeated',
     )
     parser.add_argument(
-        "--licence", choices=_LICENCES, required=True, help="of the data"
+        "--licence", choices=_LICENCES, required=True, help="licence of the data"
     )
-    parser.add_argument("--title", default="", metavar="TEXT", help="of the study")
+    parser.add_argument(
+        "--title", default="", metavar="TEXT", help="title of the study"
+    )
     parser.add_argument(
         "--description", default="", metavar="TEXT", help="a sentence or two"
     )

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--can",
         metavar="INTERFACE:CHANNEL",
-        help="where the arm is: traction-fake:PATH, or any bus of python-can",
+        help="bus to serve on: traction-fake:PATH, or any bus of python-can",
     )
     parser.add_argument(
         "--serial",
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--sensor",
         choices=("bota", "robotous", "optoforce"),
         default="bota",
-        help="which one (default: bota)",
+        help="kind of the sensor (default: bota)",
     )
     parser.add_argument(
         "--idle-first",
@@ -68,22 +68,22 @@ def _add_arm(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--hand",
         choices=("carry", "none"),
-        help="carry (default): a person holds the foot where it is, and the joints "
-        "hardly rub; none: nobody, with the friction of a real arm",
+        help="carry (default): a person holds the foot where it is, with little "
+        "joint friction; none: free, with the friction of a real arm",
     )
     parser.add_argument(
         "--tool",
         metavar="tread|bare|none|FILE",
-        help="what hangs on the tool plate: a foot of rig.toml below the wrist sensor "
-        "(default: that of the first terrain), nothing and no sensor, or the foot of a "
-        "TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",
+        help="what is mounted on the tool plate: a foot of rig.toml below the wrist "
+        "sensor (default: that of the first terrain), nothing and no sensor, or the "
+        "foot of a TOML file with mass [kg], com [m], inertia [kg m2], sole [m]",
     )
     parser.add_argument(
         "--firmware",
         type=_firmware,
         default=(_NEWEST, _NEWEST),
         metavar="MOTORS[,SAFETY]",
-        help=f"what the pucks and the safety module say they run ({_NEWEST})",
+        help=f"firmware version of the pucks and the safety module ({_NEWEST})",
     )
 
 

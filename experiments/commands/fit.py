@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from analysis.data import TractionSeries
 
 EXAMPLES = """\
-  traction fit trials.npz --out fit
-  traction fit a.csv b.csv --out fit --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N"""
+  traction fit trials.npz --to fit
+  traction fit a.csv b.csv --to fit --columns t=t_s,v_t=vt_mps,F_n=Fn_N,F_t=Ft_N"""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="npz, a CSV or Parquet file per trial, or a folder of traction export",
     )
     parser.add_argument(
-        "--out", type=Path, required=True, metavar="DIR", help="folder of the report"
+        "--to",
+        required=True,
+        type=Path,
+        metavar="DIR",
+        help="folder of the report",
     )
     parser.add_argument(
         "--columns", metavar="t=..,v_t=..,F_n=..,F_t=..", help="names in a CSV"
@@ -86,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     context = ReportContext(
-        title="Traction of foreign tables",
+        title="Traction from external data",
         subtitle=f"{count} trials from {len(args.files)} files",
         is_simulated=study.simulated,
         is_foreign=True,
@@ -96,7 +100,7 @@ def run(args: argparse.Namespace) -> int:
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
     )
-    page = write_report(study, args.out, context)
+    page = write_report(study, args.to, context)
     for warning in study.warnings:
         console.say(f"▲ {warning}")
     console.say(str(page))
@@ -110,7 +114,7 @@ def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:
     kinds = {trial.is_simulated for series in trials.values() for trial in series}
     if len(kinds) > 1:
         raise SettingsError(
-            "Simulated and recorded trials are mixed. Reports do not mix.",
+            "A report cannot mix simulated and recorded trials.",
             hint="Give the tables of one kind only.",
         )
     return True in kinds

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from experiments.operator import Console
 
 EXAMPLES = """\
-  traction identify data/sessions/*/trials/T01.mcap --models terrains.json
-  traction identify trials.npz --models terrains.json --window 200 --json"""
+  traction identify data/sessions/*/trials/T01.mcap --terrain-db terrains.json
+  traction identify trials.npz --terrain-db terrains.json --samples 200 --json"""
 
 _WINDOWS = (50, 100, 200)  # kept samples
 _PER_SECOND = 100  # kept samples
@@ -25,14 +25,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE", help="trials, npz or CSV tables"
     )
     parser.add_argument(
-        "--models",
-        type=Path,
+        "--terrain-db",
         required=True,
-        metavar="DB",
-        help="a terrain database, from traction export --terrain-db",
+        type=Path,
+        metavar="FILE",
+        help="terrain database, from traction export --terrain-db",
     )
     parser.add_argument(
-        "--window",
+        "--samples",
         type=int,
         choices=_WINDOWS,
         default=100,
@@ -55,17 +55,17 @@ def run(args: argparse.Namespace) -> int:
     from experiments.operator import Console
 
     console = Console(color=not args.no_color)
-    database = load(args.models)
+    database = load(args.terrain_db)
     results: list[dict[str, object]] = []
     for series in _series(args):
         trial = prepare_trial(series, PrepareOptions())
-        result = recognise(trial, database, args.window)
+        result = recognise(trial, database, args.samples)
         if args.json:
             content = None if result is None else asdict(result)
             results.append({"trial": series.name, "terrain": series.terrain})
             results[-1]["recognition"] = content
         else:
-            _print(series, result, args.window, console)
+            _print(series, result, args.samples, console)
     if args.json:
         console.say(json.dumps(results, indent=1))
     return 0

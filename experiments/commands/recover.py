@@ -1,4 +1,4 @@
-"""traction recover: save what is sound of trials that were not ended."""
+"""traction recover: recover the readable part of unfinished trial files."""
 
 from __future__ import annotations
 

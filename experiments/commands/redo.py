@@ -1,4 +1,4 @@
-"""traction redo: record any one trial of a session once more."""
+"""traction redo: record one trial of a session again."""
 
 import argparse
 
@@ -14,7 +14,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("session", metavar="SESSION", help="S012 or a folder")
     parser.add_argument("trial", metavar="TRIAL", help="T04 or 4")
     parser.add_argument(
-        "--reason", default="", metavar="TEXT", help="why it is repeated"
+        "--reason", default="", metavar="TEXT", help="reason for the journal"
     )
     add_reopening(parser)
 

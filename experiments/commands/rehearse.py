@@ -26,13 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `rehearse`."""
     add_simulated_arm(parser)
     parser.add_argument(
-        "--trials", type=int, default=10, metavar="N", help="of each terrain (10)"
+        "--trials", type=int, default=10, metavar="N", help="trials per terrain (10)"
     )
     parser.add_argument(
         "--twin",
         type=Path,
         metavar="DIR",
-        help="rehearse on the rig whose rig.toml and calibrations are there",
+        help="rehearse on the twin of the rig described in that folder",
     )
     parser.add_argument(
         "--jobs", type=int, metavar="N", help="processes at a time (one per core)"

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\
   traction replay S012 T04 --speed 2        a trial, twice as fast as it was
-  traction replay --can bus.log --summary   a bus log, the sums only"""
+  traction replay --can bus.log --summary   a bus log, totals only"""
 WATCH_EXAMPLES = """\
   traction watch                the session that is recorded, at ws://127.0.0.1:8765
   traction watch S012 --port 0  this session, at any free port"""
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number_within(0.01, 10_000, "a number > 0, e.g. 2"),
         default=1.0,
         metavar="N",
-        help="times as fast (1)",
+        help="replay speed (1)",
     )
     parser.add_argument(
         "--can",
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--foresight",
         type=Path,
         metavar="FILE",
-        help="compute what was foreseen anew with this terrain database, and compare",
+        help="recompute the foresight channel with this terrain database, and compare",
     )
     add_allow_missing(parser)
     parser.add_argument(
@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="serve the trial to viewers on this computer; needs traction[live]",
     )
     _add_port(parser, "--serve: ")
-    parser.add_argument("--summary", action="store_true", help="only the sums")
+    parser.add_argument("--summary", action="store_true", help="totals only")
 
 
 def _add_port(parser: argparse.ArgumentParser, when: str) -> None:
@@ -174,9 +174,11 @@ def _prove_foresight(path: Path, database: Path, console: Console) -> int:
         f"for bit, {replay.computed} computed."
     )
     if not replay.is_same_source:
-        console.problem("It was foreseen with other models than those of the file.")
+        console.problem("It was recorded with other models than those of the file.")
     if replay.first_other is not None:
-        console.problem(f"The first other state is that of cycle {replay.first_other}.")
+        console.problem(
+            f"The first state that differs is that of cycle {replay.first_other}."
+        )
     elif replay.is_same_source and not replay.is_proved:
         late = replay.computed - replay.recorded
         console.problem(f"The last {late} states are missing from the record.")
@@ -221,8 +223,8 @@ def _sum_up(tally: BusSummary, console: Console) -> None:
     silent = sum(tally.silent.values())
     console.say(
         f"{tally.frames} frames, {tally.foreign} of other kinds. {tally.questions} "
-        f"answers asked for: {tally.answers} came, {tally.late} of them after more "
-        f"than 1 ms, {silent} never came; {tally.unasked} came unasked."
+        f"answers requested: {tally.answers} came, {tally.late} of them after more "
+        f"than 1 ms, {silent} did not come; {tally.unasked} came without a request."
     )
     if tally.errors:
         told = ", ".join(f"{name} {n}" for name, n in sorted(tally.errors.items()))

@@ -1,4 +1,4 @@
-"""traction resume: continue the session that is not finished."""
+"""traction resume: continue an unfinished session."""
 
 import argparse
 from pathlib import Path

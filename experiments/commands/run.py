@@ -31,8 +31,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fast", action="store_true", help="stepped time, only with --fake"
     )
-    parser.add_argument("--trials", type=int, metavar="N", help="how many to keep")
-    parser.add_argument("--operator", default="", metavar="NAME", help="who pushes")
+    parser.add_argument(
+        "--trials", type=int, metavar="N", help="trials to keep (of the terrain)"
+    )
+    parser.add_argument(
+        "--operator", default="", metavar="NAME", help="name of the operator"
+    )
     _add_simulation(parser)
     parser.add_argument(
         "--operator-script",
@@ -41,13 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "pause, note TEXT, view, last",
     )
     parser.add_argument(
-        "--new", action="store_true", help="close what is unfinished first"
+        "--new", action="store_true", help="close an unfinished session first"
     )
     parser.add_argument(
         "--foresight",
         type=Path,
         metavar="FILE",
-        help="terrain database to foresee slips with (that of report --all)",
+        help="terrain database for foresight (that of report --all)",
     )
     parser.add_argument(
         "--can-log", type=Path, metavar="FILE", help="write every CAN frame there"
@@ -205,14 +209,14 @@ def _add_stance_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=6.0,
         metavar="N",
-        help="of the traction that is asked for, 4..10 (6)",
+        help="peak of the required traction [N], 4..10 (6)",
     )
     parser.add_argument(
         "--stances",
         type=int,
         default=_STANCES_OF_A_TRIAL,
         metavar="N",
-        help="of each recording (25)",
+        help="stances per recording (25)",
     )
 
 

@@ -30,7 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="only these: terrain, stones, incline_deg, foot, kind, session, operator",
     )
     parser.add_argument(
-        "--follow", action="store_true", help="again whenever it changes, until Ctrl-C"
+        "--follow",
+        action="store_true",
+        help="print again on every change, until Ctrl-C",
     )
 
 

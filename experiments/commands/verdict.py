@@ -1,4 +1,4 @@
-"""traction verdict: keep or reject a recorded trial, days later."""
+"""traction verdict: change the verdict on a recorded trial."""
 
 import argparse
 

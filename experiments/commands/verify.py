@@ -1,4 +1,4 @@
-"""traction verify: hold kept trials, or a publication, against their checksums."""
+"""traction verify: verify kept trials, or a publication, by their checksums."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     for deviation in deviations:
         console.problem(f"{BAD} {deviation.text()}.")
     if not deviations:
-        console.say(f"{GOOD} {len(sessions)} sessions: every kept trial is as kept.")
+        console.say(f"{GOOD} {len(sessions)} sessions: every kept trial is unchanged.")
     return _NOT_AS_KEPT if deviations else 0
 
 
@@ -79,7 +79,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
-            "Verify one publication at a time, and no session beside it.",
+            "Verify one publication at a time, without sessions.",
             hint="For example: traction verify crate --rebuild",
         )
     console = Console(color=not args.no_color)
@@ -91,7 +91,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
     if changes:
         return _NOT_AS_KEPT
     if not args.json:
-        console.say(f"{GOOD} {folders[0]}: every file is as it was published.")
+        console.say(f"{GOOD} {folders[0]}: every file is unchanged.")
     return _rebuild(folders[0], console) if args.rebuild else 0
 
 

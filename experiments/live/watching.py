@@ -165,7 +165,7 @@ def _open(data: Path, name: str | None, clock: Clock) -> WatchedSession | None:
     except PermissionError as error:
         raise SessionError(
             f"{folder.id} is recorded by process {pid} of another user.",
-            hint="Look on as the user who records. The session is not touched.",
+            hint="Run traction watch as the user who records.",
         ) from error
     return None if shared is None else WatchedSession(folder, shared, clock)
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 GOOD, WARNING, BAD = "✔", "▲", "✘"
 _GRADES = {GOOD: "good", WARNING: "warning", BAD: "bad"}
+_ARM, _ARM_WHOLE = "ARM: ", "ARM:\N{NO-BREAK SPACE}"
 _BELOW_TEXT = " " * 18  # where the text of a graded line begins
 
 
@@ -160,6 +161,8 @@ class PageRecorder(Console):
 def wrapped(text: str, width: int, indent: str = "") -> str:
     """Return `text` broken between words at `width`; a longer word stays whole.
 
+    What the arm does stays beside "ARM:".
+
     Args:
         text: lines to be broken.
         width: of the terminal [characters].
@@ -167,7 +170,7 @@ def wrapped(text: str, width: int, indent: str = "") -> str:
     """
     lines = [
         textwrap.fill(
-            line,
+            line.replace(_ARM, _ARM_WHOLE),
             width,
             subsequent_indent=indent,
             break_long_words=False,
@@ -175,7 +178,7 @@ def wrapped(text: str, width: int, indent: str = "") -> str:
         )
         for line in text.split("\n")
     ]
-    return "\n".join(lines)
+    return "\n".join(lines).replace(_ARM_WHOLE, _ARM)
 
 
 def _discard_output() -> None:

@@ -41,7 +41,8 @@ class BarScale:
 
     def number(self, value: float) -> str:
         """Return a value with its unit."""
-        return f"{value:{self.form}} {self.unit}"
+        text = f"{value:{self.form}}"
+        return f"{text.removeprefix('-') if float(text) == 0.0 else text} {self.unit}"
 
     def band_words(self, value: float) -> str:
         """Return the band and on which side of it `value` is."""
@@ -151,9 +152,9 @@ def trace_lines(
     if top <= 0.0:
         return []
     number = f"{top:.3f}" if top < 1.0 else f"{top:.1f}"
-    words = f"{trace.name} over the way, full bar {number} {trace.unit}"
+    words = f"{trace.name} over displacement, full bar {number} {trace.unit}"
     if same:
-        words += f"; kept = median of {len(same)}"
+        words += f"; kept: median of {len(same)}"
     names = [name, "kept"]
     return [words[:width]] + [
         f" {title:<{label}} {bars(row / top)}"

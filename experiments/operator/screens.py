@@ -55,7 +55,7 @@ def foresight_line(view: ForesightView) -> str:
     if view.is_late:
         return "foresight: silent"
     if view.state == OTHER_RIG_TEXT:
-        return "foresight: learnt on another foot or rig, nothing is foreseen"
+        return "foresight off: trained on another foot or rig"
     newest = float(view.slip_probability[-1]) if len(view.slip_probability) else np.nan
     bars = sparkline(view.slip_probability, _FORESEEN, _PROBABILITY)
     slip = view.state or f"{newest:.2f}"

@@ -83,7 +83,7 @@ def check_masses(rig: Rig) -> CheckResult | None:
     masses = rendered_masses(reaches, rig.frame.incline)
     mass = rig.settings.rig.control.virtual_mass
     steps = (
-        f"surely down from {masses.down:.2f} kg",
+        f"reliable contact from {masses.down:.2f} kg",
         f"within 50 % from {masses.half:.2f}",
         f"within 10 % from {masses.tenth:.2f}",
     )
@@ -141,7 +141,7 @@ def check_stream(fields: Mapping[str, str]) -> CheckResult | None:
     bursts, reads = int(fields["bursts"]), int(fields["reads"])
     is_bursty = bursts > BURSTY * reads
     if is_bursty:
-        text += ", comes in bursts: latency timer of the adapter to 1 ms"
+        text += ", arrives in bursts: set the adapter's latency timer to 1 ms"
     is_fine = not is_bursty and fields["lost"] == fields["bad_checks"] == "0"
     return CheckResult(GOOD if is_fine else WARNING, name, text)
 
@@ -182,9 +182,9 @@ def check_interface(channel: str) -> CheckResult | None:
         return CheckResult(WARNING, name, text)
     if state.queue_length > LONGEST_QUEUE:
         text = (
-            f"{channel} holds back up to {state.queue_length} frames, torques among "
+            f"{channel} queues up to {state.queue_length} frames, torques among "
             f"them: ip link set {channel} txqueuelen {LONGEST_QUEUE}"
         )
         return CheckResult(WARNING, name, text)
-    text = f"{channel} is up and holds back {state.queue_length} frames at most"
+    text = f"{channel} is up and queues {state.queue_length} frames at most"
     return CheckResult(GOOD, name, text)

@@ -38,13 +38,13 @@ def digest_of(path: Path) -> str:
     """Return the SHA-256 of a regular file of any size; no link is followed.
 
     Raises:
-        TrialFileError: it cannot be read, or is no regular file.
+        TrialFileError: it cannot be read, or is not a regular file.
     """
     try:
         descriptor = os.open(path, _NO_LINKS)
         with os.fdopen(descriptor, "rb") as file:
             if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-                raise TrialFileError(path, "is no regular file")
+                raise TrialFileError(path, "is not a regular file")
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise TrialFileError(path, f"cannot be read ({error.strerror})") from error
@@ -84,7 +84,7 @@ def changed_files(folder: Path) -> list[ChangedFile]:
 
 
 def _files(folder: Path) -> set[str]:
-    """Return everything below a folder that is no folder; links are not entered."""
+    """Return everything below a folder that is not a folder; links are not entered."""
     names: set[str] = set()
     for top, folders, files in os.walk(folder, followlinks=False):
         links = [name for name in folders if (Path(top) / name).is_symlink()]
@@ -105,6 +105,6 @@ def _read_sums(path: Path) -> dict[str, str]:
     for number, line in enumerate(text.decode(errors="replace").splitlines(), 1):
         match = _LINE.fullmatch(line)
         if match is None or match["path"] in sums:
-            raise TrialFileError(path, f"is changed: line {number} is no checksum")
+            raise TrialFileError(path, f"is changed: line {number} is not a checksum")
         sums[match["path"]] = match["digest"]
     return sums

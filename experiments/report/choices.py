@@ -66,7 +66,7 @@ def _parse_bounds(text: str) -> Mapping[str, tuple[float, float]]:
             bounds[name] = parse_window(value)
         except ValueError as error:
             raise SettingsError(
-                f"--bounds {text[:60]!r}: {part[:30]!r} is no range of a parameter.",
+                f"--bounds {text[:60]!r}: {part[:30]!r} is not a range of a parameter.",
                 hint=f"Write e.g. --bounds b=-50:50; the names are {', '.join(names)}.",
             ) from error
     return bounds

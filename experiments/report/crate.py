@@ -29,6 +29,7 @@ _MEDIA = {
     ".jsonl": "application/jsonl",
     ".toml": "application/toml",
     ".html": "text/html",
+    ".jpg": "image/jpeg",
     ".png": "image/png",
     ".pdf": "application/pdf",
     ".md": "text/markdown",
@@ -91,6 +92,23 @@ class StudyAction:
     results: Sequence[str]
 
 
+@dataclass(frozen=True, slots=True)
+class PublishedPhoto:
+    """A photo of the bed.
+
+    Attributes:
+        path: of the photo, below the crate.
+        recording: of its trial, below the crate.
+        attempt: session and attempt, e.g. S012/T04.
+        taken_utc: when, ISO 8601.
+    """
+
+    path: str
+    recording: str
+    attempt: str
+    taken_utc: str
+
+
 def require_rocrate() -> None:
     """Find out before anything is written whether rocrate is installed.
 
@@ -108,6 +126,7 @@ def crate_text(
     about: "Credits",
     recordings: Sequence[RecordingAction],
     study: StudyAction,
+    photos: Sequence[PublishedPhoto] = (),
 ) -> str:
     """Return `ro-crate-metadata.json` for everything that lies in `folder`.
 
@@ -116,6 +135,7 @@ def crate_text(
         about: who publishes what under which licence.
         recordings: an action for each.
         study: the action that made the results.
+        photos: of the bed, each with its trial.
 
     Raises:
         TrialFileError: a file cannot be read.
@@ -124,6 +144,8 @@ def crate_text(
     builder.add_root(about)
     for recording in recordings:
         builder.add_recording(recording)
+    for photo in photos:
+        builder.add_photo(photo, about.licence.url)
     builder.add_study(study)
     return builder.text()
 
@@ -151,9 +173,8 @@ class _CrateBuilder:
             description=f"Licence of the data: {about.licence.id}.",
             url=about.licence.url,
         )
-        profile = self._entity(
-            _PROFILE, "CreativeWork", name="Process Run Crate", version="0.5"
-        )
+        name = "Process Run Crate"
+        profile = self._entity(_PROFILE, "CreativeWork", name=name, version="0.5")
         people = [
             self._person(author.crate_id, author.name) for author in about.authors
         ]
@@ -180,6 +201,14 @@ class _CrateBuilder:
             endTime=end,
             agent=self._person(f"#operator-{_slug(operator)}", operator),
         )
+
+    def add_photo(self, photo: PublishedPhoto, licence: str) -> None:
+        """Describe a photo of the bed: its trial, its time, its licence."""
+        file = self.files[photo.path]
+        file["description"] = f"Bed after {photo.attempt}, before it was reset."
+        file["about"] = self.files[photo.recording]
+        file["dateCreated"] = photo.taken_utc
+        file["license"] = self.crate.dereference(licence)
 
     def add_study(self, study: StudyAction) -> None:
         """Describe how the results came about."""

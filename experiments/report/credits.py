@@ -110,14 +110,14 @@ def parse_author(text: str) -> Author:
     match = _AUTHOR.fullmatch(text.strip())
     if match is None or not match["name"].isprintable() or len(text) > _LONGEST:
         raise SettingsError(
-            f"--author {text[:60]!r} is no name.",
+            f"--author {text[:60]!r} is not a name.",
             hint='Write "Family, Given" or "Family, Given <ORCID>".',
         )
     orcid = (match["orcid"] or "").removeprefix("https://orcid.org/")
     if orcid and not _is_orcid(orcid):
         raise SettingsError(
-            f"--author {text[:60]!r}: {orcid[:30]!r} is no ORCID (its last digit is a "
-            "checksum of the others).",
+            f"--author {text[:60]!r}: {orcid[:30]!r} is not an ORCID (its last digit "
+            "is a checksum of the others).",
             hint="Copy it from https://orcid.org, e.g. 0000-0002-1825-0097.",
         )
     return Author(match["name"].strip(), orcid)
@@ -213,7 +213,7 @@ def licence_text(about: Credits) -> str:
     """Return which licence holds for what."""
     return (
         "# Licences\n\n"
-        f"The recordings, tables, figures and texts of this folder: "
+        f"The recordings, photos, tables, figures and texts of this folder: "
         f"{about.licence.name} ({about.licence.id}), {about.licence.url}\n\n"
         f"They were made with {about.software}, which is under the MIT licence and not "
         "part of this folder.\n"
@@ -232,7 +232,7 @@ def readme_text(about: Credits, terrains: Sequence[str], trials: int) -> str:
 
 | file | content |
 |---|---|
-| `sessions/` | recorded sessions: trials as MCAP (ROS 2), settings, journal |
+| `sessions/` | sessions: trials as MCAP (ROS 2), photos of the bed, settings, journal |
 | `tables/` | the kept trials as CSV, `datapackage.json` (Frictionless) beside them |
 | `results/` | report, fitted models (`fits.json`, `fits.csv`), figures |
 | `ro-crate-metadata.json` | RO-Crate 1.1, profile Process Run Crate 0.5 |

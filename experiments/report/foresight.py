@@ -162,7 +162,7 @@ def replay_foresight(path: Path, source: ForesightSource) -> ForesightReplay:
     trial, reader = load_trial(path), TrialReader(path)
     if not reader.has_foresight:
         raise SettingsError(
-            f"{trial.name}: nothing was foreseen while it was recorded.",
+            f"{trial.name}: it has no foresight channel.",
             hint="Record with one: traction run TERRAIN --foresight FILE",
         )
     recorded = reader.foresight().data

@@ -112,7 +112,7 @@ def _rows(text: str) -> Iterator[tuple[tuple[str, ...], float]]:
             yield tuple(row[name] for name in _PLACES), value
         except (KeyError, TypeError, ValueError) as error:
             raise SettingsError(
-                f"{TABLE} is no table of results ({error!r}).",
+                f"{TABLE} is not a table of results ({error!r}).",
                 hint="Was it edited? Name the changed files with: traction verify DIR",
             ) from error
 

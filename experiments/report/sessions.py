@@ -98,7 +98,7 @@ def choose_sessions(
     else:
         sessions = [find_session(data, name) for name in dict.fromkeys(names)]
     if standing := [s.id for s in sessions if s.is_of_stances]:
-        what = f"{' '.join(standing)}: of stances, without a push to study."
+        what = f"{' '.join(standing)}: sessions of stances have no pushes to report."
         raise SessionError(what, hint="Leave it out.")
     if not sessions:
         hint = "Record some: traction run S0 --fake --fast"
@@ -125,7 +125,7 @@ def tell_missing(
         KeptDataError: there are some, and `allow_missing` is false.
     """
     deviations = check_kept(sessions, allow_missing=allow_missing)
-    texts = [f"Not what was kept: {deviation.text()}." for deviation in deviations]
+    texts = [f"Not as in the journal: {deviation.text()}." for deviation in deviations]
     for text in texts:
         console.problem(f"{WARNING} {text}")
     return texts
@@ -149,7 +149,7 @@ def _load_trials(
                 raise SessionError(
                     f"{path.name} of {session.id} is "
                     f"{'' if trial.is_simulated else 'not '}simulated, its folder says "
-                    "otherwise. Reports do not mix.",
+                    "otherwise. A report cannot mix the two.",
                     hint="Put the file back where it came from.",
                 )
             trials.setdefault(trial.terrain, []).append(trial)

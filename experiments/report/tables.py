@@ -18,15 +18,15 @@ from experiments.session import SessionFolder, read_json
 SLID = (25, 50, 100, 200)  # ticks of sliding after which the ground is asked
 _SLIP_HEADER = (
     *("terrain", "slips", "recall", "lead [ms]", "0.1 s ahead", "needless time"),
-    *("false alarms/min", "false of all", "recall by chance", "calibration error"),
+    *("false alarms/min", "false-alarm share", "recall by chance", "calibration error"),
 )
 _SLIP_NOTE = (
-    "Every trial is foreseen by what the other four fifths taught, the alarm's "
-    "threshold included. Recall: slips with a warning in the 0.2 s before v_t rose "
-    "above 0.03 m/s. Lead: from the beginning of that alarm, at most 2 s. Needless "
-    "time: share of at-risk time outside those 0.2 s in warning. By chance: recall of "
-    "the same warnings moved in time. Causal filters are 8 to 14 ms late, which is in "
-    "all numbers."
+    "Every trial is predicted by models of the other four fifths of the trials, the "
+    "alarm's threshold included (5-fold cross-validation). Recall: slips with a "
+    "warning in the 0.2 s before v_t rose above 0.03 m/s. Lead: from the beginning "
+    "of that alarm, at most 2 s. False-alarm time: share of at-risk time outside "
+    "those 0.2 s in warning. By chance: recall of the same warnings shifted in time. "
+    "All numbers include the delay of the causal filters, 8 to 14 ms."
 )
 _ROW = (
     ("incline_deg", "incline [°]"),
@@ -130,7 +130,7 @@ def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
                 result = tuple(str(values.get(k, "")) for k in ("name", "mark", "text"))
                 sessions_of.setdefault(result, []).append(session.id)
     return ReportTable(
-        "Checks before the sessions",
+        "Preflight results",
         ("check", "", "found", "sessions"),
         [(*result, ", ".join(ids)) for result, ids in sorted(sessions_of.items())],
         section=ReportSection.HEALTH,
@@ -168,8 +168,8 @@ def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
         "Provenance",
         ("what", "value"),
         rows,
-        note="As recorded in the trials: code, packages, machine, firmware, and the "
-        "checksums of the settings that every trial file contains.",
+        note="As recorded in the trials: code, packages, machine, firmware, and "
+        "the checksums of the settings in every trial file.",
     )
 
 
@@ -224,7 +224,7 @@ def _slip_table(scores: Mapping[str, SlipScore]) -> ReportTable:
         for name, score in scores.items()
     ]
     return ReportTable(
-        "Foresight: slips within 200 ms, on trials not seen",
+        "Foresight: slips within 200 ms, held-out trials",
         _SLIP_HEADER,
         rows,
         note=_SLIP_NOTE,
@@ -235,7 +235,7 @@ def _slip_table(scores: Mapping[str, SlipScore]) -> ReportTable:
 def _ground_table(rows: Mapping[str, Mapping[str, Sequence[float]]]) -> ReportTable:
     times = [f"{n * 0.01:g} s" for n in SLID]
     return ReportTable(
-        "Foresight: probability of the right ground over time",
+        "Foresight: probability of the true terrain over time",
         (
             "terrain",
             *(f"terrain, {time}" for time in times),
@@ -260,17 +260,17 @@ def _ground_table(rows: Mapping[str, Mapping[str, Sequence[float]]]) -> ReportTa
 
 def _surface_table(score: Mapping[str, Any]) -> ReportTable:
     rows = [
-        ("right after 0.5 s of sliding", _share(score["accuracy"][0])),
-        ("right after 1 s of sliding", _share(score["accuracy"][1])),
-        ("right after 0.5 s, begun anew anywhere", _share(score["anywhere"][0])),
-        ("right after 1 s, begun anew anywhere", _share(score["anywhere"][1])),
-        ("98 % sure and wrong", _number(score["sure_and_wrong"], ".3f")),
+        ("correct after 0.5 s of sliding", _share(score["accuracy"][0])),
+        ("correct after 1 s of sliding", _share(score["accuracy"][1])),
+        ("correct after 0.5 s, started anywhere", _share(score["anywhere"][0])),
+        ("correct after 1 s, started anywhere", _share(score["anywhere"][1])),
+        ("wrong at 98 % confidence", _number(score["sure_and_wrong"], ".3f")),
         ("calibration error", _number(score["calibration"], ".3f")),
         ("95 % after a change of ground, median [s]", _number(score["back"], ".2f")),
         ("the slowest of them [s]", _number(score["slowest"], ".2f")),
     ]
     return ReportTable(
-        "Foresight: flat or rocky, on trials not seen",
+        "Foresight: flat or rocky, held-out trials",
         ("what", "value"),
         rows,
         note="A change of ground is a splice of two trials in the middle of sliding.",

@@ -169,7 +169,7 @@ def _recovered(
         for row in _rows(study.terrains[terrain], [error for _, error in of_terrain])
     ]
     return ReportTable(
-        "True parameters beside the recovered ones",
+        "True and recovered parameters",
         ("terrain", "parameter", "true, mean (range)", "Tustin, all trials"),
         rows,
         note="A simulated plate follows eq. (1) with δ_s = 2 and a static force that "

@@ -98,9 +98,9 @@ def read_foresight(path: Path) -> ForesightSource:
     model = foresight_in(database.parts)
     if model is None:
         raise SettingsError(
-            f"{path} knows no foresight: it was made by an earlier version, or from "
-            "too few trials.",
-            hint="Make it anew: traction report --all. Nothing was started.",
+            f"{path} contains no foresight models: it was made by an earlier "
+            "version, or from too few trials.",
+            hint="Make it again: traction report --all. Nothing was started.",
         )
     break_away = {
         name: terrain.from_rest

@@ -167,7 +167,7 @@ def build_compensation(
     if stored.gravity != rig.gravity.model:
         raise SettingsError(
             f"{section.file} was measured with gravity {stored.gravity}, rig.toml has "
-            f"{rig.gravity.model}: what pulls one way would be taken for friction.",
+            f"{rig.gravity.model}: a gravity error would be identified as friction.",
             hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
         )
     constants, fit = load_constants(), stored.fit
@@ -183,8 +183,8 @@ def _check_size(name: str, constants: ArmConstants, friction: MotorFriction) -> 
     for joint, (torque, limit) in enumerate(zip(coulomb, most, strict=True), 1):
         if torque > limit:
             raise SettingsError(
-                f"{name} says that {torque:.2f} N m rub at joint {joint}, more than "
-                f"{limit:.2f} N m.",
+                f"{name} gives {torque:.2f} N m of friction at joint {joint}, more "
+                f"than {limit:.2f} N m.",
                 hint=f"Run traction calibrate friction again, or {_WITHOUT}. {NOTHING}",
             )
 
@@ -205,8 +205,8 @@ def twin_gravity(rig: RigSettings, known: LawCalibrations) -> str:
     if rubbed.gravity == "calibrated" and not known.gravity:
         raise SettingsError(
             f"{rig.friction.file} was measured with gravity calibrated, and "
-            f"{rig.gravity.file} cannot be read: what pulls one way would be taken for "
-            "friction.",
+            f"{rig.gravity.file} cannot be read: a gravity error would be identified "
+            "as friction.",
             hint=f"Bring {rig.gravity.file} back beside it, or run traction calibrate "
             f"friction again. {NOTHING}",
         )
@@ -232,7 +232,7 @@ def twin_words(settings: Settings) -> list[str]:
         measured[name] = name.partition(":")[2]
     if not measured:
         raise SettingsError(
-            f"{settings.folder} describes no arm of its own: no calibration is there.",
+            f"{settings.folder} contains no calibration of an arm.",
             hint="Make one with: traction calibrate gravity, friction, sensor or "
             f"terrain. {NOTHING}",
         )

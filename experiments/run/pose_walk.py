@@ -175,7 +175,7 @@ class PoseWalk:
         raise PreflightError(
             f"Joint {joint + 1} is {apart[joint]:.3f} rad from where it was sent "
             f"(limit {ASTRAY[joint]:g}).",
-            hint="Is something in its way, or does an encoder stand still?",
+            hint="Is something in the way, or has an encoder failed?",
             arm_state="idle, braked",
         )
 
@@ -199,9 +199,9 @@ class PoseWalk:
             if speed.max() <= STILL:
                 return q.mean(axis=0), records["torque_command"].mean(axis=0)
         raise PreflightError(
-            f"Joint {speed.argmax() + 1} moved at {speed.max():.3f} rad/s while it was "
-            f"weighed (limit {STILL}).",
-            hint="Nobody may touch the arm. Start again.",
+            f"Joint {speed.argmax() + 1} moved at {speed.max():.3f} rad/s during the "
+            f"measurement (limit {STILL}).",
+            hint="The arm must not be touched. Start again.",
         )
 
     def ask(self, text: str, prompt: Prompt) -> None:

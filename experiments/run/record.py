@@ -245,7 +245,7 @@ def _end(
         return
     context.say(written)
     context.reject(name, f"interrupted: {outcome.reason}")
-    context.say(f"{name.kept} kept as interrupted: rejected/{name.rejected}.mcap.")
+    context.say(f"{name.kept} saved as interrupted: rejected/{name.rejected}.mcap.")
     if outcome.reason != "interrupted":
         context.say(archive.flight(header, name, outcome.reason))
 
@@ -256,8 +256,8 @@ def _friction_lines(devices: Mapping[str, str]) -> list[str]:
     if motor == "0":
         return []
     return [
-        f"motor {motor} swung by itself: its friction is not as calibrated, nothing is "
-        "compensated any more. Run: traction calibrate friction"
+        f"motor {motor} oscillated: its friction differs from the calibration, "
+        "friction is no longer compensated. Run: traction calibrate friction"
     ]
 
 

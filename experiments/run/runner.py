@@ -163,14 +163,11 @@ class SessionRunner:
         elif self._stuck >= FAULTS_IN_A_ROW:
             raise StuckFootError(self._stuck, context.metadata.folder.id)
 
-    # --- messages -----------------------------------------------------------------
-
     def _make_safe(self) -> str:
         """Idle the arm and return its state in words; safe to repeat."""
         context = self._context
         is_confirmed = context.console_loop.make_safe()
-        mode = context.rig.backend.safety_mode()
-        return rest_text(mode, is_confirmed=is_confirmed)
+        return rest_text(context.rig.backend.safety_mode(), is_confirmed=is_confirmed)
 
     def _report_bug(self, arm_text: str, trace: str) -> None:
         """Print where the arm is and what is safe; the traceback goes to the log."""
@@ -294,7 +291,6 @@ def _later(context: RunContext, name: TrialName) -> str:
     """Return where a trial without a verdict went, and how it is kept after all."""
     session = context.metadata.folder
     command = f"traction verdict {session.id} {name.rejected} keep REASON"
-    return (
-        f"{name.kept} was not judged: rejected/{name.rejected}.mcap. To keep it: "
-        f"{command}{data_option(session.path.parent.parent)}"
-    )
+    command += data_option(session.path.parent.parent)
+    what = f"{name.kept} was not judged: rejected/{name.rejected}.mcap."
+    return f"{what} To keep it: {command}"

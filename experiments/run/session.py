@@ -151,7 +151,7 @@ def run_session(request: SessionRequest, mode: OpenMode) -> int:
             code = runner.run(mode.event, **_details(request, mode, differences))
     for plan in faults.plans if faults is not None else ():
         text = plan.to_text()
-        console.say(f"▲ The fault {text} was planned, and its time never came.")
+        console.say(f"▲ The fault {text} was not raised: its time was not reached.")
     _print_next(request, journal, code)
     return code
 
@@ -177,7 +177,7 @@ def _foresight_of(request: SessionRequest, mode: OpenMode) -> ForesightSource | 
         if named is not None and mode.journal is None:
             raise
         # It is in the way of nothing: a trial needs no foresight.
-        request.console.say(f"{WARNING} Nothing is foreseen. {error}")
+        request.console.say(f"{WARNING} Foresight is off. {error}")
         return None
 
 
@@ -188,8 +188,8 @@ def _foresee(source: ForesightSource, rig: Rig, console: Console) -> None:
     if not source.model.knows(rig.identity):
         known = "; ".join(known.text for known in source.model.provenance.rigs)
         console.say(
-            f"{WARNING} Foresight was learnt on another foot or rig: nothing is "
-            f"foreseen. Here: {rig.identity.text}. Learnt on: {known}."
+            f"{WARNING} Foresight was trained on another foot or rig and "
+            f"is off. Here: {rig.identity.text}. Trained on: {known}."
         )
 
 
@@ -289,6 +289,6 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     try:
         steps = next_steps(request.data, matrix, is_simulated=is_simulated)
     except TractionError as error:  # of another session; this one is complete
-        steps = [f"▲ What comes next is not known: {error.message}"]
+        steps = [f"▲ The next terrain is unknown: {error.message}"]
     for step in steps:
         request.console.say(step)

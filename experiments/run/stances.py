@@ -38,13 +38,13 @@ from experiments.session import (
 )
 
 LIVE_STANCE = (
-    "A real arm takes no stances: a foot that stands by itself, its impedance and its "
-    "policies were tried in the simulation alone. The arm was not touched."
+    "Stances are not available on a real arm: impedance and policies "
+    "were tested in simulation only. The arm was not touched."
 )
 _STEP = 0.754878  # of the row of spots, from trial to trial
 _STUCK = (
-    "The foot does not get on with what it is to do ({state}). The arm holds. Look at "
-    "the foot; then the recording is made again."
+    "The foot makes no progress ({state}). The arm holds. Check "
+    "the foot; the recording is then repeated."
 )
 
 
@@ -55,7 +55,7 @@ class StuckFootError(TractionError):
         """Say how often in a row, in the session of that name."""
         super().__init__(
             f"The foot got stuck in {times} recordings in a row.",
-            hint="Look at the foot and at the friction of the arm. To go on: "
+            hint="Check the foot and the friction of the arm. To go on: "
             f"traction resume {session}",
         )
 
@@ -104,7 +104,7 @@ def check_stances(rig: Rig, task: StanceTask, data: Path) -> None:
         )
     if not source.model.knows(rig.identity):
         raise SettingsError(
-            f"{source.path} was learnt on another foot or rig.",
+            f"{source.path} was trained on another foot or rig.",
             hint="Make one here: traction report --all. Nothing was started.",
         )
 

@@ -110,7 +110,9 @@ def prove_mounting(context: RunContext) -> None:
         raise preflight_error(
             "mounting", error=change.error, limit=limit, turned=turned
         )
-    context.say(f"{GOOD} mounting proven: {change.error:.1f} N off (limit {limit:.1f})")
+    context.say(
+        f"{GOOD} mounting verified: {change.error:.1f} N off (limit {limit:.1f})"
+    )
     walk.ask("Take the arm again. [space]", Prompt.SUPPORT)
 
 

@@ -36,7 +36,15 @@ from .matrix_board import (
     next_steps,
     parse_where,
 )
-from .photos import Camera, PhotoError, add_photo, has_photo, photos_of
+from .photos import (
+    Camera,
+    KeptPhoto,
+    PhotoError,
+    add_photo,
+    has_photo,
+    kept_photo,
+    photos_of,
+)
 from .reducer import KEEP, REJECT, refusal, replay
 from .sidecar import STANCES, TrialName, TrialOutcome, sidecar_of
 from .stance_task import (
@@ -75,6 +83,7 @@ __all__ = [
     "Event",
     "Journal",
     "KeptDataError",
+    "KeptPhoto",
     "MatrixRow",
     "PhotoError",
     "SessionFolder",
@@ -102,6 +111,7 @@ __all__ = [
     "has_photo",
     "iso_utc",
     "kept_data_error",
+    "kept_photo",
     "kept_pushes",
     "kept_sidecars",
     "list_sessions",

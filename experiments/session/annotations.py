@@ -30,12 +30,12 @@ def parse_trial(text: str) -> tuple[int, int]:
     """Return (number, attempt) of a name such as T04b; attempt 0 for T04.
 
     Raises:
-        SessionError: it is no name of a trial.
+        SessionError: it is not a name of a trial.
     """
     match = _TRIAL.match(text)
     if match is None:
         raise SessionError(
-            f"{text!r} is no trial.", hint="Name one like T04, or T04a of rejected/."
+            f"{text!r} is not a trial.", hint="Name one like T04, or T04a of rejected/."
         )
     attempt = 0
     for letter in match["letters"]:

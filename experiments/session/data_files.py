@@ -21,8 +21,8 @@ def read_json(path: Path) -> dict[str, Any]:
     """Return a JSON object, an empty one where the file is missing or damaged.
 
     Raises:
-        TrialFileError: it is no regular file of this session, too large, or cannot be
-            read now.
+        TrialFileError: it is not a regular file of this session, too large, or cannot
+            be read now.
     """
     try:
         return parse_object(read_data(path)) or {}
@@ -137,7 +137,7 @@ def sha256_of(path: Path) -> str:
     """Return the hex digest of a file.
 
     Raises:
-        TrialFileError: it is no regular file of the session, too large, or cannot be
+        TrialFileError: it is not a regular file of the session, too large, or cannot be
             read.
     """
     try:
@@ -165,7 +165,7 @@ def _write_new(folder: int, name: str, content: bytes) -> None:
 def _finite(text: str) -> float:
     number = float(text)
     if not math.isfinite(number):
-        raise ValueError(f"{text:.20} is no finite number")
+        raise ValueError(f"{text:.20} is not a finite number")
     return number
 
 

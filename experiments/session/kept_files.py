@@ -89,7 +89,7 @@ def _compare(
         stem, attempt = path.stem, fields.get("attempt")
         is_judged = any(d.kept == stem and d.attempt == attempt for d in judged)
         if events and fields.get("verdict") == KEEP and not is_judged:
-            faults.append((f"trials/{path.name}", "is kept, the journal knows nothing"))
+            faults.append((f"trials/{path.name}", "is kept, but is not in the journal"))
     return faults
 
 
@@ -128,7 +128,7 @@ def kept_data_error(deviations: Sequence[Deviation]) -> KeptDataError:
     named = "; ".join(d.text() for d in deviations[:_NAMED])
     more = f"; and {len(deviations) - _NAMED} more" if deviations[_NAMED:] else ""
     return KeptDataError(
-        f"Not what was kept: {named}{more}.",
+        f"Not as in the journal: {named}{more}.",
         hint="Copy the files back, or go on without them: --allow-missing.",
     )
 
@@ -236,7 +236,7 @@ def board_notes(
             )
     terrains = {row.name for row in matrix.terrains}
     notes += [
-        f"{session.path.name}: {session.terrain} is no terrain of the matrix; it is "
+        f"{session.path.name}: {session.terrain} is not a terrain of the matrix; it is "
         "not counted."
         for session in known
         if session.terrain not in terrains

@@ -13,6 +13,7 @@ import shlex
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from tempfile import gettempdir
 from typing import Any, cast
@@ -24,7 +25,7 @@ from experiments.session.sidecar import TrialName
 from experiments.session.store import SessionFolder, iso_utc
 from experiments.session.trial_files import PHOTO_SUFFIXES, find_sidecar, sidecar_path
 
-LARGEST = 40_000_000  # bytes of a photo
+LARGEST = 16 * 2**20  # bytes of a photo, as of any file that is read back
 MOST_PIXELS = 50_000_000
 _THUMB = (280, 210)  # pixels of a photo in a report
 _QUALITY = 55
@@ -116,6 +117,59 @@ def _suffix(content: bytes) -> str:
     raise PhotoError("the file is neither JPEG nor PNG")
 
 
+@dataclass(frozen=True, slots=True)
+class KeptPhoto:
+    """A photo of the bed as it was taken.
+
+    Attributes:
+        name: of its file, beside the recording.
+        content: JPEG or PNG, with the checksum of the sidecar.
+        taken_utc: when, ISO 8601.
+        sha256: checksum, hexadecimal.
+    """
+
+    name: str
+    content: bytes
+    taken_utc: str
+    sha256: str
+
+
+def kept_photo(sidecar: Path) -> KeptPhoto | None:
+    """Return the photo of an attempt, None where none was taken.
+
+    The folder may be from elsewhere: no link is followed, size and kind are bounded.
+
+    Args:
+        sidecar: of the attempt, below trials/ or rejected/.
+
+    Raises:
+        PhotoError: it is missing, changed, too large, or neither JPEG nor PNG.
+        TrialFileError: it, or the sidecar, is not a regular file of the session.
+    """
+    photo = read_json(sidecar).get("photo")
+    if not isinstance(photo, dict):
+        return None
+    fields = cast("dict[str, Any]", photo)
+    suffix = str(fields.get("suffix"))
+    if suffix not in PHOTO_SUFFIXES:
+        raise PhotoError("has no file name")
+    path = sidecar.with_suffix(suffix)
+    content = _kept(path)
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != fields.get("sha256"):
+        raise PhotoError("is not the one that was taken: its checksum is wrong")
+    if not suffix.endswith(_suffix(content)):
+        raise PhotoError(f"is not a {suffix[-3:]} file")
+    return KeptPhoto(path.name, content, _time(fields.get("taken_utc")), digest)
+
+
+def _time(taken: object) -> str:
+    try:
+        return datetime.fromisoformat(str(taken)).isoformat()
+    except ValueError as error:
+        raise PhotoError("has no time") from error
+
+
 def has_photo(folder: SessionFolder, name: TrialName) -> bool:
     """Return whether an attempt has a photo."""
     return bool(find_sidecar(folder, name).get("photo"))
@@ -162,31 +216,18 @@ def photos_of(
     problems: list[str] = []
     for session in sessions:
         for path in list_folder(session.trials, "T??.json"):
-            photo = read_json(path).get("photo")
-            if not isinstance(photo, dict):
-                continue
-            fields = cast("dict[str, Any]", photo)
             title = f"{session.id} {path.stem}"
             try:
-                photos.append(_shown(title, path, fields))
+                photo = kept_photo(path)
+                if photo is not None:
+                    photos.append((title, _caption(photo), thumbnail(photo.content)))
             except (PhotoError, TrialFileError) as error:
                 problems.append(f"{title}: its photo of the bed {error}.")
     return photos, problems
 
 
-def _shown(
-    title: str, sidecar: Path, photo: Mapping[str, Any]
-) -> tuple[str, str, bytes]:
-    suffix = str(photo.get("suffix"))
-    if suffix not in PHOTO_SUFFIXES:
-        raise PhotoError("has no file name")
-    path = sidecar.with_suffix(suffix)
-    content = _kept(path)
-    if hashlib.sha256(content).hexdigest() != photo.get("sha256"):
-        raise PhotoError("is not the one that was taken: its checksum is wrong")
-    taken, digest = str(photo.get("taken_utc", "?")), str(photo["sha256"])
-    caption = f"{taken}, {path.name}, SHA-256 {digest[:16]}…"
-    return title, caption, thumbnail(content)
+def _caption(photo: KeptPhoto) -> str:
+    return f"{photo.taken_utc}, {photo.name}, SHA-256 {photo.sha256[:16]}…"
 
 
 def _kept(path: Path) -> bytes:
@@ -194,7 +235,7 @@ def _kept(path: Path) -> bytes:
 
     Raises:
         PhotoError: it is missing, cannot be read, or is too large.
-        TrialFileError: it is no regular file of the session.
+        TrialFileError: it is not a regular file of the session.
     """
     try:
         with os.fdopen(open_data(path), "rb") as file:

@@ -98,7 +98,7 @@ def refusal(state: SessionState, event: _Facts) -> str:
     """Return why `event` cannot happen now; empty where it can."""
     name = _EVENTS.get(str(event.get("event")))
     if name is None:
-        return "this is no event of a session"
+        return "this is not an event of a session"
     refused = TABLE[state.phase, name].refused
     check = _CHECKS.get(name)
     return refused or (check(state, event) if check else "")

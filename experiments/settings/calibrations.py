@@ -80,7 +80,7 @@ def with_calibrations(settings: Settings, *, is_simulated: bool | None) -> Setti
     unless it is the twin of a rig (`is_simulated` is None), where all of them fit.
 
     Raises:
-        SettingsError: a file cannot be read, is no calibration, of another foot or
+        SettingsError: a file cannot be read, is not a calibration, of another foot or
             terrain, or of a simulated rig for a real one, or conversely.
     """
     reader = _Reader(settings, is_simulated=is_simulated)

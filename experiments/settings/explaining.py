@@ -176,7 +176,7 @@ def _refusal(location: _Location, option: str) -> str:
     """Return why there is no such `option`; that of another kind has a name."""
     others = [kind for kind, s in location.kinds.items() if option in s.model_fields]
     if not others:
-        return "is no setting Traction knows"
+        return "is not a setting Traction knows"
     names = " and ".join(f'"{kind}"' for kind in others)
     return f'belongs to kind {names}, this is a "{location.kind}"'
 

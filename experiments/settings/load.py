@@ -115,7 +115,7 @@ def load_settings(config: Path | None) -> Settings:
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise SettingsError(
-            f"matrix.toml: terrain {twice[0]!r} stands there twice.",
+            f"matrix.toml: terrain {twice[0]!r} occurs twice.",
             hint="Every row needs a name of its own. Nothing was started.",
         )
     folder = config.parent if config is not None else Path()

@@ -76,7 +76,7 @@ def parse_script(text: str) -> tuple[TimedPress, ...]:
         time_ns = _parse_time(words[0]) if len(words) == 2 else after_ns
         if press is None or len(words) > 2 or time_ns is None or time_ns < after_ns:
             raise SettingsError(
-                f"Script line {number}: {line.strip()[:60]!r} is no press in order.",
+                f"Script line {number}: {line.strip()[:60]!r} is not a press in order.",
                 hint=f'Expected [SECONDS] {"|".join(PRESSES)}, e.g. "3.0 activate".',
             )
         after_ns = time_ns

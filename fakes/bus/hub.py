@@ -161,13 +161,14 @@ def _remove_stale(path: Path) -> None:
         return
     if not path.is_socket():
         raise SettingsError(
-            f"{path} exists and is no socket.", hint="Name a file that does not exist."
+            f"{path} exists and is not a socket.",
+            hint="Name a file that does not exist.",
         )
     with open_socket() as probe:
         probe.settimeout(1.0)
         if probe.connect_ex(str(path)) != errno.ECONNREFUSED:
             raise SettingsError(
-                f"{path} is in use: somebody serves a bus there.",
+                f"{path} is in use by another server.",
                 hint="Stop that server, or choose another path.",
             )
     path.unlink()

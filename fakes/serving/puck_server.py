@@ -95,8 +95,9 @@ class PuckServer:
         words = [self.sensor.losses] if self.sensor and self.sensor.losses else []
         if port.ignored or port.lost:
             words.append(
-                f"{port.ignored} packets were no classic data frames and were ignored; "
-                f"{port.lost} frames were lost because nobody took them in time."
+                f"{port.ignored} packets were no classic data frames and were "
+                f"ignored; {port.lost} frames were lost because the client did not "
+                "read them in time."
             )
         return " ".join(words)
 

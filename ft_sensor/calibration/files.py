@@ -89,7 +89,7 @@ def terrain_metadata(text: str) -> dict[str, str]:
     """
     table: object = _parse(text, "terrain.toml").get("facts", {})
     if not isinstance(table, dict):
-        raise SettingsError("terrain.toml is incomplete: facts is no table.")
+        raise SettingsError("terrain.toml is incomplete: facts is not a table.")
     fields = cast("dict[str, object]", table)
     return {str(key): str(value) for key, value in fields.items()}
 

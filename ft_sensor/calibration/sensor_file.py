@@ -71,7 +71,7 @@ def sensor_from_toml(text: str, name: str) -> SensorCalibration:
     """Return the calibration of a file called `name`.
 
     Raises:
-        SettingsError: the text is no calibration of a wrist sensor.
+        SettingsError: the text is not a calibration of a wrist sensor.
     """
     try:
         table = parse_toml(text)
@@ -124,6 +124,6 @@ def _rows(values: list[list[float]]) -> str:
 
 def _wrong(name: str, what: str) -> SettingsError:
     return SettingsError(
-        f"{name} is no calibration of a wrist sensor: {what}.",
+        f"{name} is not a calibration of a wrist sensor: {what}.",
         hint="Make one with: traction calibrate sensor. Nothing was started.",
     )

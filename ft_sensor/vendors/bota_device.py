@@ -147,7 +147,7 @@ class BotaDevice:
         raise DeviceFaultError(
             f"The F/T sensor sends raw gauge data or absurd forces after "
             f"{_RESETS} starts (limits {_MAX_FORCE:g} N, {_MAX_TORQUE:g} N m).",
-            hint="Take its power away for ten seconds, then open it again.",
+            hint="Switch its power off for ten seconds, then open it again.",
         )
 
     def _set_up(self, dialog: SerialDialog) -> None:

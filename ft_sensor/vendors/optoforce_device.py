@@ -130,8 +130,9 @@ class OptoForceDevice:
                 break
         else:
             raise LinkTimeoutError(
-                "The F/T sensor does not tell its serial number.",
-                hint="Cycle its power. Without it the sensitivities are anybody's.",
+                "The F/T sensor does not report its serial number.",
+                hint="Cycle its power. Without it the sensitivities cannot be "
+                "assigned to it.",
             )
         if reply != self._settings.serial_number:
             raise DeviceFaultError(
@@ -156,8 +157,8 @@ class OptoForceDevice:
                 )
             if optoforce.is_older_protocol(dialog.buffer):
                 raise DeviceFaultError(
-                    "The F/T sensor speaks an older protocol of its maker.",
-                    hint="Its firmware has to be brought up to date.",
+                    "The F/T sensor uses an older protocol of its vendor.",
+                    hint="Update its firmware.",
                 )
         if not dialog.frames:
             dialog.raise_no_reply(self.line.baudrate)

@@ -151,7 +151,7 @@ class RobotousDevice:
         reply = _model_of(name)
         if reply is None:
             raise DeviceFaultError(
-                f"The F/T sensor calls itself '{name}', whose scale is unknown.",
+                f"The F/T sensor reports the name '{name}', whose scale is unknown.",
                 hint=f"Known are {', '.join(MODELS)}.",
             )
         if reply.most_hz < self._settings.rate:
@@ -167,7 +167,7 @@ class RobotousDevice:
         self._set(dialog, robotous.SET_BAUDRATE, robotous.BAUD_CODES[BAUDRATE])
         raise DeviceFaultError(
             f"At {_FIRST_BAUDRATE} baud the F/T sensor is too slow for the loop. It "
-            f"was told to use {BAUDRATE} baud from its next power-on.",
+            f"was set to {BAUDRATE} baud from its next power-on.",
             hint=f"Cycle its power and set baudrate = {BAUDRATE} in rig.toml.",
         )
 
@@ -244,7 +244,7 @@ def _not_taken(
     what: str, wished: tuple[int, ...], got: tuple[int, ...]
 ) -> DeviceFaultError:
     return DeviceFaultError(
-        f"The F/T sensor reads back {what} code {got}, told was {wished}.",
+        f"The F/T sensor reads back {what} code {got}, set was {wished}.",
         hint="Cycle its power and try again; check its firmware.",
     )
 

@@ -130,7 +130,7 @@ TABLES = {
 @pytest.mark.parametrize("name", TABLES)
 def test_a_table_beyond_its_limits_is_refused(tmp_path, name):
     TABLES[name](tmp_path / name)
-    ended = run("fit", tmp_path / name, "--out", tmp_path / "out", cwd=tmp_path)
+    ended = run("fit", tmp_path / name, "--to", tmp_path / "out", cwd=tmp_path)
     assert ended.code == 2, ended.text
     assert ended.memory < MEMORY, ended
 
@@ -159,7 +159,7 @@ def test_a_database_beyond_its_limits_is_refused(tmp_path, name):
     table = tmp_path / "table.csv"
     table.write_bytes(HEADER + b"0,0.1,2,1\n" * 200)
     DATABASES[name](tmp_path / "terrains.json")
-    database = ("--models", tmp_path / "terrains.json")
+    database = ("--terrain-db", tmp_path / "terrains.json")
     ended = run("identify", table, *database, cwd=tmp_path)
     assert ended.code == 2, ended.text
     assert ended.memory < MEMORY, ended

@@ -6,8 +6,8 @@ from tests.disturbances.rows import RECORDINGS, TABLES, Outcome
 HEAD = """\
 # Disturbances
 
-What can be wrong with a trial without a single fault being raised, and what comes of
-it. None passes in silence: it is refused, flagged with its likely cause, or harmless,
+What can be wrong with a trial although no fault is raised, and the result.
+Nothing passes silently: it is refused, flagged with its likely cause, or harmless,
 and then a number says how harmless. Made by
 `python -m tests.disturbances > docs/disturbances.md`; held by `tests/disturbances`.
 """
@@ -34,7 +34,7 @@ def _table(title: str, rows: list[tuple[str, Seen]]) -> list[str]:
     return [
         f"## {title}",
         "",
-        "| what is wrong | what comes of it | said, or change of F_t/F_n |",
+        "| disturbance | result | message, or change of F_t/F_n |",
         "| --- | --- | --- |",
         *(f"| {name} | {seen.outcome.value} | {_said(seen)} |" for name, seen in rows),
     ]

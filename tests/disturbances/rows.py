@@ -127,7 +127,7 @@ TABLES = (
     TableRow("clock jumps by 1 s", jumped, HARMLESS, 0.01),
     TableRow("clock goes back by 1 s", backward, REFUSED, "time does not increase"),
     TableRow("every tenth row is no number", spoilt, FLAGGED, "not finite"),
-    TableRow("each row twice", lambda x: np.repeat(x, 2, 0), FLAGGED, "there twice"),
+    TableRow("each row twice", lambda x: np.repeat(x, 2, 0), FLAGGED, "duplicate rows"),
     TableRow("zeros", lambda x: x * [1.0, 0, 0, 0], REFUSED, "No sample"),
     TableRow("five rows", lambda x: x[:5], REFUSED, "No sample"),
     TableRow("100 Hz", lambda x: x[::5], HARMLESS, 0.05),
@@ -140,7 +140,7 @@ TABLES = (
     TableRow(
         "a unit that there is not",
         times(V, 1.0),
-        *(REFUSED, "no unit", "S0", "t,v_t [kn],F_n,F_t"),
+        *(REFUSED, "not a unit", "S0", "t,v_t [kn],F_n,F_t"),
     ),
     TableRow("a column twice", times(V, 1.0), REFUSED, "twice", "S0", "t,F_n,F_n,F_t"),
 )
@@ -251,7 +251,10 @@ RECORDINGS = (
         "axes of the moment swapped", of_cycles(swap_moments), FLAGGED, "moment"
     ),
     RecordingRow(
-        "moments with the other sign", of_cycles(flip_moments), FLAGGED, "presses"
+        "moments with the other sign",
+        of_cycles(flip_moments),
+        FLAGGED,
+        "the force acts",
     ),
     RecordingRow("foot 5 % heavier than entered", heavier(0.05), HARMLESS, 0.01),
     RecordingRow("foot 20 % heavier than entered", heavier(0.2), HARMLESS, 0.03),

@@ -8,21 +8,21 @@ from tests.faults.processes import TABLE as PROCESSES
 from tests.faults.truth import Promise, promise_of
 
 HEAD = """\
-# Every fault in every phase
+# Faults in every phase of a session
 
-What comes of each fault that `--fault` can raise, and of signals and killed processes,
+The result of each fault that `--fault` can raise, and of signals and killed processes,
 in each phase of a session; and, in the last column, while the arm moves by itself from
 pose to pose of a calibration. Made by `python -m tests.faults > docs/faults.md`; the
 tests in `tests/faults` hold the program against it.
 """
 TRUTH = """
-## What the arm truly does
+## True motion of the arm
 
 Taken from the simulated arm itself, not from what the driver believes: from the fault
 to half a second after the command. `speed` is the largest joint speed as a share of the
 joint's limit in rig.toml, with the joint; `travel` how far the sole gets within 0.5 s;
-`drive` the force that the motors, beyond the arm's weight, put on whoever holds the
-sole; `hand` the force between arm and hand. No cell of the matrix may exceed speed 1,
+`drive` the force that the motors, beyond the arm's weight, put on the person who
+holds the sole; `hand` the force between arm and hand. No cell may exceed speed 1,
 travel 160 mm (100 mm where the fault stops the arm), drive 50 N and hand 80 N, but
 where a note says so. Measured by `python -m tests.faults.bounds`.
 """

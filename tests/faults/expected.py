@@ -15,7 +15,7 @@ class End(Enum):
     COMPLETE = "nothing happens"
     REFUSED = "refused, nothing created"
     NOT_ACTIVATED = "not activated, resumed"
-    TOLD = "told, the trial goes on or is redone"
+    TOLD = "reported, the trial goes on or is redone"
     REDONE = "trial interrupted and redone"
     UNTARED = "five tares refused, resumed"
     UNBRACKETED = "kept, the last tare is missing"
@@ -128,7 +128,7 @@ _IN_STOP = replace(
 def _module(word: str, idle: Cell) -> Row:
     """Return the row of a monitor of the safety module that strikes at once."""
     text = f"{_MODULE}{word} fault."
-    told_anew = replace(OK, why="the start-up tells the module its limits anew")
+    told_anew = replace(OK, why="the start-up sends the module its limits again")
     return _ending(text, _IDLE, "pendant-idle", preflight=told_anew, idle=idle)
 
 
@@ -280,11 +280,11 @@ TABLE: dict[str, Row] = {
         idle=_not_ready("The CAN interface refuses to send and receive."),
     ),
     "unacknowledged": _ending(
-        "Nobody on the CAN bus acknowledges; no reply",
+        "No device on the CAN bus acknowledges; no reply",
         _UNKNOWN,
         "can-silence",
-        preflight=_refused("Nobody on the CAN bus acknowledges."),
-        idle=_not_ready("Nobody on the CAN bus acknowledges"),
+        preflight=_refused("No device on the CAN bus acknowledges."),
+        idle=_not_ready("No device on the CAN bus acknowledges"),
     ),
     "bus-flooded": _row(OK),
     "bus-shared": _ending(
@@ -334,13 +334,13 @@ TABLE: dict[str, Row] = {
         idle=_not_ready("Puck 3 has not answered for 100 ms."),
     ),
     "safety-silent": _ending(
-        "The safety module has not told its mode for ",
+        "The safety module has not reported its mode for ",
         Arm(250, "driven", HOLD, "UNKNOWN - support it"),
         "safety-silent",
         preflight=_refused("The safety module does not answer"),
         idle=Cell(
             End.ENDED,
-            "The safety module has not told its mode for ",
+            "The safety module has not reported its mode for ",
             why="found when torques are made ready",
         ),
     ),
@@ -372,7 +372,7 @@ TABLE: dict[str, Row] = {
         Cell(End.TOLD, "Known-pose residual"),
         tare=Cell(End.TOLD, "Force varied "),
     ),
-    "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up anew")),
+    "ft-reboot": _lost_sensor(_FLAGGED, replace(OK, why="it is set up again")),
     "ft-clock-jump": _lost_sensor(_FLAGGED, replace(OK, why="the fit begins then")),
     "not-a-number": _ending(
         _NAN,

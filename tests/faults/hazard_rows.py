@@ -86,7 +86,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         ),
         "stuck": (
             "the last torque goes on while the arm moves",
-            "the loop stands still and somebody else asks for positions",
+            "the loop stands still and another program asks for positions",
             "not detected by the module where its heartbeat is longer than expected; the sensor's age stops a trial",
             "the loop goes on where it was; a trial is interrupted",
             ("stall-150-ms, heartbeat 1 s",),
@@ -128,7 +128,7 @@ ROWS: dict[str, dict[str, Fields]] = {
     },
     "safety mode": {
         "lost": (
-            "nobody knows whether the arm is driven or braked",
+            "it is unknown whether the arm is driven or braked",
             "cable or safety module dead",
             "no answer for 250 ms",
             "hold; brakes asked for after 400 ms",
@@ -332,7 +332,7 @@ ROWS: dict[str, dict[str, Fields]] = {
     },
     "console heartbeat": {
         "lost": (
-            "nobody watches the arm",
+            "no one watches the arm",
             "console killed, terminal closed",
             "the loop's parent is gone",
             "hold, brakes after 1 s",
@@ -366,7 +366,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             (_SERVER + "test_a_beating_console_and_recorder_leave_the_arm_alone",),
         ),
         "implausible": (
-            "a command nobody gave",
+            "a command that was not given",
             "an old command in the ring",
             "commands have numbers, a new loop takes none that is older",
             "it is not obeyed",
@@ -780,7 +780,7 @@ ROWS: dict[str, dict[str, Fields]] = {
         "stuck": (
             "friction of the arm before",
             "cables renewed, calibration not",
-            "a motor that swings to and fro six times a second: its friction is smaller than what is compensated",
+            "a motor that oscillates six times a second: its friction is smaller than what is compensated",
             "compensation ends for the session, told at the review",
             (),
             "1.2 times the friction at the largest share leaves no swing",
@@ -790,7 +790,7 @@ ROWS: dict[str, dict[str, Fields]] = {
             ),
         ),
         "drifting": (
-            "more is compensated than rubs",
+            "more is compensated than the friction",
             "warm or worn drives",
             "none; the share is 0.8 at most, of the lower end of what was found",
             "none needed up to a fifth",

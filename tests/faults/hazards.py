@@ -13,13 +13,13 @@ from tests.faults.hazard_rows import ROWS
 HEAD = """\
 # Hazards
 
-For every signal: what comes of it when it is lost, stuck, drifting, implausible or
-late; how that is noticed, what the program does, how far it gets until then, and the
-test that holds it. "not detected" stands where nothing notices, with what bounds it.
+For every signal: the hazard when it is lost, stuck, drifting,
+implausible or late; how it is detected, the reaction, the bound until then,
+and the test. "not detected" is stated with what bounds the hazard.
 Made by `python -m tests.faults.hazards > docs/hazards.md`. Bounds are the worst of the
 recording of a trial and of a move by the arm itself, measured on the simulated arm
 (docs/faults.md): largest joint speed as a share of the joint's limit, travel of the
-sole within 0.5 s, force of the motors on whoever holds the sole.
+sole within 0.5 s, force of the motors on the person who holds the sole.
 """
 
 

@@ -18,7 +18,7 @@ _ASTRAY = Cell(
 )
 _IN_VAIN = Cell(
     End.UNMEASURED,
-    " stands still although the arm is sent on.",
+    " does not turn although the arm is commanded to move.",
     why="seen when the move turns the motor in vain, at the latest in the next move",
 )
 _MET = Cell(

@@ -32,8 +32,8 @@ class TrueMotion:
         speed: largest joint speed as a share of the joint's limit in rig.toml.
         joint: the joint that had it, 1-7.
         travel: farthest that the sole was from its place within 0.5 s [m].
-        drive: largest force that the motors, beyond the arm's weight, put on whoever
-            holds the sole [N].
+        drive: largest force that the motors, beyond the arm's weight, put on the person
+            who holds the sole [N].
         hand: largest force between the arm and the operator's hand [N].
     """
 
@@ -62,7 +62,7 @@ class Promise:
 FALLING = Promise(
     speed=np.inf,
     travel=np.inf,
-    why="nobody drives the arm: without power it sinks, and a person has to support it",
+    why="the arm is not driven: without power it sinks, and a person has to support it",
 )
 LYING = Promise(
     speed=2.0,
@@ -72,7 +72,7 @@ LYING = Promise(
 )
 TWISTED = Promise(
     speed=2.0,
-    why="somebody twists the foot with 1.2 N m, nearly all that the motor of joint 7 "
+    why="a person twists the foot with 1.2 N m, nearly all that the motor of joint 7 "
     "may have; the lock gives way and the arm holds without it",
 )
 LIMP = Promise(

@@ -59,7 +59,7 @@ def test_a_process_that_stops_for_a_while_ends_the_trial_only(
         assert until(lambda: message in seen.output(), 5), seen.output()
         ends = [e["event"] for e in seen.journal()]
         assert "session-ended" not in ends
-        assert until(lambda: "T01 kept as interrupted" in seen.output(), 10)
+        assert until(lambda: "T01 saved as interrupted" in seen.output(), 10)
 
 
 def test_ctrl_c_ends_a_session_with_everything_put_away(tmp_path):

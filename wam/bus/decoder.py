@@ -66,7 +66,7 @@ def describe_id(can_id: int) -> str:
     if address.is_group and address.to == Group.PROPERTY:
         return f"{who} answers"
     if address.is_group and address.to in {kind.value for kind in ReplyKind}:
-        return f"{who} tells its {ReplyKind(Group(address.to)).name.lower()}"
+        return f"{who} reports its {ReplyKind(Group(address.to)).name.lower()}"
     if not address.is_group:
         return f"{who} to {node_name(address.to)}"
     known = address.to in _GROUP_NAMES
@@ -136,7 +136,7 @@ class BusReader:
             delay = self._answered((address.sender, answer), frame.utc_ns)
             return f"{who} {_describe(answer, frame.data)}{delay}"
         if address.is_group and address.to == Group.BUS:
-            return f"{who} tells every puck: {frame.data.hex(' ')}"
+            return f"{who} sends to every puck: {frame.data.hex(' ')}"
         return f"{who} sends {frame.can_id:03x} {frame.data.hex(' ')}"
 
     def _say_foreign(self, frame: LoggedFrame) -> str:
@@ -145,7 +145,7 @@ class BusReader:
             self.tally.errors.update(names)
             return f"the controller reports: {', '.join(sorted(names))}"
         self.tally.foreign += 1
-        return f"a frame no WAM uses: {frame.can_id:x}"
+        return f"not a WAM frame: {frame.can_id:x}"
 
     def _hear_host(
         self, frame: LoggedFrame, address: Address, spoken: list[DecodedLine]
@@ -272,14 +272,14 @@ def _describe(answer: ReplyKind, data: bytes) -> str:
         extra = "" if encoder is None else f", joint encoder {encoder}"
         return f"is at {decode_position(data)}{extra}"
     if answer is ReplyKind.JOINT_ENCODER:
-        return f"has its joint encoder at {decode_position(data)}"
+        return f"joint encoder at {decode_position(data)}"
     if answer is ReplyKind.TORQUE:
         torque, status = decode_torque(data)
         extra = f", status {status:08b}" if status else ""
-        return f"feels the torque {_triple(torque)} N m{extra}"
+        return f"measures the torque {_triple(torque)} N m{extra}"
     if answer is ReplyKind.FORCE:
-        return f"feels the force {_triple(decode_force(data))} N"
-    return f"feels the acceleration {_triple(decode_acceleration(data))} m/s2"
+        return f"measures the force {_triple(decode_force(data))} N"
+    return f"measures the acceleration {_triple(decode_acceleration(data))} m/s2"
 
 
 def _triple(values: tuple[float, float, float]) -> str:

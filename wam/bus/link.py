@@ -249,7 +249,7 @@ def broken_link(channel: str, error: Exception) -> LinkError:
     if is_full:
         return LinkFullError(
             f"CAN {channel}: the send queue is full.",
-            hint="Nobody acknowledges: is the arm powered, is the bus terminated?",
+            hint="No device acknowledges: is the arm powered, is the bus terminated?",
         )
     return LinkError(
         f"CAN {channel} broke: {error}.",

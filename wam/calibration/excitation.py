@@ -129,8 +129,8 @@ def _centres(model: ArmModel, space: FreeSpace) -> list[Array]:
     roomy = [centre for centre in candidates if _has_room(model, centre, space)]
     if len(roomy) < CENTRES:
         raise SettingsError(
-            f"Only {len(roomy)} of {len(candidates)} poses leave room to go to and "
-            f"fro ({CENTRES} are needed).",
+            f"Only {len(roomy)} of {len(candidates)} poses leave room to move back and "
+            f"forth ({CENTRES} are needed).",
             hint="Calibrate with a lower container: --terrain NAME.",
         )
     to_motors = np.linalg.inv(model.constants.j2mp)

@@ -90,7 +90,7 @@ def friction_from_toml(text: str, name: str) -> FrictionCalibration:
     """Return the calibration of a file called `name`.
 
     Raises:
-        SettingsError: the text is no calibration of friction.
+        SettingsError: the text is not a calibration of friction.
     """
     try:
         table = parse_toml(text)
@@ -162,6 +162,6 @@ def _seven(value: object) -> Array:
 
 def _wrong(name: str, what: str) -> SettingsError:
     return SettingsError(
-        f"{name} is no calibration of friction: {what}.",
+        f"{name} is not a calibration of friction: {what}.",
         hint="Make one with: traction calibrate friction. Nothing was started.",
     )

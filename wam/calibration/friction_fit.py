@@ -175,7 +175,7 @@ def check_friction(fit: FrictionFit) -> None:
     Raises:
         SettingsError: the held-out way contradicts it, or it is hardly known.
     """
-    hint = "Nobody may touch the arm. Is its gravity that of this foot?"
+    hint = "The arm must not be touched. Is the gravity model that of this foot?"
     worst = int(fit.residual.argmax())
     if not fit.residual[worst] <= LARGEST_RESIDUAL:
         raise SettingsError(

@@ -73,7 +73,7 @@ def gravity_from_toml(text: str, name: str) -> GravityCalibration:
     """Return the calibration of a file called `name`.
 
     Raises:
-        SettingsError: the text is no gravity calibration.
+        SettingsError: the text is not a gravity calibration.
     """
     try:
         table = parse_toml(text)
@@ -139,6 +139,6 @@ def _rows(values: Array) -> str:
 
 def _wrong(name: str, what: str) -> SettingsError:
     return SettingsError(
-        f"{name} is no gravity calibration: {what}.",
+        f"{name} is not a gravity calibration: {what}.",
         hint="Make one with: traction calibrate gravity. Nothing was started.",
     )

@@ -92,7 +92,7 @@ def tilted_pair(model: ArmModel, space: FreeSpace) -> list[Array]:
         if space.holds(tilted) and space.is_clear(model, upright, tilted):
             return [upright, tilted]
     raise SettingsError(
-        "The wrist cannot be turned anywhere: something is in its way.",
+        "No wrist pose is free of collision.",
         hint="Is the terrain's frame in matrix.toml right? traction calibrate terrain",
     )
 

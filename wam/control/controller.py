@@ -105,7 +105,7 @@ class FootController(ControlLaw):
             ((goal >= constants.q_lower) & (goal <= constants.q_upper)).all()
         )
         if not is_inside:
-            raise ValueError(f"{goal} is no pose within the joint stops")
+            raise ValueError(f"{goal} is not a pose within the joint stops")
         if not 0.0 < speed <= TOP_SPEED:
             raise ValueError(f"{speed} rad/s is not within 0..{TOP_SPEED}")
         now = reading.host_ns

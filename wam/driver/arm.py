@@ -290,6 +290,6 @@ def _check_taken(wanted: Sequence[int], reported: Sequence[int]) -> None:
     worst = max(abs(w - f) for w, f in zip(wanted, reported, strict=True))
     if worst > _ZEROED_WITHIN:
         raise DeviceFaultError(
-            f"The pucks report {list(reported)} counts, told were {list(wanted)}.",
+            f"The pucks report {list(reported)} counts, set were {list(wanted)}.",
             hint="The arm must not move while it is zeroed. Zero it again.",
         )

@@ -96,7 +96,7 @@ def _check_bus(condition: BusCondition) -> None:
         )
     if condition is BusCondition.UNHEARD:
         raise PreflightError(
-            "Nobody on the CAN bus acknowledges.",
+            "No device on the CAN bus acknowledges.",
             hint="Is the arm powered, is the bus terminated, is the cable in?",
         )
 

@@ -40,7 +40,7 @@ def check_home(error: Array) -> None:
     if abs(error[joint]) > HOME_LIMIT:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where home was last "
-            f"time (limit {HOME_LIMIT}), as far as its motor's absolute encoder tells.",
+            f"time (limit {HOME_LIMIT}), by its motor's absolute encoder.",
             arm_state="idle",
             hint="Put the arm against its stops and zero it again. If a cable was "
             "tensioned or a motor changed, take mech_at_home out of rig.toml.",
@@ -83,7 +83,7 @@ def check_zero(error: Array) -> None:
     if abs(error[joint]) > HOME_LIMIT:
         raise PreflightError(
             f"Joint {joint + 1} is {error[joint]:+.3f} rad from where its position "
-            f"puts it (limit {HOME_LIMIT}), says its motor's absolute encoder.",
+            f"puts it (limit {HOME_LIMIT}), by its motor's absolute encoder.",
             arm_state="idle",
             hint="The zero is wrong: put the arm at home, then: traction zero.",
         )

@@ -219,7 +219,7 @@ class StartUp:
         reached = {tuple(_number(p.node, name, p.vers) for name in "PT") for p in pucks}
         if len(reached) > 1:
             raise DeviceFaultError(
-                "The pucks' firmwares do not fit together: "
+                "The firmware versions of the pucks are incompatible: "
                 f"{' '.join(str(puck.vers) for puck in pucks)} number P or T "
                 "differently.",
                 hint="Ask Barrett for one firmware on all seven pucks.",
@@ -229,8 +229,8 @@ class StartUp:
         table = names(Device.MOTOR, nearest_documented(puck.vers))
         if "POLES" not in table.values():
             self._warnings.append(
-                f"Puck {puck.node} with firmware {puck.vers} has no POLES: a wrist is "
-                "taken for granted, gimbals would not be noticed."
+                f"Puck {puck.node} with firmware {puck.vers} has no POLES: a wrist "
+                "is assumed, gimbals would not be detected."
             )
             return
         poles = self._get(puck.node, "POLES", puck.vers)

@@ -55,7 +55,7 @@ def _switch_power(arm: Program, session: LedSession) -> None:
 
 
 def _interrupted(session: LedSession) -> None:
-    session.program.expect("kept as interrupted", PATIENCE)
+    session.program.expect("saved as interrupted", PATIENCE)
 
 
 def _again(session: LedSession) -> None:

@@ -66,7 +66,7 @@ def test_too_few_finite_rows_are_refused():
 
 @pytest.mark.parametrize("name", ["", "x" * 61, "S0\n"])
 def test_a_terrain_needs_a_usable_name(name):
-    with pytest.raises(SettingsError, match="no name for a terrain"):
+    with pytest.raises(SettingsError, match="not a name for a terrain"):
         TractionSeries(name, "a.csv", *columns())
 
 

@@ -92,7 +92,7 @@ def test_units_unknown_or_contradicted_are_refused(tmp_path, header, units, reas
 )
 def test_a_column_that_stands_there_twice_is_refused(tmp_path, header):
     path = write(tmp_path, header + "\n0,0.1,100,2,1\n1,0.1,100,2,1\n2,0.1,100,2,1\n")
-    with pytest.raises(SettingsError, match="v_t stands there twice"):
+    with pytest.raises(SettingsError, match="v_t occurs twice"):
         load_tables([path])
 
 

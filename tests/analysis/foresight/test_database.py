@@ -58,5 +58,5 @@ def test_foresight_survives_a_file_that_is_written_back(tmp_path):
 )
 def test_a_file_with_impossible_foresight_is_refused(tmp_path, foresight):
     path = saved(tmp_path, database(foresight))
-    with pytest.raises(SettingsError, match=re.escape("no terrain database")):
+    with pytest.raises(SettingsError, match=re.escape("not a terrain database")):
         load(path)

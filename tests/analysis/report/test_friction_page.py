@@ -74,13 +74,13 @@ def test_every_joint_has_a_cell_in_every_row():
 def test_a_joint_that_rubs_more_than_before_is_named(model):
     now = calibration(scale=worn(4))
     (text,) = change_sentences(page(model, now, [calibration(BEFORE)]))
-    assert text.startswith(f"Joint 4 rubs 20% more than on {BEFORE}")
+    assert text.startswith(f"Friction of joint 4 is 20% higher than on {BEFORE}")
 
 
 def test_a_joint_that_rubs_less_than_before_is_named(model):
     earlier = [calibration(BEFORE, scale=worn(1))]
     (text,) = change_sentences(page(model, calibration(), earlier))
-    assert text.startswith("Joint 1 rubs 17% less")
+    assert text.startswith("Friction of joint 1 is 17% lower")
 
 
 def test_a_change_within_the_intervals_is_none():
@@ -96,13 +96,13 @@ def test_it_is_the_last_calibration_that_changes_are_stated_against(model):
 def test_every_earlier_calibration_has_its_line(model):
     years = ["2025-01-01T08:00:00Z", "2026-01-01T08:00:00Z"]
     earlier = [calibration(year) for year in years]
-    table = table_of(page(model, calibration(), earlier), "Against earlier ones")
+    table = table_of(page(model, calibration(), earlier), "Earlier calibrations")
     assert [row[0] for row in table.rows] == [*years, NOW]
 
 
 def test_a_first_calibration_is_compared_with_none(model):
     first = page(model, calibration())
-    assert "Against earlier ones" not in {t.name for t in friction_tables(first)}
+    assert "Earlier calibrations" not in {t.name for t in friction_tables(first)}
     assert change_sentences(first) == []
 
 
@@ -134,4 +134,4 @@ def test_the_page_says_of_which_arm_it_is(html):
 
 
 def test_what_has_changed_stands_before_the_numbers(html):
-    assert html.index("Joint 1 rubs") < html.index("break-away")
+    assert html.index("Friction of joint 1") < html.index("break-away")

@@ -184,7 +184,7 @@ def test_markup_in_a_drawing_stays_text(hostile_study):
 def test_a_study_without_models_still_has_a_report(make_series, moving, tmp_path):
     study = run_study({"S0": [make_series(moving)]}, StudyOptions(), simulated=False)
     page = Page(write_report(study, tmp_path, context(is_foreign=True)).read_text())
-    assert "What could not be done" in page.text
+    assert "Analyses that were not completed" in page.text
     assert "FOREIGN" in page.text
     drawn = [a.get("aria-label", "") for a in page.attributes("div")]
     assert any("velocity below" in alt for alt in drawn)  # Fig. 4 needs no model

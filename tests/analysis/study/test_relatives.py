@@ -1,4 +1,4 @@
-"""What other terrains tell about one, on drawn terrains that are alike or not."""
+"""Transfer from other terrains about one, on drawn terrains that are alike or not."""
 
 import numpy as np
 import pytest

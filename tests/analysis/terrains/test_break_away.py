@@ -80,7 +80,7 @@ def test_a_database_of_before_break_away_is_still_read(path, tmp_path):
         ({"law": [1.0, 1.0, -1.0, 0.0]}, "spread"),
         ({"kind": "magic"}, "magic"),
         ({"v_slip": float("inf")}, "positive"),
-        ({"draws": 3}, "no terrain database"),
+        ({"draws": 3}, "not a terrain database"),
     ],
 )
 def test_a_damaged_break_away_model_is_refused(path, tmp_path, change, said):

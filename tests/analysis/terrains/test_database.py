@@ -154,7 +154,7 @@ def test_quantiles_that_do_not_increase_are_refused(tmp_path, value):
     content = changed()
     model = content["terrains"]["S0"]["models"]["gp_se_trial"]
     model["quantiles"][-1][0][0] = value
-    with pytest.raises(SettingsError, match="no terrain database"):
+    with pytest.raises(SettingsError, match="not a terrain database"):
         load(saved(tmp_path, content))
 
 

@@ -264,7 +264,7 @@ def test_an_unknown_terrain_and_an_unknown_model_are_named(path):
         ({"axes": {"F_n": [0.0, float("nan")], "v_t": [0.1, 0.2]}}, "not increase"),
         ({"default": "oracle"}, "lacks the model"),
         ({"terrains": {"S0": {"kind": "small"}}}, "is missing"),
-        ({"terrains": 3}, "no terrain database"),
+        ({"terrains": 3}, "not a terrain database"),
     ],
 )
 def test_a_file_that_is_no_database_is_refused(path, tmp_path, change, said):
@@ -279,7 +279,7 @@ def test_a_file_that_is_no_database_is_refused(path, tmp_path, change, said):
 def test_other_texts_are_refused(tmp_path, text):
     bad = tmp_path / "bad.json"
     bad.write_text(text)
-    with pytest.raises(SettingsError, match="no terrain database"):
+    with pytest.raises(SettingsError, match="not a terrain database"):
         load(bad)
 
 
@@ -369,7 +369,7 @@ def test_a_damaged_part_of_a_database_is_refused(path, tmp_path, change):
     change(content)
     bad = tmp_path / "bad.json"
     bad.write_text(json.dumps(content))
-    with pytest.raises(SettingsError, match="no terrain database"):
+    with pytest.raises(SettingsError, match="not a terrain database"):
         load(bad)
 
 

@@ -172,7 +172,7 @@ def test_an_arm_that_is_held_while_it_is_weighed_is_no_measurement(
     monkeypatch.setattr(walk.PoseWalk, "rest", rest_held)
     done, rig = calibrate(tmp_path / "gravity.toml", "--poses", 3, press=press)
     assert done.code == 3, done.err
-    assert "while it was weighed (limit 0.02)" in done.err
+    assert "during the measurement (limit 0.02)" in done.err
     assert rig.network.safety_mode is SafetyMode.IDLE
     assert not list(tmp_path.iterdir())
 

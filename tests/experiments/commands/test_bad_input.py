@@ -151,7 +151,7 @@ SETTINGS = [
     (
         "matrix",
         ('name = "S10"', 'name = "S0"'),
-        "matrix.toml: terrain 'S0' stands there twice.",
+        "matrix.toml: terrain 'S0' occurs twice.",
     ),
     (
         "matrix",
@@ -162,13 +162,13 @@ SETTINGS = [
     (
         "rig",
         ("foot_speed", "foot_sped"),
-        "rig.toml: limits.foot_sped is no setting Traction knows - did you mean "
+        "rig.toml: limits.foot_sped is not a setting Traction knows - did you mean "
         "foot_speed? (line ",
     ),
     (
         "rig",
         ("[limits]", "[limits]\nhaste = 1"),
-        "rig.toml: limits.haste is no setting Traction knows (line ",
+        "rig.toml: limits.haste is not a setting Traction knows (line ",
     ),
     (
         "rig",
@@ -237,7 +237,7 @@ def test_settings_that_are_no_text_are_refused(tmp_path):
     config = tmp_path / "rig.toml"
     config.write_bytes(b"\xff\x00\xff")
     done = traction("status", "--config", config)
-    assert "cannot be read (it is no text)" in refusal(done)
+    assert "cannot be read (it is not text)" in refusal(done)
 
 
 # --- report ---------------------------------------------------------------------------
@@ -329,7 +329,7 @@ def test_live_and_simulated_sessions_do_not_mix(copied):
     shutil.copytree(folder, live)
     for names in (("S001", "S002"), ("--all",)):
         done = traction("report", *names, "--data", copied)
-        assert refusal(done).startswith("S001 is simulated. Reports do not mix")
+        assert refusal(done).startswith("S001 is simulated. A report cannot mix")
 
 
 @pytest.mark.parametrize("seed", ["-1", "x", "1" * 30])
@@ -366,7 +366,7 @@ def table(path, rows=400):
 
 
 def test_a_fit_of_a_missing_file_is_refused(tmp_path):
-    done = traction("fit", tmp_path / "no.csv", "--out", tmp_path / "out")
+    done = traction("fit", tmp_path / "no.csv", "--to", tmp_path / "out")
     assert "no.csv: cannot be read (No such file or directory)." in refusal(done)
     assert not (tmp_path / "out").exists()
 
@@ -374,21 +374,21 @@ def test_a_fit_of_a_missing_file_is_refused(tmp_path):
 def test_a_fit_of_a_table_without_its_columns_names_them(tmp_path):
     path = tmp_path / "t.csv"
     path.write_text("time,speed\n0,1\n")
-    done = traction("fit", path, "--out", tmp_path / "out")
+    done = traction("fit", path, "--to", tmp_path / "out")
     assert "no column t, v_t, F_n, F_t; it has time, speed" in refusal(done)
 
 
 def test_a_fit_into_a_folder_that_is_a_file_is_refused(tmp_path):
     place = tmp_path / "occupied"
     place.write_text("precious")
-    done = traction("fit", table(tmp_path / "t.csv"), "--out", place)
+    done = traction("fit", table(tmp_path / "t.csv"), "--to", place)
     assert "cannot be written" in refusal(done)
     assert place.read_text() == "precious"
 
 
 def test_a_fit_with_a_strange_list_of_columns_is_refused(tmp_path):
     done = traction(
-        "fit", tmp_path / "t.csv", "--out", tmp_path, "--columns", "t=a,speed=b"
+        "fit", tmp_path / "t.csv", "--to", tmp_path, "--columns", "t=a,speed=b"
     )
     assert "'speed=b' does not name a column" in refusal(done)
 

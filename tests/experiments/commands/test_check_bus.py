@@ -22,9 +22,9 @@ from wam.bus.log import BusTraffic
         (0x401, "host to pucks 1-4"),
         (0x00A, "host to safety module"),
         (0x003, "host to puck 3"),
-        (0x463, "puck 3 tells its position"),
+        (0x463, "puck 3 reports its position"),
         (0x426, "puck 1 answers"),
-        (0x50A, "F/T sensor tells its force"),
+        (0x50A, "F/T sensor reports its force"),
         (0x540, "safety module to every puck"),
         (0x7FF, "node 31 to group 31"),
     ],
@@ -86,7 +86,7 @@ def listen(tmp_path, *ids):
 def test_who_talks_is_told_with_its_rate(tmp_path):
     done = listen(tmp_path, 0x463)
     assert done.code == 0
-    assert "puck 3 tells its position" in done.out
+    assert "puck 3 reports its position" in done.out
     assert "frames/s" in done.out
     assert "masters" in done.out
     assert "another program" not in done.out
@@ -98,7 +98,7 @@ def test_another_master_is_told(tmp_path):
 
 
 def test_a_silent_bus_is_told(tmp_path):
-    assert "silent, as an arm is that nobody asks" in listen(tmp_path).out
+    assert "silent, as an arm is while no host polls it" in listen(tmp_path).out
 
 
 class DeafBus(can.BusABC):
@@ -138,7 +138,7 @@ def served_by(monkeypatch):
 def test_what_the_controller_reports_is_told_with_what_it_means(served_by):
     served_by(DeafBus())
     done = traction("check", "--bus", 0.1)
-    assert "passive 1. Nobody on the CAN bus acknowledges." in done.out
+    assert "passive 1. No device on the CAN bus acknowledges." in done.out
 
 
 def test_a_bus_that_breaks_ends_with_its_exit_code(served_by):

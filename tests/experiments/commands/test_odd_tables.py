@@ -53,7 +53,7 @@ def fitted(folder):
     """Return (what was printed, the page's text, fits.json) of all odd tables."""
     np.savez(folder / "odd.npz", **odd_trials())
     stones = ("--stones", "load=none,holes=small,twice=small")
-    done = traction("fit", folder / "odd.npz", "--out", folder / "out", *stones)
+    done = traction("fit", folder / "odd.npz", "--to", folder / "out", *stones)
     assert done.code == 0, done.err
     page = (folder / "out/report/index.html").read_text()
     fits = json.loads((folder / "out/fits.json").read_text())
@@ -81,7 +81,7 @@ def odd(tmp_path_factory):
         "100% sticking",
         "stuck: 0 trial with kept samples",
         "holes: 60 rows were not finite; dropped",
-        "twice: 1400 rows were there twice; dropped",
+        "twice: 1400 duplicate rows were dropped",
         "short, fold 1, Tustin: 2 samples are too few",
         "short, fold 1, GP (SE): No Gaussian process from 2 samples",
         "its health and its limits are unknown",
@@ -116,7 +116,7 @@ def test_what_cannot_be_fitted_has_no_number(odd, terrain):
 
 def test_warnings_are_said_where_the_program_runs(odd):
     out, _, _ = odd
-    assert "▲ twice: 1400 rows were there twice; dropped." in out
+    assert "▲ twice: 1400 duplicate rows were dropped." in out
 
 
 @pytest.mark.long

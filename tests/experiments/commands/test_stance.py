@@ -15,7 +15,7 @@ def test_a_real_arm_takes_no_stances(tmp_path):
     done = traction("stance", "S0", "--policy", "none", "--data", tmp_path)
 
     assert done.code == 3
-    assert "A real arm takes no stances" in done.err
+    assert "Stances are not available on a real arm" in done.err
     assert "The arm was not touched" in done.err
     assert list_sessions(tmp_path) == []
 

@@ -37,10 +37,10 @@ def test_every_terrain_has_the_five_models_and_that_of_a_new_trial(exported):
 def test_a_recorded_trial_is_recognised(exported):
     data, path = exported
     (trial,) = data.glob("sessions/*_Tf.fake/trials/T02.mcap")
-    done = traction("identify", trial, "--models", path, "--window", 50)
+    done = traction("identify", trial, "--terrain-db", path, "--samples", 50)
     assert done.code == 0, done.err
     assert "0.5 s windows" in done.out
-    told = traction("identify", trial, "--models", path, "--window", 50, "--json")
+    told = traction("identify", trial, "--terrain-db", path, "--samples", 50, "--json")
     (answer,) = json.loads(told.out)
     assert answer["terrain"] == "Tf"
     assert answer["recognition"]["terrains"] == ["S0", "Tf"]
@@ -65,6 +65,6 @@ def test_an_export_is_of_one_kind(options):
 
 def test_a_file_that_is_no_database_is_refused(exported, tmp_path):
     (tmp_path / "db.json").write_text("{}")
-    done = traction("identify", exported[1], "--models", tmp_path / "db.json")
+    done = traction("identify", exported[1], "--terrain-db", tmp_path / "db.json")
     assert done.code == 2
     assert "no terrain database" in done.err

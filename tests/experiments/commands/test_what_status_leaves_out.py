@@ -45,7 +45,7 @@ def test_a_renamed_session_is_said_to_be_left_out(config, data):
 def test_a_session_of_an_unknown_terrain_is_said_to_be_left_out(config, data):
     folder = only_session(data)
     folder.rename(folder.with_name(folder.name.replace("TF", "MOON")))
-    assert "MOON is no terrain of the matrix" in status(config, data).err
+    assert "MOON is not a terrain of the matrix" in status(config, data).err
 
 
 def test_a_condition_that_matches_nothing_is_said(config, data):

@@ -1,5 +1,6 @@
 """Lines for people: broken between words where there is a terminal."""
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,6 +17,15 @@ def test_a_line_is_broken_between_words_and_indented():
 def test_a_path_longer_than_the_terminal_stays_whole():
     path = "/data/" + "x" * 40 + "-y/events.jsonl"
     assert path in wrapped(f"Log: {path}", 30).split("\n")
+
+
+@pytest.mark.parametrize("width", [58, 60, 62, 64, 80])
+@pytest.mark.parametrize("state", ["holding", "UNKNOWN - support it", "damping"])
+def test_what_the_arm_does_is_never_on_another_line(width, state):
+    text = f"T02 stopped at 2.0 s: F/T sample 21 ms old (limit 20). ARM: {state}. Push."
+    lines = wrapped(text, width).split("\n")
+    assert " ".join(lines) == text
+    assert any(f"ARM: {state.split()[0]}" in line for line in lines)
 
 
 @given(st.lists(st.text("abc,.-", min_size=1, max_size=9)), st.integers(12, 90))

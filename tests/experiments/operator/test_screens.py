@@ -119,6 +119,12 @@ def test_a_trial_that_has_just_begun_is_shown_too():
 SCALE = BarScale(64.0, 0.0, 30.0, "N", ".1f")
 
 
+@pytest.mark.parametrize("value", [-0.04, 0.04, -0.0])
+def test_a_number_that_rounds_to_zero_has_no_sign(value):
+    assert SCALE.number(value) == "0.0 N"
+    assert SCALE.number(-0.06) == "-0.1 N"
+
+
 def test_the_scale_is_fixed_and_shows_a_tenth_of_the_limit():
     assert sparkline(np.array([0.0, 1.0, 6.4, 16.0, 36.0, 64.0, 640.0]), 7, SCALE) == (
         "▁▂▃▅▆██"
@@ -220,7 +226,7 @@ def test_a_trace_stands_above_the_median_of_the_kept_ones():
     own = WayTrace("F_t", "N", np.array([0.0, 7.0, np.nan, 14.0]))
     kept = [np.array([7.0, 7.0, 7.0, np.nan]), np.array([7.0, 0.0, 7.0, np.nan])]
     words, mine, theirs = trace_lines(own, [*kept, np.zeros(9)], "T03", 80)
-    assert words == "F_t over the way, full bar 14.0 N; kept = median of 2"
+    assert words == "F_t over displacement, full bar 14.0 N; kept: median of 2"
     assert mine == " T03  ▁▅ █"
     assert theirs == " kept ▅▃▅ "
 

@@ -54,7 +54,7 @@ def test_a_folder_behind_a_link_is_not_entered(folder, tmp_path_factory):
 def test_a_list_that_is_none_is_refused_with_its_line(folder, content):
     with (folder / SUMS).open("ab") as file:
         file.write(content)
-    with pytest.raises(TrialFileError, match="line 3 is no checksum"):
+    with pytest.raises(TrialFileError, match="line 3 is not a checksum"):
         changed_files(folder)
 
 

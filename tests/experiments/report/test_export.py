@@ -268,7 +268,7 @@ def test_kept_tables_are_known_to_be_prepared(exported, in_parquet, recorded, fo
 
 @pytest.mark.slow
 def test_fit_reports_an_exported_folder_as_simulated(in_parquet, tmp_path):
-    done = traction("fit", in_parquet, "--out", tmp_path / "fit")
+    done = traction("fit", in_parquet, "--to", tmp_path / "fit")
     assert done.code == 0
     fits = json.loads((tmp_path / "fit" / "fits.json").read_text())
     assert (list(fits["terrains"]), fits["simulated"]) == (["TF"], True)
@@ -279,7 +279,7 @@ def test_fit_mixes_no_simulated_with_recorded_tables(exported, recorded, tmp_pat
     name = f"{recorded.folder.name}/T01.csv"
     real = tmp_path / "real.csv"
     real.write_bytes((exported / name).read_bytes())
-    done = traction("fit", exported / name, real, "--out", tmp_path / "fit")
+    done = traction("fit", exported / name, real, "--to", tmp_path / "fit")
     assert done.code == 2
     assert not (tmp_path / "fit").exists()
 

@@ -81,7 +81,7 @@ def test_the_foot_pushes_as_hard_as_a_serial_sensor_would_say(trial, first_trial
 def test_the_bus_log_has_an_answer_to_every_question_for_the_wrench(session):
     lines = traction("replay", "--can", session[2], "--summary").out.splitlines()
     # The absent nodes of the enumeration; of 31, nine are there.
-    assert " 22 never came; 0 came unasked" in lines[0]
+    assert " 22 did not come; 0 came without a request" in lines[0]
 
 
 def test_a_silent_sensor_is_refused_before_anything_is_created(on_bus, tmp_path):

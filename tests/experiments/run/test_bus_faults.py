@@ -39,7 +39,7 @@ ENDINGS = {
         IDLE,
     ),
     "unacknowledged": (
-        "Nobody on the CAN bus acknowledges; no reply from the arm for ",
+        "No device on the CAN bus acknowledges; no reply from the arm for ",
         "ARM: UNKNOWN - support it, press Shift-idle.",
         UNKNOWN,
         IDLE,

@@ -85,7 +85,7 @@ def test_other_models_do_not_pass_for_those_of_the_record(foreseen, tmp_path):
     )
     assert done.code == 1
     assert "other models" in done.err
-    assert "first other state" in done.err
+    assert "first state that differs" in done.err
 
 
 def test_a_session_without_a_database_records_no_foresight(first_trial):
@@ -155,4 +155,4 @@ def test_a_session_that_is_opened_again_is_foreseen_as_before(
     assert done.code == 0, done.err
     trial = only_session(data) / "trials" / "T01.mcap"
     assert TrialReader(trial).has_foresight is is_there
-    assert ("Nothing is foreseen." in done.out) is not is_there
+    assert ("Foresight is off." in done.out) is not is_there

@@ -170,7 +170,7 @@ def test_a_redone_session_is_complete_again(redone):
     [
         ("T09", "S001 cannot be opened: T09 was never recorded."),
         ("T01a", "T01a is one attempt; a trial is repeated by its number."),
-        ("first", "'first' is no trial."),
+        ("first", "'first' is not a trial."),
     ],
 )
 def test_a_redo_of_no_trial_is_refused(recorded, trial, text):

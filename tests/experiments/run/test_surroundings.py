@@ -164,5 +164,5 @@ def test_poses_are_counted_before_any_is_looked_at(tmp_path, count):
 
 
 def test_poses_are_not_read_from_a_device():
-    with pytest.raises(SettingsError, match="no file"):
+    with pytest.raises(SettingsError, match="not a file"):
         read_poses(Path("/dev/zero"), SETTINGS, ROWS["TF"], ANY)

@@ -148,5 +148,5 @@ def test_a_broken_neighbour_does_not_cost_a_complete_session_its_exit_code(
     monkeypatch.setattr("experiments.run.session.next_steps", refuse)
     done = run_short(config, tmp_path)
     assert (done.code, done.err) == (0, "")
-    assert "What comes next is not known" in done.out
+    assert "The next terrain is unknown" in done.out
     assert "cannot be read (EIO)" in done.out

@@ -93,7 +93,7 @@ def test_a_trial_whose_file_has_changed_is_not_kept(copied):
     [
         ("T09", "There is no T09 in S001. Trials: T01 T02."),
         ("T01b", "There is no T01b in S001. Trials: T01 T02."),
-        ("../T01", "'../T01' is no trial."),
+        ("../T01", "'../T01' is not a trial."),
     ],
 )
 def test_a_verdict_on_no_trial_is_refused(copied, trial, text):

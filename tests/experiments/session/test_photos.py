@@ -1,5 +1,6 @@
 """The photo of the bed: taken or dropped, hashed, dated, shown; never worth a trial."""
 
+import hashlib
 import io
 import json
 import os
@@ -8,13 +9,15 @@ import sys
 import pytest
 from PIL import Image
 
-from acquisition.errors import SettingsError
+from acquisition.errors import SettingsError, TrialFileError
 from experiments.run.photo import collect_photo, take_photo
 from experiments.session.photos import (
+    LARGEST,
     Camera,
     PhotoError,
     add_photo,
     has_photo,
+    kept_photo,
     photos_of,
     thumbnail,
 )
@@ -71,6 +74,13 @@ def test_a_command_without_a_photo_says_why(tmp_path, body, why):
         Camera(command(tmp_path, body), None, 0.3 if "time" in body else 10.0).take()
 
 
+def test_a_photo_that_could_not_be_read_back_is_not_taken(tmp_path):
+    body = f"open(path, 'wb').write(b'\\xff\\xd8\\xff' + bytes({LARGEST}))"
+    camera = Camera(command(tmp_path, body), None, 10.0)
+    with pytest.raises(PhotoError, match=f"{LARGEST} at most"):
+        camera.take()
+
+
 def test_a_program_that_is_not_there_is_named():
     with pytest.raises(PhotoError, match="nowhere-at-all: No such file"):
         Camera("nowhere-at-all {path}", None, 1.0).take()
@@ -118,6 +128,44 @@ def test_a_report_shows_a_small_photo_with_time_and_checksum(folder):
     assert Image.open(io.BytesIO(jpeg)).size == (280, 210)
     assert len(jpeg) < 12_000
     assert problems == []
+
+
+def test_a_photo_is_read_as_it_was_taken(folder):
+    path = folder.trials / "T01.json"
+    assert kept_photo(path) is None
+    add_photo(folder, FIRST, photo(), 0, "command")
+    kept = kept_photo(path)
+    assert (kept.name, kept.content) == ("T01.photo.jpg", photo())
+    assert kept.taken_utc == "1970-01-01T00:00:00+00:00"
+    assert kept.sha256 == digest(folder.trials / kept.name)
+
+
+@pytest.mark.parametrize(
+    ("content", "fields", "why"),
+    [
+        (photo("PNG"), {}, "not a jpg"),
+        (b"#!/bin/sh", {}, "neither JPEG nor PNG"),
+        (photo(), {"taken_utc": "soon"}, "no time"),
+        (photo(), {"taken_utc": None}, "no time"),
+    ],
+)
+def test_what_only_looks_like_a_photo_is_refused(folder, content, fields, why):
+    add_photo(folder, FIRST, photo(), 0, "command")
+    (folder.trials / "T01.photo.jpg").write_bytes(content)
+    path = folder.trials / "T01.json"
+    about = sidecar(path)
+    about["photo"] |= {"sha256": hashlib.sha256(content).hexdigest(), **fields}
+    path.write_text(json.dumps(about))
+    with pytest.raises(PhotoError, match=why):
+        kept_photo(path)
+
+
+def test_no_more_of_a_photo_is_read_than_a_photo_may_have(folder):
+    add_photo(folder, FIRST, photo(), 0, "command")
+    with (folder.trials / "T01.photo.jpg").open("r+b") as file:
+        file.truncate(LARGEST + 1)
+    with pytest.raises(TrialFileError, match=f"the limit is {LARGEST}"):
+        kept_photo(folder.trials / "T01.json")
 
 
 def test_a_changed_or_missing_photo_is_named_and_not_shown(folder):

@@ -134,7 +134,7 @@ def test_a_terminal_that_another_program_has_is_not_read(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("content", "why"), [(b"\xff\xfe", "no text"), (b"#" * 1_000_001, "1 MB")]
+    ("content", "why"), [(b"\xff\xfe", "not text"), (b"#" * 1_000_001, "1 MB")]
 )
 def test_a_script_that_is_no_small_text_is_refused(tmp_path, content, why):
     path = tmp_path / "presses.txt"

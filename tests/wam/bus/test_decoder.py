@@ -46,17 +46,18 @@ def log():
             "host sets torques of pucks 1-4: -65 -878 556 -750",
         ),
         ("402 AA 02 9C 02 1F F1 40 00", "host sets torques of pucks 5-7: 167 33 -59"),
-        ("540 88 00 02 00", "safety module tells every puck: 88 00 02 00"),
+        ("540 88 00 02 00", "safety module sends to every puck: 88 00 02 00"),
         ("546 AB 00 49 42 79 00", "safety module answers PEN = 00794249, UNASKED"),
         ("443 3F 70 1F", "puck 2 is at -36833, UNASKED"),
         (
             "483 3F 70 88 02 80 00",
             "puck 4 is at -36728, joint encoder 163840, UNASKED",
         ),
-        ("50A 00 01 80 FD 31 F6", "F/T sensor feels the force (1, -2.5, -9.809) N"),
+        ("50A 00 01 80 FD 31 F6", "F/T sensor measures the force (1, -2.5, -9.809) N"),
         (
             "50B 9A 01 00 FC 3D 00 84",
-            "F/T sensor feels the torque (0.1001, -0.25, 0.01489) N m, status 10000100",
+            "F/T sensor measures the torque (0.1001, -0.25, 0.01489) N m, status "
+            "10000100",
         ),
         ("426 05", "puck 1: A property reply has 4 or 6 bytes: 05."),
         ("7E1 01", "node 31 sends 7e1 01"),
@@ -148,7 +149,7 @@ def test_the_sensor_answers_a_question_with_two_frames(log):
 
 
 def test_frames_of_other_kinds_are_counted(log):
-    assert "no WAM uses" in log(0, "1FFFFFFF", is_of_wam=False)
+    assert "not a WAM frame" in log(0, "1FFFFFFF", is_of_wam=False)
     assert log.reader.tally.foreign == 1
 
 

@@ -67,7 +67,7 @@ def test_a_damaged_file_is_refused_by_name(example_tool, spoil):
     whole = gravity_to_toml(calibration(example_tool))
     spoiled = spoil(whole)
     assert spoiled != whole
-    with pytest.raises(SettingsError, match=r"my\.toml is no gravity calibration"):
+    with pytest.raises(SettingsError, match=r"my\.toml is not a gravity calibration"):
         gravity_from_toml(spoiled, "my.toml")
 
 

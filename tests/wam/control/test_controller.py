@@ -190,7 +190,7 @@ def test_a_speed_that_is_none_is_refused(law, speed):
 @pytest.mark.parametrize("goal", [np.full(7, 4.0), np.full(7, np.nan), np.zeros(6)])
 def test_a_goal_that_cannot_be_reached_is_refused(law, goal):
     law.enter(ArmState.HOLD, reading(0.0))
-    with pytest.raises(ValueError, match="is no pose"):
+    with pytest.raises(ValueError, match="is not a pose"):
         law.move_to(goal, 0.5, reading(0.0))
 
 
