@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from hashlib import blake2b
 from typing import TypeVar, overload
 
 import numpy as np
@@ -25,6 +26,7 @@ from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
 T = TypeVar("T")
 Digests = Mapping[str, Mapping[int, str]]
+_DERIVED = ("_digests", "_wholes")  # of a plan
 Prepared = Mapping[str, Sequence[PreparedTrial]]
 
 
@@ -92,8 +94,7 @@ class FoldResult:
 class FoldPlan(Sequence[FoldTask]):
     """The folds of a study, each made from the samples of all when it is asked for.
 
-    The samples of all trials stand one after the other in three arrays, so that a plan
-    grows with the trials and a worker that has it needs no more than a number.
+    A plan grows with the trials, and a worker that has it needs no more than a number.
 
     Args:
         trials: what models are fitted to.
@@ -144,22 +145,26 @@ class FoldPlan(Sequence[FoldTask]):
 
     def outline(self, index: int) -> tuple[object, ...]:
         """Return what tells a fold from others, digests in the place of samples."""
-        terrain, fold = self._places[index]
-        fitted, tested = self._digests
-        training = [fitted[terrain][k] for k in self._others(terrain, fold)]
+        (terrain, fold), (_, tested) = self._places[index], self._digests
         met = self._met(terrain, fold, lambda name, k: tested[name][k])
         own = tested[terrain][fold]
-        return ("fold", terrain, fold, training, own, met, self._options)
+        return ("fold", terrain, fold, self._wholes[terrain], own, met, self._options)
 
     def __getstate__(self) -> dict[str, object]:
         """Return what a worker needs."""
-        return {k: v for k, v in vars(self).items() if k != "_digests"}
+        return {k: v for k, v in vars(self).items() if k not in _DERIVED}
 
     @cached_property
     def _digests(self) -> tuple[Digests, Digests]:
-        fitted = self._fitted.digests()
-        is_same = self._tested is self._fitted
-        return fitted, fitted if is_same else self._tested.digests()
+        return self._fitted.digests(), self._tested.digests()
+
+    @cached_property
+    def _wholes(self) -> dict[str, str]:
+        """Digests of all trials of every terrain: with a fold's number its training."""
+        return {
+            terrain: blake2b(repr(sorted(of.items())).encode()).hexdigest()
+            for terrain, of in self._digests[0].items()
+        }
 
     def _others(self, terrain: str, fold: int) -> list[int]:
         return [k for k in self._usable[terrain] if k != fold]
