@@ -1,7 +1,10 @@
 """A line of the table says whether its goal is met; growth is an exponent."""
 
+import importlib.util
+
 import pytest
 
+from benchmarks.__main__ import NAMES, PAGE, table_of, with_table
 from benchmarks.rows import BenchRow
 from benchmarks.scale import exponent, rows_of
 
@@ -42,3 +45,21 @@ def test_growth_beyond_linear_is_not_met():
     verdicts = {row.what: row.verdict for row in rows_of(found)}
     assert verdicts["planning grows as trials to the power of"] == "not met"
     assert verdicts["`status` grows as sessions to the power of"] == "met"
+
+
+def test_the_table_goes_between_its_marks_and_again():
+    page = PAGE.read_text()
+    text = table_of({"scale": [BenchRow("x", 1.0, "s", 2.0)]})
+    once = with_table(page, text)
+    assert "| x | 1 s | ≤ 2 s | met | scale |" in once
+    assert with_table(once, text) == once
+    assert with_table(once, "").count("| x |") == 0
+
+
+def test_a_page_without_marks_is_refused():
+    with pytest.raises(ValueError, match="no marks"):
+        with_table("# Measured", "")
+
+
+def test_every_benchmark_is_there():
+    assert all(importlib.util.find_spec(f"benchmarks.{name}") for name in NAMES)
