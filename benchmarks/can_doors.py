@@ -22,6 +22,7 @@ from typing import Any
 from can.interfaces.socketcan import socketcan
 
 from acquisition import SystemClock
+from benchmarks.rows import BenchRow
 from wam.bus import (
     MODERN,
     MOTOR_NODES,
@@ -137,6 +138,20 @@ def measure(cycles: int) -> list[DoorCost]:
                 ends.times.append(spent)
     gc.enable()
     return [_cost(name, ends.times) for name, ends in doors.items()]
+
+
+def rows() -> list[BenchRow]:
+    """Return what was measured, for the table."""
+    logging.disable()  # python-can: datagrams have no options of CAN
+    return [
+        BenchRow(
+            f"13 frames of a cycle through the {cost.name}, paced",
+            cost.median_us,
+            "us",
+            GOAL_US if cost.name == "kernel socket" else None,
+        )
+        for cost in measure(1000)
+    ]
 
 
 def _cost(name: str, times: list[int]) -> DoorCost:

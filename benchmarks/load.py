@@ -30,6 +30,7 @@ from acquisition.sample import Flag, Record
 from acquisition.schema import CYCLE, schema_text
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from benchmarks.rows import BenchRow, not_installed
 
 GOAL_SECONDS = 5.0  # wall time for 80 trials of 30 s
 GOAL_ITERATING = 5.0  # times faster than iter_messages + frombuffer
@@ -228,6 +229,33 @@ def _status_mb(field: str) -> float:
         if line.startswith(f"{field}:"):
             return int(line.split()[1]) / 1024
     raise RuntimeError(f"no {field} in /proc/self/status")
+
+
+def rows() -> list[BenchRow]:
+    """Return what was measured, for the table."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "T01.mcap"
+        write_trial(path, 30.0, 1)
+        sides = {side.name: side for side in compare(path, 3)}
+    goals = {
+        "mcap iter_messages + frombuffer": GOAL_ITERATING,
+        "mcap-ros2-support, decoded": GOAL_DECODING,
+    }
+    return [
+        BenchRow("cycles of one 30 s trial read", sides["this reader"].median_ms, "ms"),
+        *(
+            BenchRow(
+                f"the same against {name}",
+                sides[name].ratio,
+                "times",
+                goal,
+                is_least=True,
+            )
+            if name in sides
+            else not_installed(f"the same against {name}", goal)
+            for name, goal in goals.items()
+        ),
+    ]
 
 
 def main() -> None:

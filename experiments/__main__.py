@@ -4,9 +4,11 @@
 import argparse
 import errno
 import importlib
+import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
@@ -97,8 +99,12 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
     """Keeps the examples as they are written."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of all commands; imports no slow library."""
+def build_parser(wanted: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
+    """Return the parser of all commands; imports no slow library.
+
+    Args:
+        wanted: commands whose options are declared; the others have only their names.
+    """
     parser = _Parser(
         prog="traction",
         description="Measures how a robotic foot grips loose stones.",
@@ -113,6 +119,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser.set_defaults(run=_show_first_steps)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     for name, help_text in COMMANDS.items():
+        if name not in wanted:
+            commands.add_parser(name, help=help_text)
+            continue
         file = _JOINED.get(name, name)
         module = importlib.import_module(f"experiments.commands.{file}")
         command = getattr(module, name.upper(), module)
@@ -136,17 +145,11 @@ def _show_first_steps(_: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
-    parser = build_parser()
-    try:
-        import argcomplete
-
-        from experiments.completion import NameCompleter
-
-        argcomplete.autocomplete(parser, default_completer=NameCompleter())
-    except ImportError:
-        pass
-    line = sys.argv[1:] if arguments is None else arguments
-    args = parser.parse_args(with_present_names(line))
+    if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
+        _complete()
+    named = with_present_names(sys.argv[1:] if arguments is None else arguments)
+    parser = build_parser(set(named) & set(COMMANDS))
+    args = parser.parse_args(named)
     try:
         code = args.run(args)
     except TractionError as error:
@@ -163,6 +166,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _report_disk(error)
         return _report_bug()
     return int(code)
+
+
+def _complete() -> None:
+    """Answer the tab key."""
+    with suppress(ImportError):
+        import argcomplete
+
+        from experiments.completion import NameCompleter
+
+        argcomplete.autocomplete(build_parser(), default_completer=NameCompleter())
 
 
 def _report_disk(error: OSError) -> int:

@@ -33,7 +33,7 @@ from .quality import (
     share_below,
     suggest,
 )
-from .samples import SampleTable, TrainingSet
+from .samples import PooledSamples, SampleTable, TrainingSet
 from .series import Array, Indices, TractionSeries
 from .tables import load_tables
 from .tare_bracket import TareBracket
@@ -72,6 +72,7 @@ __all__ = [
     "PackageField",
     "PackageFile",
     "PackagedTable",
+    "PooledSamples",
     "PrepareOptions",
     "PreparedTrial",
     "RecordedTrial",

@@ -1,7 +1,10 @@
 """Samples as models take them: columns, and where one trial ends."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from hashlib import blake2b
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,6 +46,11 @@ class SampleTable:
         """Number of rows."""
         return int(self.F_t.size)
 
+    def part(self, start: int, end: int) -> "SampleTable":
+        """Return the rows from `start` to before `end`, without a copy of them."""
+        columns = (self.F_n, self.v_t, self.F_t)  # of a mapped file, in a worker
+        return SampleTable(*(np.asarray(column[start:end]) for column in columns))
+
     def take(self, indices: Indices) -> "SampleTable":
         """Return the rows at `indices`."""
         return SampleTable(self.F_n[indices], self.v_t[indices], self.F_t[indices])
@@ -51,6 +59,50 @@ class SampleTable:
     def inputs(self) -> Array:
         """Return (F_n, v_t) side by side, shape (n, 2)."""
         return np.column_stack([self.F_n, self.v_t])
+
+
+class PooledSamples(NamedTuple):
+    """Kept samples of all trials, one trial after the other.
+
+    Attributes:
+        table: the samples.
+        spans: first row and end of every trial, by terrain and number.
+    """
+
+    table: SampleTable
+    spans: Mapping[str, Mapping[int, tuple[int, int]]]
+
+    @classmethod
+    def of(
+        cls,
+        trials: Mapping[str, Sequence[PreparedTrial]],
+        chosen: Mapping[str, Sequence[int]],
+    ) -> "PooledSamples":
+        """Return the samples of the trials with the numbers `chosen`, by terrain."""
+        names = [(name, k) for name, numbers in chosen.items() for k in numbers]
+        ends = np.cumsum([0, *(trials[name][k].kept for name, k in names)]).tolist()
+        spans: dict[str, dict[int, tuple[int, int]]] = {name: {} for name in chosen}
+        for (name, k), span in zip(names, pairwise(ends), strict=True):
+            spans[name][k] = span
+        return cls(SampleTable.of([trials[name][k] for name, k in names]), spans)
+
+    def trial(self, terrain: str, number: int) -> SampleTable:
+        """Return the samples of one trial, without a copy of them."""
+        return self.table.part(*self.spans[terrain][number])
+
+    def digests(self) -> dict[str, dict[int, str]]:
+        """Return a hash of the samples of every trial, by terrain and number."""
+        return {
+            name: {k: _digest(self.trial(name, k)) for k in spans}
+            for name, spans in self.spans.items()
+        }
+
+
+def _digest(rows: SampleTable) -> str:
+    digest = blake2b(digest_size=16)
+    for column in (rows.F_n, rows.v_t, rows.F_t):
+        digest.update(np.ascontiguousarray(column, dtype="<f8").tobytes())
+    return digest.hexdigest()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

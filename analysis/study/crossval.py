@@ -5,16 +5,28 @@ The model of fold k of a terrain is also tested on trial k of every other terrai
 """
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import blake2b
+from typing import TypeVar, overload
 
 import numpy as np
 
 from acquisition import TractionError
-from analysis.data import Indices, PreparedTrial, SampleTable, TrainingSet
+from analysis.data import (
+    Indices,
+    PooledSamples,
+    PreparedTrial,
+    SampleTable,
+    TrainingSet,
+)
 from analysis.study.metrics import Score, mean_absolute_error, score
 from analysis.study.models import TITLES, FitOptions, FittedModel, ModelFitter
 
+T = TypeVar("T")
+Digests = Mapping[str, Mapping[int, str]]
+_DERIVED = ("_digests", "_wholes")  # of a plan
 Prepared = Mapping[str, Sequence[PreparedTrial]]
 
 
@@ -79,9 +91,99 @@ class FoldResult:
     notes: tuple[str, ...]
 
 
+class FoldPlan(Sequence[FoldTask]):
+    """The folds of a study, each made from the samples of all when it is asked for.
+
+    A plan grows with the trials, and a worker that has it needs no more than a number.
+
+    Args:
+        trials: what models are fitted to.
+        targets: the same trials as models are tested on them.
+        usable: numbers of the trials that can be folded, by terrain.
+        options: how to fit.
+    """
+
+    def __init__(
+        self,
+        trials: Prepared,
+        targets: Prepared,
+        usable: Mapping[str, Sequence[int]],
+        options: FitOptions,
+    ) -> None:
+        self._usable, self._options = usable, options
+        self._fitted = PooledSamples.of(trials, usable)
+        self._tested = (
+            self._fitted if targets is trials else PooledSamples.of(targets, usable)
+        )
+        self._places = [
+            (name, k) for name, folds in usable.items() if len(folds) > 1 for k in folds
+        ]
+
+    def __len__(self) -> int:
+        """Return the number of folds."""
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, index: int) -> FoldTask: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[FoldTask]: ...
+    def __getitem__(self, index: int | slice) -> FoldTask | list[FoldTask]:
+        """Return everything that one fold needs."""
+        if isinstance(index, slice):
+            return [self[k] for k in range(len(self))[index]]
+        terrain, fold = self._places[index]
+        rest = [self._fitted.trial(terrain, k) for k in self._others(terrain, fold)]
+        return FoldTask(
+            terrain=terrain,
+            fold=fold,
+            training=SampleTable.joined(rest),
+            lengths=tuple(rows.count for rows in rest),
+            own=self._tested.trial(terrain, fold),
+            others=self._met(terrain, fold, self._tested.trial),
+            options=self._options,
+        )
+
+    def outline(self, index: int) -> tuple[object, ...]:
+        """Return what tells a fold from others, digests in the place of samples."""
+        (terrain, fold), (_, tested) = self._places[index], self._digests
+        met = self._met(terrain, fold, lambda name, k: tested[name][k])
+        own = tested[terrain][fold]
+        return ("fold", terrain, fold, self._wholes[terrain], own, met, self._options)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what a worker needs."""
+        return {k: v for k, v in vars(self).items() if k not in _DERIVED}
+
+    @cached_property
+    def _digests(self) -> tuple[Digests, Digests]:
+        return self._fitted.digests(), self._tested.digests()
+
+    @cached_property
+    def _wholes(self) -> dict[str, str]:
+        """Digests of all trials of every terrain: with a fold's number its training."""
+        return {
+            terrain: blake2b(repr(sorted(of.items())).encode()).hexdigest()
+            for terrain, of in self._digests[0].items()
+        }
+
+    def _others(self, terrain: str, fold: int) -> list[int]:
+        return [k for k in self._usable[terrain] if k != fold]
+
+    def _met(
+        self, terrain: str, fold: int, of: Callable[[str, int], T]
+    ) -> dict[str, tuple[T, ...]]:
+        """Return `of` every trial of another terrain that a fold is tested on."""
+        own = self._usable[terrain]
+        return {
+            other: tuple(of(other, k) for k in met_trials(fold, own, tests))
+            for other, tests in self._usable.items()
+            if other != terrain
+        }
+
+
 def plan_folds(
     trials: Prepared, options: FitOptions, targets: Prepared | None = None
-) -> tuple[list[FoldTask], list[str]]:
+) -> tuple[FoldPlan, list[str]]:
     """Return the folds of a study and notes on what cannot be folded.
 
     Args:
@@ -101,18 +203,13 @@ def plan_folds(
         for terrain, prepared in trials.items()
     }
     notes = _notes_on_gaps(trials, usable)
-    tasks: list[FoldTask] = []
-    for terrain, folds in usable.items():
-        if len(folds) < 2:
-            notes.append(
-                f"{terrain}: {len(folds)} trial with kept samples; leaving one out "
-                "needs two, so no model was fitted."
-            )
-            continue
-        tasks += [
-            _task((trials, targets), usable, (terrain, fold), options) for fold in folds
-        ]
-    return tasks, notes
+    notes += [
+        f"{terrain}: {len(folds)} trial with kept samples; leaving one out "
+        "needs two, so no model was fitted."
+        for terrain, folds in usable.items()
+        if len(folds) < 2
+    ]
+    return FoldPlan(trials, targets, usable, options), notes
 
 
 def run_fold(task: FoldTask) -> FoldResult:
@@ -153,18 +250,22 @@ def choose_rows(task: FoldTask) -> Indices:
     return np.random.default_rng(key).choice(task.training.count, count, replace=False)
 
 
-def pair_trials(models: Sequence[int], tests: Sequence[int]) -> list[tuple[int, int]]:
-    """Return which fold's model meets which trial of another terrain.
+def met_trials(fold: int, models: Sequence[int], tests: Sequence[int]) -> list[int]:
+    """Return the trials of another terrain that the model of a fold meets, in order.
 
     Fold k meets trial k where both exist. A fold or trial left over is paired by
     wrapping round the other list, so that each is used at least once.
+
+    Args:
+        fold: one of `models`.
+        models: numbers of the folds.
+        tests: numbers of the trials of the other terrain.
     """
-    if not models or not tests:
+    if not tests:
         return []
-    pairs = [(k, k) for k in models if k in tests]
-    pairs += [(k, tests[k % len(tests)]) for k in models if k not in tests]
-    pairs += [(models[k % len(models)], k) for k in tests if k not in models]
-    return sorted(pairs)
+    own, known = fold if fold in tests else tests[fold % len(tests)], set(models)
+    left = (k for k in tests if k not in known)
+    return sorted([own, *(k for k in left if models[k % len(models)] == fold)])
 
 
 def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[str]:
@@ -177,34 +278,6 @@ def _notes_on_gaps(trials: Prepared, usable: Mapping[str, list[int]]) -> list[st
         for k, trial in enumerate(prepared)
         if k not in usable[terrain]
     ]
-
-
-def _task(
-    trials: tuple[Prepared, Prepared],
-    usable: Mapping[str, list[int]],
-    place: tuple[str, int],
-    options: FitOptions,
-) -> FoldTask:
-    terrain, fold = place
-    own, targets = trials[0][terrain], trials[1]
-    others = {
-        other: tuple(
-            SampleTable.of([targets[other][j]])
-            for k, j in pair_trials(usable[terrain], usable[other])
-            if k == fold
-        )
-        for other in targets
-        if other != terrain
-    }
-    return FoldTask(
-        terrain=terrain,
-        fold=fold,
-        training=SampleTable.of([own[k] for k in usable[terrain] if k != fold]),
-        lengths=tuple(own[k].kept for k in usable[terrain] if k != fold),
-        own=SampleTable.of([targets[terrain][fold]]),
-        others=others,
-        options=options,
-    )
 
 
 def _examine(model: FittedModel, task: FoldTask) -> ModelFold:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from ipaddress import ip_address
-from typing import Any, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
 
 from joblib import Parallel, delayed, parallel_config
@@ -17,6 +17,7 @@ Result = TypeVar("Result")
 Progress = Callable[[int, int], None]
 
 _FEW = 3  # tasks that cost less than starting workers
+_MAPPED = 20_000  # bytes of an array that is not copied into every task
 _PATIENCE = 10.0  # s to reach a scheduler
 
 
@@ -40,6 +41,19 @@ class Workers:
         if self.n_jobs is None and tasks <= _FEW:
             return 1
         return min(available_cores() if self.n_jobs is None else self.n_jobs, tasks)
+
+
+@runtime_checkable
+class SharedTasks(Protocol):
+    """Tasks that are made from one body of data: it is shared once, then its numbers.
+
+    What is pickled of it goes to every worker a single time: its arrays by a file that
+    all of them map, or scattered on a cluster.
+    """
+
+    def outline(self, index: int) -> object:
+        """Return what tells one task from every other, without its data."""
+        ...
 
 
 class Store(Protocol):
@@ -84,39 +98,61 @@ def run_tasks(
     """
     where = workers if isinstance(workers, Workers) else Workers(workers)
     results = {} if store is None else _stored(store, tasks)
-    left = [(k, task) for k, task in enumerate(tasks) if k not in results]
+    left = [k for k in range(len(tasks)) if k not in results]
     if progress is not None and results:
         progress(len(results), len(tasks))
-    for k, result in _stream(function, left, where):
+    for k, result in _stream(function, tasks, left, where):
         results[k] = result
         if store is not None:
-            store.put(tasks[k], result)
+            store.put(_key(tasks, k), result)
         if progress is not None:
             progress(len(results), len(tasks))
     return [results[k] for k in range(len(tasks))]
 
 
+def _key(tasks: Sequence[Any], number: int) -> object:
+    """Return what a store knows a task by."""
+    return tasks.outline(number) if isinstance(tasks, SharedTasks) else tasks[number]
+
+
 def _stored(store: Store, tasks: Sequence[Any]) -> dict[int, Any]:
-    results = ((k, store.get(task)) for k, task in enumerate(tasks))
+    results = ((k, store.get(_key(tasks, k))) for k in range(len(tasks)))
     return {k: result for k, result in results if result is not None}
 
 
 def _stream(
-    function: Callable[[Task], Result], tasks: list[tuple[int, Task]], where: Workers
+    function: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    left: Sequence[int],
+    where: Workers,
 ) -> Iterator[tuple[int, Result]]:
-    """Yield (number, result) of every task as it is done, in any order."""
-    count = where.count(len(tasks))
-    if not tasks:
+    """Yield (number, result) of every task left as it is done, in any order."""
+    count = where.count(len(left))
+    if not left:
         return
-    calls: Iterable[Any] = (delayed(_one_threaded)(function, *task) for task in tasks)
+    shared: list[Any] = [tasks] if isinstance(tasks, SharedTasks) else []
+    calls: Iterable[Any] = (
+        delayed(_numbered)(function, k, tasks)
+        if shared
+        else delayed(_one_threaded)(function, k, tasks[k])
+        for k in left
+    )
     if where.scheduler is not None:
-        with _cluster(where.scheduler):
+        with _cluster(where.scheduler, shared):
             yield from _parallel(calls)
     elif count <= 1:
-        yield from (_one_threaded(function, *task) for task in tasks)
+        yield from (_one_threaded(function, k, tasks[k]) for k in left)
     else:
-        with parallel_config("loky", n_jobs=count, inner_max_num_threads=1):
+        with parallel_config(
+            "loky", n_jobs=count, inner_max_num_threads=1, max_nbytes=_MAPPED
+        ):
             yield from _parallel(calls)
+
+
+def _numbered(
+    function: Callable[[Task], Result], number: int, tasks: Sequence[Task]
+) -> tuple[int, Result]:
+    return _one_threaded(function, number, tasks[number])
 
 
 def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
@@ -151,8 +187,11 @@ def is_guarded(address: str) -> bool:
 
 
 @contextmanager
-def _cluster(address: str) -> Iterator[None]:
-    """Send the tasks of the block to the Dask scheduler at `address`."""
+def _cluster(address: str, shared: Sequence[Any]) -> Iterator[None]:
+    """Send the tasks of the block to the Dask scheduler at `address`.
+
+    What is `shared` by them goes to every worker once.
+    """
     from distributed import Client
 
     if not is_guarded(address):
@@ -170,5 +209,5 @@ def _cluster(address: str) -> Iterator[None]:
             hint="Start one with `dask scheduler` and workers with `dask worker`, or "
             "leave --scheduler out.",
         ) from error
-    with client, parallel_config("dask", client=client):
+    with client, parallel_config("dask", client=client, scatter=list(shared) or None):
         yield

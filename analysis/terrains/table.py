@@ -8,7 +8,7 @@ distribution comes back exactly.
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +18,11 @@ from analysis.study import SHARES
 
 Rows = tuple[tuple[float, ...], ...]
 
+_AT_ONCE = 2048  # points
 _NODES = 64  # shares that moments are integrated over
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Table:
     """Quantiles of F_t on a grid of F_n and v_t.
 
@@ -70,13 +71,30 @@ class Table:
 
     def over(self, F_n: Array, v_t: Array) -> Array:
         """Return the quantiles [N] at many points, shape (q, n)."""
-        i, a = _places(self.F_n, F_n)
-        j, b = _places(self.v_t, v_t)
-        table = np.array(self.forces)
-        low = table[:, i, j] + b * (table[:, i, j + 1] - table[:, i, j])
-        far = table[:, i + 1, j]
-        high = far + b * (table[:, i + 1, j + 1] - far)
-        return low + a * (high - low)
+        loads, speeds, cells = self._arrays
+        i, a = _places(loads, F_n)
+        j, b = _places(speeds, v_t)
+        cell = i * speeds.size + j
+        if cell.size <= _AT_ONCE:
+            return _blended(cells[:, cell], a, b)
+        forces = np.empty((len(cells), cell.size))
+        for start in range(0, cell.size, _AT_ONCE):  # what fits into the cache
+            part = slice(start, start + _AT_ONCE)
+            forces[:, part] = _blended(cells[:, cell[part]], a[part], b[part])
+        return forces
+
+    @cached_property
+    def _arrays(self) -> tuple[Array, Array, Array]:
+        """Return both axes and, point by point, the cell above it, shape (q, n m, 4).
+
+        Of every cell: F_t [N] at the point, what it gains along v_t, F_t at the next
+        load, and what that gains along v_t.
+        """
+        forces = np.array(self.forces)
+        along = np.diff(forces, axis=2, append=0.0)
+        next_row = (np.roll(grid, -1, axis=1) for grid in (forces, along))
+        cells = np.stack([forces, along, *next_row], axis=-1)
+        return np.array(self.F_n), np.array(self.v_t), cells.reshape(len(forces), -1, 4)
 
 
 def rows_of(values: Array) -> Rows:
@@ -102,11 +120,18 @@ def _place(axis: tuple[float, ...], value: float) -> tuple[int, float]:
     return i, (value - axis[i]) / (axis[i + 1] - axis[i])
 
 
-def _places(axis: tuple[float, ...], values: Array) -> tuple[np.ndarray, Array]:
-    points = np.array(axis)
-    inside = np.clip(values, points[0], points[-1])
-    i = np.clip(np.searchsorted(points, inside, "right") - 1, 0, points.size - 2)
-    return i, (inside - points[i]) / (points[i + 1] - points[i])
+def _places(points: Array, values: Array) -> tuple[np.ndarray, Array]:
+    """Return (lower points, shares of the way to the next), clamped to the axis."""
+    inside = np.minimum(np.maximum(values, points[0]), points[-1])
+    i = points[1:-1].searchsorted(inside, "right")
+    low = points[i]
+    return i, (inside - low) / (points[i + 1] - low)
+
+
+def _blended(corners: Array, a: Array, b: Array) -> Array:
+    """Return F_t [N], shape (q, n), from cells of shape (q, n, 4)."""
+    low = corners[:, :, 0] + b * corners[:, :, 1]
+    return low + a * (corners[:, :, 2] + b * corners[:, :, 3] - low)
 
 
 def _blend(rows: Rows, i: int, a: float, j: int, b: float) -> float:

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import json
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
+    from experiments.board import MatrixRow
     from experiments.operator import Console
-    from experiments.session import MatrixRow
+    from experiments.session import Deviation, SessionFolder
+    from experiments.settings import TerrainRow
 
 EXAMPLES = """\
   traction status                           the board, and what comes next
@@ -18,11 +23,19 @@ EXAMPLES = """\
 _HEADER = ("terrain", "kind", "kept", "trials", "rejected", "sessions")
 _LOOK_NS = 1_000_000_000
 _NOT_AS_KEPT = 6  # exit code
+_SHIPPED = Path(__file__).parents[1] / "data"
+_LARGEST = 1_000_000  # bytes of a settings file
+_FILES = ("rig.toml", "matrix.toml")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `status`."""
     parser.add_argument("--json", action="store_true", help="as JSON")
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="read every file again, whatever is known of it from before",
+    )
     parser.add_argument(
         "--where",
         default="",
@@ -38,59 +51,145 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the board, counted from files whose checksum is right."""
-    import json
-
-    from experiments.operator import BAD, Console
-    from experiments.session import (
-        DigestCache,
-        board_notes,
+    from experiments.board import (
+        BoardCache,
+        cache_path,
         compare_board,
         count_board,
         enough_lines,
         next_steps,
         parse_where,
+        see_sessions,
     )
-    from experiments.settings import load_settings
+    from experiments.operator import Console
 
-    settings = load_settings(args.config)
-    where, digest = parse_where(args.where), DigestCache()
+    cache = BoardCache(None if args.fresh else cache_path(args.data))
+    rows = cache.rows(_settings_texts(args.config), lambda: _terrains(args.config))
+    where = parse_where(args.where)
     console = Console(color=not args.no_color)
 
-    def count() -> list[MatrixRow]:
-        return count_board(args.data, settings.matrix, where, digest)
-
-    def steps(board: Sequence[MatrixRow]) -> list[str]:
-        kinds = {line.is_simulated for line in board if line.sessions} or {False}
-        every = enough_lines(args.data, settings.matrix, where)
+    def look() -> Board:
+        seen = see_sessions(args.data, where, cache)
+        cache.save()
+        lines = count_board(seen, rows, where)
+        known, terrains = [s.folder for s in seen], {row.name for row in rows}
+        kinds = {line.is_simulated for line in lines if line.sessions} or {False}
+        steps = enough_lines(seen, rows, where)
         for kind in sorted(kinds):
-            every += next_steps(args.data, settings.matrix, is_simulated=kind)
-        return every
-
-    def notes(board: Sequence[MatrixRow]) -> list[str]:
-        return board_notes(args.data, settings.matrix, where, board)
-
-    def lines() -> list[str]:
-        return [*_plain(board := count()), *notes(board), *steps(board)]
+            steps += next_steps(args.data, seen, rows, is_simulated=kind)
+        notes = board_notes(args.data, known, terrains, where, lines)
+        return Board(lines, notes, steps, compare_board(seen, where))
 
     if args.follow:
-        return _follow(lines, console)
-    board = count()
-    deviations = compare_board(args.data, where, digest)
-    for note in notes(board):  # not in the way of a program that reads the board
+        return _follow(lambda: look().plain(), console)
+    return _show(look(), console, is_json=args.json)
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """Everything that one look at the sessions has to tell.
+
+    Attributes:
+        lines: the terrains.
+        notes: why there is less than somebody may expect.
+        steps: what comes next.
+        deviations: kept trials that are missing or changed.
+    """
+
+    lines: list[MatrixRow]
+    notes: list[str]
+    steps: list[str]
+    deviations: list[Deviation]
+
+    def plain(self) -> list[str]:
+        """Return the board as lines of text."""
+        from experiments.operator import aligned
+
+        table = aligned([_HEADER, *map(_row, self.lines)])
+        return [*table, *self.notes, *self.steps]
+
+
+def board_notes(
+    data: Path,
+    known: Sequence[SessionFolder],
+    terrains: Collection[str],
+    where: Mapping[str, str],
+    board: Sequence[object],
+) -> list[str]:
+    """Return why a board shows less than somebody may expect, a line for each reason.
+
+    Args:
+        data: the data folder.
+        known: its sessions.
+        terrains: names of those of the matrix.
+        where: the conditions that the board was counted with.
+        board: its rows.
+    """
+    from acquisition.trial_file import list_folder
+    from experiments.session import JOURNAL_FILE
+
+    sessions = data / "sessions"
+    if not data.is_dir():
+        return [f"There is no data folder {data}: nothing is counted."]
+    if not sessions.is_dir():
+        return [f"There are no sessions in {data} yet."]
+    notes: list[str] = []
+    named = {session.path for session in known}
+    for path in list_folder(sessions):
+        if path not in named and (path / JOURNAL_FILE).is_file():
+            notes.append(
+                f"{path} has a journal, but not the name of a session: it is not "
+                "counted. Give it back its name."
+            )
+    notes += [
+        f"{session.path.name}: {session.terrain} is no terrain of the matrix; it is "
+        "not counted."
+        for session in known
+        if session.terrain not in terrains
+    ]
+    if where and not board:
+        asked = ",".join(f"{key}={value}" for key, value in where.items())
+        notes.append(f"Nothing matches --where {asked}.")
+    return notes
+
+
+def _show(board: Board, console: Console, *, is_json: bool) -> int:
+    """Print what was seen; return the exit code."""
+    from experiments.operator import BAD
+
+    for note in board.notes:  # not in the way of a program that reads the board
         console.problem(note)
-    if args.json:
-        console.say(json.dumps([line.as_dict() for line in board], indent=1))
+    if is_json:
+        console.say(json.dumps([line.as_dict() for line in board.lines], indent=1))
     else:
-        _print(board, steps(board), console)
-    for deviation in deviations:
+        console.table(_HEADER, [_row(line) for line in board.lines])
+        for step in board.steps:
+            console.say(step)
+    for deviation in board.deviations:
         console.problem(f"{BAD} {deviation.text()}.")
-    return _NOT_AS_KEPT if deviations else 0
+    return _NOT_AS_KEPT if board.deviations else 0
 
 
-def _print(board: Sequence[MatrixRow], steps: Sequence[str], console: Console) -> None:
-    console.table(_HEADER, [_row(line) for line in board])
-    for step in steps:
-        console.say(step)
+def _settings_texts(config: Path | None) -> list[bytes] | None:
+    """Return the contents of the settings files, None where one cannot be read."""
+    texts = [(_SHIPPED / name).read_bytes() for name in _FILES]
+    for path in [] if config is None else [config, config.with_name(_FILES[1])]:
+        try:
+            if not path.exists():
+                texts.append(b"")
+            elif path.is_file() and path.stat().st_size <= _LARGEST:
+                texts.append(path.read_bytes())
+            else:
+                return None
+        except OSError:
+            return None
+    return texts
+
+
+def _terrains(config: Path | None) -> Sequence[TerrainRow]:
+    from experiments.settings import load_settings
+
+    return load_settings(config).matrix.terrains
 
 
 def _row(line: MatrixRow) -> tuple[str, ...]:
@@ -102,16 +201,6 @@ def _row(line: MatrixRow) -> tuple[str, ...]:
         str(line.rejected),
         " ".join(line.sessions) or "-",
     )
-
-
-def _plain(board: Sequence[MatrixRow]) -> list[str]:
-    """Return the board as lines of text."""
-    rows = [_HEADER, *(_row(line) for line in board)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADER))]
-    return [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        for row in rows
-    ]
 
 
 def _follow(look: Callable[[], list[str]], console: Console) -> int:

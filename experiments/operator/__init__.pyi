@@ -1,4 +1,4 @@
-from .console import BAD, GOOD, WARNING, Console, PageRecorder
+from .console import BAD, GOOD, WARNING, Console, PageRecorder, aligned
 from .feedback import FeedbackSignal, OperatorFeedback, build_feedback
 from .graphs import KeptRow, LiveScales, WayTrace, packed, trace_lines
 from .keys import (
@@ -51,6 +51,7 @@ __all__ = [
     "RecordingView",
     "TerminalInput",
     "WayTrace",
+    "aligned",
     "build_feedback",
     "choose_operator",
     "end_lines",

@@ -8,8 +8,6 @@ import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from experiments.operator.graphs import fitted
-
 if TYPE_CHECKING:
     from rich.live import Live
 
@@ -79,6 +77,8 @@ class Console:
             return
         from rich.text import Text
 
+        from experiments.operator.graphs import fitted
+
         size = shutil.get_terminal_size((80, 24))
         shown = fitted(lines, size.columns, size.lines - 1)
         text = Text("\n".join(shown), no_wrap=True, overflow="ellipsis")
@@ -124,7 +124,11 @@ class Console:
         return live
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Print a table with rich, in colour where there is a terminal."""
+        """Print a table; in bold and fitted to its width where there is a terminal."""
+        if not self._is_terminal:
+            for line in aligned([header, *rows]):
+                self.say(line)
+            return
         from rich.console import Console as RichConsole
         from rich.table import Table
 
@@ -156,6 +160,12 @@ class PageRecorder(Console):
 
     def say(self, text: str = "") -> None:
         """Print nothing: the page is for a program."""
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the rows as lines with every column at its place."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
 
 
 def wrapped(text: str, width: int, indent: str = "") -> str:

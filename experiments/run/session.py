@@ -8,6 +8,7 @@ from pathlib import Path
 from acquisition import PreflightError, TractionError
 from acquisition.trial_file import is_there
 from experiments.arguments import data_option
+from experiments.board import glance_sessions, next_steps, row_of
 from experiments.fault_injection import HostFaults, plan_faults
 from experiments.messages import blames_hardware
 from experiments.operator import WARNING, Console, OperatorInput, keyboard
@@ -41,7 +42,6 @@ from experiments.session import (
     Journal,
     StanceTask,
     create_session,
-    next_steps,
     session_lock,
     session_utc_ns,
     write_json,
@@ -285,9 +285,10 @@ def _print_next(request: SessionRequest, journal: Journal, code: int) -> None:
     request.console.say(f"Complete. Next: traction report {name}{data}")
     request.console.say(f"It writes {journal.folder.path / 'report' / 'index.html'}")
     is_simulated = journal.folder.is_simulated
-    matrix = request.settings.matrix
+    rows = [row_of(row) for row in request.settings.matrix.terrains]
     try:
-        steps = next_steps(request.data, matrix, is_simulated=is_simulated)
+        seen = glance_sessions(request.data)
+        steps = next_steps(request.data, seen, rows, is_simulated=is_simulated)
     except TractionError as error:  # of another session; this one is complete
         steps = [f"▲ The next terrain is unknown: {error.message}"]
     for step in steps:

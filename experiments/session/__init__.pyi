@@ -20,22 +20,14 @@ from .journal import Journal, open_journal
 from .kept_files import (
     Deviation,
     KeptDataError,
-    board_notes,
     check_kept,
     compare_kept,
     compare_trial,
+    enough_of,
     kept_data_error,
+    unreadable,
 )
 from .lock import LOCK_FILE, locked_error, owner_of, session_lock, sign
-from .matrix_board import (
-    DigestCache,
-    MatrixRow,
-    compare_board,
-    count_board,
-    enough_lines,
-    next_steps,
-    parse_where,
-)
 from .photos import (
     Camera,
     KeptPhoto,
@@ -56,6 +48,7 @@ from .stance_task import (
 )
 from .states import Event, SessionPhase, table_lines
 from .store import (
+    JOURNAL_FILE,
     SessionFolder,
     create_session,
     find_session,
@@ -69,9 +62,15 @@ from .trial_files import (
     kept_sidecars,
     write_next_tare,
 )
-from .unfinished import UnfinishedSession, find_unfinished
+from .unfinished import (
+    UnfinishedSession,
+    find_unfinished,
+    inspect_session,
+    is_unfinished,
+)
 
 __all__ = [
+    "JOURNAL_FILE",
     "KEEP",
     "LOCK_FILE",
     "LONGEST_TEXT",
@@ -79,12 +78,10 @@ __all__ = [
     "STANCES",
     "Camera",
     "Deviation",
-    "DigestCache",
     "Event",
     "Journal",
     "KeptDataError",
     "KeptPhoto",
-    "MatrixRow",
     "PhotoError",
     "SessionFolder",
     "SessionPhase",
@@ -96,19 +93,18 @@ __all__ = [
     "add_note",
     "add_photo",
     "add_remark",
-    "board_notes",
     "change_verdict",
     "check_kept",
     "clean_text",
-    "compare_board",
     "compare_kept",
     "compare_trial",
-    "count_board",
     "create_session",
-    "enough_lines",
+    "enough_of",
     "find_session",
     "find_unfinished",
     "has_photo",
+    "inspect_session",
+    "is_unfinished",
     "iso_utc",
     "kept_data_error",
     "kept_photo",
@@ -117,11 +113,9 @@ __all__ = [
     "list_sessions",
     "locked_error",
     "looks_like_trial",
-    "next_steps",
     "open_journal",
     "owner_of",
     "parse_trial",
-    "parse_where",
     "photos_of",
     "read_json",
     "read_stance_task",
@@ -137,6 +131,7 @@ __all__ = [
     "stance_pushes",
     "table_lines",
     "trial_path",
+    "unreadable",
     "write_json",
     "write_new",
     "write_new_text",

@@ -1,21 +1,24 @@
 """Kept trials as the journal has them against the files: what is missing or changed."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from acquisition import SessionError, TrialFileError
 from acquisition.trial_file import is_there, list_folder
-from analysis.next_push import PushRecord, Stopping, stopping_of
 from experiments.session.data_files import damaged_lines, read_json, sha256_of
 from experiments.session.reducer import KEEP, replay
 from experiments.session.sidecar import TrialName
-from experiments.session.store import JOURNAL_FILE, SessionFolder, list_sessions
+from experiments.session.store import SessionFolder
 from experiments.session.trial_files import decision_of, find_sidecar, kept_pushes
-from experiments.settings import MatrixSettings, TerrainRow
+
+if TYPE_CHECKING:
+    from analysis.next_push import Stopping
 
 _NAMED = 6  # deviations in one message
 _Facts = Mapping[str, Any]
@@ -174,21 +177,40 @@ def _changed(size: int, before: object) -> str:
     return f"is changed: {size} bytes, {before} were kept"
 
 
-def enough_of(
-    sessions: Sequence[SessionFolder], row: TerrainRow, *, is_simulated: bool
-) -> str:
+class WantedRow(Protocol):
+    """A row of the matrix, of which so many trials are wanted."""
+
+    @property
+    def name(self) -> str:
+        """Name of the terrain."""
+        ...
+
+    @property
+    def trials(self) -> int:
+        """How many trials are wanted."""
+        ...
+
+    @property
+    def kind(self) -> str:
+        """Kind of the terrain."""
+        ...
+
+    @property
+    def target(self) -> str:
+        """What the trials are to tell most about."""
+        ...
+
+
+def enough_of(sessions: Sequence[SessionFolder], row: WantedRow) -> str:
     """Return why the kept trials of a terrain are enough for its target, "" if not.
 
     Nothing is said, nor computed, where as many are kept as the matrix wants.
 
     Args:
-        sessions: oldest first; those of other terrains do not count.
+        sessions: those of the terrain, oldest first.
         row: the terrain.
-        is_simulated: of its simulated trials, not of the live ones.
     """
-    own = [s for s in sessions if s.terrain == row.name]
-    own = [s for s in own if s.is_simulated is is_simulated]
-    texts = [json.dumps(push.plain()) for s in own for push in kept_pushes(s)]
+    texts = [json.dumps(push.plain()) for s in sessions for push in kept_pushes(s)]
     if len(texts) >= row.trials:
         return ""
     told = _stopping(tuple(texts), row.kind, row.target)
@@ -201,47 +223,8 @@ def enough_of(
 
 @lru_cache(maxsize=64)
 def _stopping(texts: tuple[str, ...], kind: str, target: str) -> Stopping | None:
+    from analysis.next_push import PushRecord, stopping_of
+
     records = [PushRecord.from_plain(json.loads(text)) for text in texts]
     known = [record for record in records if record is not None]
     return stopping_of(known, kind, target)
-
-
-def board_notes(
-    data: Path,
-    matrix: MatrixSettings,
-    where: Mapping[str, str],
-    board: Sequence[object],
-) -> list[str]:
-    """Return why a board shows less than somebody may expect, a line for each reason.
-
-    Args:
-        data: the data folder.
-        matrix: the terrains.
-        where: the conditions that the board was counted with.
-        board: its rows.
-    """
-    sessions = data / "sessions"
-    if not data.is_dir():
-        return [f"There is no data folder {data}: nothing is counted."]
-    if not sessions.is_dir():
-        return [f"There are no sessions in {data} yet."]
-    notes: list[str] = []
-    known = list_sessions(data)
-    named = {session.path for session in known}
-    for path in list_folder(sessions):
-        if path not in named and (path / JOURNAL_FILE).is_file():
-            notes.append(
-                f"{path} has a journal, but not the name of a session: it is not "
-                "counted. Give it back its name."
-            )
-    terrains = {row.name for row in matrix.terrains}
-    notes += [
-        f"{session.path.name}: {session.terrain} is not a terrain of the matrix; it is "
-        "not counted."
-        for session in known
-        if session.terrain not in terrains
-    ]
-    if where and not board:
-        asked = ",".join(f"{key}={value}" for key, value in where.items())
-        notes.append(f"Nothing matches --where {asked}.")
-    return notes

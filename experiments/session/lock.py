@@ -10,7 +10,6 @@ from pathlib import Path
 
 from acquisition import SessionError, SystemClock
 from acquisition.trial_file import check_absent, check_folders, open_data
-from experiments.messages import CATALOGUE
 from experiments.session.data_files import read_json
 from experiments.session.store import SessionFolder, iso_utc
 
@@ -82,6 +81,8 @@ def owner_of(folder: SessionFolder) -> LockOwner | None:
 
 def locked_error(folder: SessionFolder) -> SessionError:
     """Return the refusal of a session that another process has open."""
+    from experiments.messages import CATALOGUE
+
     owner = _signature(folder.path / LOCK_FILE)
     message = CATALOGUE["locked"]
     fields = {

@@ -1,10 +1,13 @@
 """A trial on the disk: its name, and the sidecar with what is known of it."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from acquisition.trial_file import VerifiedFile
+if TYPE_CHECKING:
+    from acquisition.trial_file import VerifiedFile
 
 STANCES = "stances"  # all of them were made
 COMPLETE = frozenset({"travel", "key", "time-limit", STANCES})

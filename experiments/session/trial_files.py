@@ -1,13 +1,14 @@
 """Where the files of a trial stand: they follow what the journal decided."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from acquisition import TrialFileError
 from acquisition.trial_file import is_there, list_folder
-from analysis.next_push import PushRecord
 from experiments.session.data_files import (
     move_file,
     read_json,
@@ -19,6 +20,9 @@ from experiments.session.reducer import KEEP, REJECT
 from experiments.session.sidecar import TrialName
 from experiments.session.states import Event
 from experiments.session.store import SessionFolder
+
+if TYPE_CHECKING:
+    from analysis.next_push import PushRecord
 
 PHOTO_SUFFIXES = (".photo.jpg", ".photo.png")
 _SUFFIXES = (".mcap", ".truth.mcap", *PHOTO_SUFFIXES)
@@ -144,6 +148,8 @@ def kept_pushes(folder: SessionFolder) -> list[PushRecord]:
 
     None at all where one of them has no such record: a trial of an older version.
     """
+    from analysis.next_push import PushRecord
+
     records = [PushRecord.from_plain(s.get("push")) for s in kept_sidecars(folder)]
     known = [record for record in records if record is not None]
     return known if len(known) == len(records) else []

@@ -80,11 +80,16 @@ def find_unfinished(data: Path) -> list[UnfinishedSession]:
     return sessions
 
 
+def is_unfinished(state: SessionState) -> bool:
+    """Return whether something is left to be recorded, or to be put away."""
+    return state.phase in OPEN | RESUMABLE
+
+
 def inspect_session(folder: SessionFolder) -> UnfinishedSession | None:
     """Return the session as one to be resumed, None where it is not."""
     events = folder.events()
     state = replay(events)
-    if state.phase not in OPEN | RESUMABLE or owner_of(folder) is not None:
+    if not is_unfinished(state) or owner_of(folder) is not None:
         return None
     return UnfinishedSession(
         folder, state, _seconds(folder, state), str(events[-1].get("utc") or "")

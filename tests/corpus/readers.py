@@ -13,6 +13,7 @@ from acquisition.errors import TractionError, TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
 from analysis.terrains import database as terrain_db
+from experiments.board import BoardCache, count_board, row_of, see_sessions
 from experiments.operator.scripted import ScriptedOperator
 from experiments.report.checksums import SUMS, changed_files
 from experiments.report.rebuilding import compare_tables
@@ -21,7 +22,6 @@ from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
 from experiments.session.journal import open_journal
 from experiments.session.lock import session_lock
-from experiments.session.matrix_board import count_board
 from experiments.session.store import list_sessions
 from experiments.session.unfinished import find_unfinished
 from experiments.settings.load import load_settings
@@ -74,8 +74,8 @@ def _session(folder: Path, name: str, data: bytes, journal: bytes = b"") -> None
     (path / "events.jsonl").write_bytes(journal)
     (path / name).write_bytes(data)
     find_unfinished(folder)
-    matrix = load_settings(None).matrix
-    count_board(folder, matrix)
+    rows = [row_of(row) for row in load_settings(None).matrix.terrains]
+    count_board(see_sessions(folder, {}, BoardCache()), rows)
     (session,) = list_sessions(folder)
     with session_lock(session):
         recover_session(open_journal(session, SystemClock()))

@@ -1,4 +1,7 @@
+import copy
+import io
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +13,10 @@ from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import posterior_search
-from analysis.study.crossval import choose_rows, pair_trials, plan_folds, run_fold
+from analysis.study.crossval import choose_rows, met_trials, plan_folds, run_fold
 from analysis.study.metrics import mean_absolute_error
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
+from analysis.study.store import task_key
 
 SMALL_FIT = FitOptions(gp_points=60, models=(TUSTIN, GP_SE))
 
@@ -57,7 +61,8 @@ def test_model_of_fold_k_meets_trial_k_of_the_other_terrains(trials):
     ],
 )
 def test_trials_pair_by_number_and_wrap_where_they_cannot(models, tests, pairs):
-    assert pair_trials(models, tests) == pairs
+    met = [(k, trial) for k in models for trial in met_trials(k, models, tests)]
+    assert met == pairs
 
 
 def test_chosen_rows_are_distinct_and_depend_on_seed_terrain_and_fold(trials):
@@ -146,3 +151,73 @@ def test_three_starts_reach_the_best_of_twenty(trials, kernel):
         missed += posterior_search(model, X, r).lml < best - 1e-3
     # 95 % of the fits of a study; of nine that is all
     assert missed == 0
+
+
+def counted(name, kept, seed):
+    """Return a prepared trial that has nothing but its kept samples."""
+    F_n, v_t, F_t = np.random.default_rng(seed).normal(size=(3, kept))
+    return SimpleNamespace(name=name, kept=kept, F_n=F_n, v_t=v_t, F_t=F_t)
+
+
+def many(trials):
+    """Return so many trials on eight terrains."""
+    return {
+        terrain: [counted(f"T{k}", 50, (k, j)) for k in range(trials // 8)]
+        for j, terrain in enumerate("ABCDEFGH")
+    }
+
+
+def sent_bytes(value):
+    """Return how many bytes go to a worker."""
+    from joblib import dump
+
+    buffer = io.BytesIO()
+    dump(value, buffer)
+    return buffer.tell()
+
+
+def test_a_plan_grows_with_the_trials_not_with_their_square():
+    sizes = []
+    for count in (80, 320):
+        plan, _ = plan_folds(many(count), FitOptions())
+        assert len(plan) == count
+        sizes.append(sent_bytes(plan))
+    assert sizes[1] < 4.4 * sizes[0]
+
+
+def test_a_fold_is_another_one_where_any_of_its_samples_is(trials):
+    before, _ = plan_folds(trials, SMALL_FIT)
+    keys = [task_key(before.outline(k)) for k in range(len(before))]
+    assert len(set(keys)) == len(keys)
+    changed = replace(trials["B0"][1], F_t=trials["B0"][1].F_t + 1e-12)
+    trials["B0"][1] = changed
+    after, _ = plan_folds(trials, SMALL_FIT)
+    is_same = [task_key(after.outline(k)) == key for k, key in enumerate(keys)]
+    touched = [
+        any(
+            np.array_equal(rows.F_t, changed.F_t)
+            for rows in (task.own, *(r for of in task.others.values() for r in of))
+        )
+        or task.terrain == "B0"
+        for task in after
+    ]
+    assert is_same == [not is_touched for is_touched in touched]
+    assert any(is_same)
+    other, _ = plan_folds(trials, replace(SMALL_FIT, seed=9))
+    assert task_key(other.outline(0)) != task_key(after.outline(0))
+
+
+def test_folds_of_other_targets_have_other_outlines(trials):
+    before, _ = plan_folds(trials, SMALL_FIT)
+    moved = {n: [replace(t, F_t=t.F_t + 1) for t in of] for n, of in trials.items()}
+    after, _ = plan_folds(trials, SMALL_FIT, moved)
+    assert before.outline(0)[3] == after.outline(0)[3]
+    assert before.outline(0)[4:6] != after.outline(0)[4:6]
+
+
+def test_a_plan_that_was_sent_gives_the_same_folds(trials):
+    plan, _ = plan_folds(trials, SMALL_FIT)
+    plan.outline(0)
+    sent = copy.deepcopy(plan)  # as pickle does it
+    for one, other in zip(plan[:], sent[:], strict=True):
+        assert task_key(one) == task_key(other)

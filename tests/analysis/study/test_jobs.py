@@ -1,3 +1,6 @@
+from collections.abc import Sequence
+
+import numpy as np
 import pytest
 
 from analysis.study.jobs import available_cores, run_tasks
@@ -34,3 +37,50 @@ def test_an_error_in_a_task_is_not_swallowed():
 
 def test_there_is_at_least_one_core():
     assert available_cores() >= 1
+
+
+class Sums(Sequence):
+    """Tasks made from one array: the first numbers of it."""
+
+    def __init__(self, values):
+        self.values = values
+
+    def __len__(self):
+        return 6
+
+    def __getitem__(self, index):
+        return self.values[:index]
+
+    def outline(self, index):
+        return ("sum", index)
+
+
+def total(values):
+    return float(values.sum()), type(values).__name__
+
+
+class Memory:
+    """A store in memory that notes what it is asked for."""
+
+    def __init__(self):
+        self.results = {}
+
+    def get(self, key):
+        return self.results.get(key)
+
+    def put(self, key, result):
+        self.results[key] = result
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_tasks_of_one_body_of_data_are_known_by_their_numbers(n_jobs):
+    tasks, store = Sums(np.arange(50_000.0)), Memory()
+    found = run_tasks(total, tasks, n_jobs, store=store)
+    assert [value for value, _ in found] == [0.0, 0.0, 1.0, 3.0, 6.0, 10.0]
+    assert set(store.results) == {("sum", k) for k in range(6)}
+    assert run_tasks(fail, tasks, 1, store=store) == found
+
+
+def test_workers_map_the_data_that_tasks_share():
+    *_, last = run_tasks(total, Sums(np.arange(50_000.0)), 2)
+    assert last == (10.0, "memmap")

@@ -11,8 +11,8 @@ import pytest
 
 from acquisition.clock import SystemClock
 from analysis.data.load import load_trial
+from experiments.board.upcoming import confounding, suggest_order
 from experiments.session.annotations import parse_trial
-from experiments.session.matrix_board import confounding, suggest_order
 from experiments.session.reducer import replay
 from experiments.settings.load import load_settings
 from tests.experiments.program import (

@@ -1,0 +1,138 @@
+"""All benchmarks, one table: what, today, goal, met or not.
+
+    python -m benchmarks [--only NAME ...] [--write]
+
+Each benchmark runs in a process of its own, one after the other, with one thread of
+linear algebra. `--write` puts the table into docs/measured.md, between its marks. A
+whole run takes less than 15 minutes.
+"""
+
+import argparse
+import datetime
+import importlib
+import importlib.metadata
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+from benchmarks.rows import BenchRow
+
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "measured.md"
+BEGIN, END = "<!-- python -m benchmarks -->", "<!-- end of the table -->"
+NAMES = (
+    *("lockstep", "fit", "analysis_speed", "scale"),
+    *("can_doors", "codec", "load", "recorder"),
+)
+PEERS = ("scikit-learn", "GPy", "tinygp", "jax", "numpy", "scipy", "python-can", "mcap")
+_LIMIT_S = 400
+_MARK = "ROWS "
+
+
+def run_one(name: str) -> list[BenchRow]:
+    """Return the rows of one benchmark, run in a process of its own."""
+    command = [sys.executable, "-m", "benchmarks", "--inside", name]
+    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
+    try:
+        done = subprocess.run(
+            command,
+            cwd=ROOT,
+            env=os.environ | threads,
+            capture_output=True,
+            text=True,
+            timeout=_LIMIT_S,
+            check=True,
+        )
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
+        return [BenchRow(name, None, "", note=f"failed: {type(error).__name__}")]
+    (line,) = (x for x in done.stdout.splitlines() if x.startswith(_MARK))
+    return [BenchRow(**row) for row in json.loads(line.removeprefix(_MARK))]
+
+
+def surroundings() -> str:
+    """Return commit, machine, date and versions in one paragraph."""
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty", "--abbrev=10"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    ).stdout.strip()
+    today = datetime.datetime.now(datetime.UTC).date()
+    load = os.getloadavg()[0]
+    return (
+        f"Commit {commit or 'unknown'}, {today}, Python {platform.python_version()}, "
+        f"{len(os.sched_getaffinity(0))} cores ({processor()}), load {load:.1f} at the "
+        f"end. {', '.join(map(version_of, PEERS))}."
+    )
+
+
+def processor() -> str:
+    """Return the name of the processor."""
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return line.partition(":")[2].strip()
+    return platform.machine()
+
+
+def version_of(name: str) -> str:
+    """Return a library with its version."""
+    try:
+        return f"{name} {importlib.metadata.version(name)}"
+    except importlib.metadata.PackageNotFoundError:
+        return f"{name} not installed"
+
+
+def table_of(found: dict[str, list[BenchRow]]) -> str:
+    """Return the table in Markdown."""
+    lines = ["| what | today | goal | | `python -m benchmarks --only` |"]
+    lines.append("|---|---|---|---|---|")
+    lines += [
+        f"| {' | '.join(row.cells())} | {name} |"
+        for name, rows in found.items()
+        for row in rows
+    ]
+    return "\n".join(lines)
+
+
+def with_table(page: str, text: str) -> str:
+    """Return the page with `text` between its marks.
+
+    Raises:
+        ValueError: the page has no marks.
+    """
+    before, begin, rest = page.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError("the page has no marks for the table")
+    return f"{before}{BEGIN}\n{text}\n{END}{after}"
+
+
+def main() -> int:
+    """Run, print and write."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES)
+    parser.add_argument("--write", action="store_true", help=f"into {PAGE.name}")
+    parser.add_argument("--inside", choices=NAMES, help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.inside:
+        rows = importlib.import_module(f"benchmarks.{arguments.inside}").rows()
+        print(_MARK + json.dumps([row.plain() for row in rows]))
+        return 0
+    found: dict[str, list[BenchRow]] = {}
+    for name in arguments.only:
+        found[name] = run_one(name)
+        for row in found[name]:
+            print("  ".join(row.cells()), flush=True)
+    text = f"\n{surroundings()}\n\n{table_of(found)}\n"
+    print(text)
+    if arguments.write:
+        PAGE.write_text(with_table(PAGE.read_text(), text))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

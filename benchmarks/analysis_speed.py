@@ -1,0 +1,85 @@
+"""What the analysis costs: one recorded trial, one fold, one answer of a table.
+
+    python -m benchmarks.analysis_speed
+
+Processor time, the best of a few repeats.
+"""
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from analysis.data import load_trial
+from analysis.study import run_fold
+from analysis.terrains.table import Table
+from benchmarks.rows import BenchRow
+from benchmarks.study_race import folds_of
+from experiments.__main__ import main as traction
+from experiments.report import REPORTED
+
+SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
+_SECONDS = 30.0  # of a trial
+
+
+def best(function: Callable[[], object], repeats: int, calls: int = 1) -> float:
+    """Return the smallest processor time of one call [s]."""
+    times: list[float] = []
+    for _ in range(repeats):
+        before = time.process_time()
+        for _ in range(calls):
+            function()
+        times.append((time.process_time() - before) / calls)
+    return min(times)
+
+
+def trial_row() -> BenchRow:
+    """Return what loading a simulated trial costs, scaled to 30 s of recording."""
+    with tempfile.TemporaryDirectory() as folder:
+        options = "run S0 --fake --fast --operator-script auto --trials 1"
+        if traction([*options.split(), "--data", folder]):
+            raise RuntimeError("the session was not recorded")
+        (path,) = Path(folder).glob("sessions/*/trials/T01.mcap")
+        seconds = float(np.ptp(load_trial(path).t))
+        spent = best(lambda: load_trial(path).series(), 7) * _SECONDS / seconds
+    what = "one trial of 30 s loaded, all derived arrays"
+    return BenchRow(what, 1e3 * spent, "ms", 12)
+
+
+def fold_row() -> BenchRow:
+    """Return what one fold of the report's models costs."""
+    task = folds_of(SLICE)[0]
+    task = replace(task, options=replace(task.options, models=REPORTED))
+    what = f"a fold of the report's {len(REPORTED)} models"
+    return BenchRow(what, best(lambda: run_fold(task), 2), "s", 0.4)
+
+
+def table_rows() -> list[BenchRow]:
+    """Return what answers of a terrain database cost."""
+    dice = np.random.default_rng(1)
+    loads, speeds = np.linspace(0.5, 20.0, 20), np.linspace(0.005, 0.2, 16)
+    forces = np.sort(dice.normal(size=(9, 20, 16)), axis=0)
+    rows = tuple(tuple(map(tuple, grid)) for grid in forces.tolist())
+    shares = tuple(np.linspace(0.01, 0.99, 9).tolist())
+    table = Table(tuple(loads.tolist()), tuple(speeds.tolist()), shares, rows)
+    found: dict[int, float] = {}
+    for count, calls in ((10, 1000), (100_000, 3)):
+        F_n, v_t = dice.uniform(0.5, 20.0, count), dice.uniform(0.005, 0.2, count)
+        found[count] = best(lambda F=F_n, v=v_t: table.over(F, v), 5, calls)
+    return [
+        BenchRow("terrain database, 10 points", 1e6 * found[10], "us", 8),
+        BenchRow("terrain database, 100,000 points", 1e3 * found[100_000], "ms", 10),
+    ]
+
+
+def rows() -> list[BenchRow]:
+    """Return what was measured, for the table."""
+    return [trial_row(), fold_row(), *table_rows()]
+
+
+if __name__ == "__main__":
+    for line in rows():
+        print("  ".join(line.cells()))

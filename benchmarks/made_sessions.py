@@ -1,0 +1,66 @@
+"""Sessions as they lie on the disk, made in a moment: what `scale` counts.
+
+Journal, session.json and sidecars are what the program writes; the recordings are a few
+kilobytes of noise, for the board looks at nothing but their checksums.
+"""
+
+import hashlib
+import json
+import random
+from pathlib import Path
+
+from experiments.session.data_files import journal_line
+from experiments.session.states import Event
+
+TERRAINS = ("S0", "S10", "S15", "B0", "B10", "B15", "TF", "Tf")
+_UTC = "2027-01-15T10:00:00Z"
+
+
+def make_sessions(
+    data: Path, count: int, *, trials: int = 10, size: int = 4096
+) -> list[Path]:
+    """Write complete sessions below `data` and return their folders.
+
+    Args:
+        data: a data folder, without sessions.
+        count: how many sessions.
+        trials: kept trials of each.
+        size: of a recording [bytes].
+    """
+    folders: list[Path] = []
+    for number in range(1, count + 1):
+        terrain = TERRAINS[number % len(TERRAINS)]
+        name = f"2027-01-15_S{number:03d}_{terrain}.fake"
+        folders.append(data / "sessions" / name)
+        _make_session(folders[-1], terrain, trials, random.Random(number), size)
+    return folders
+
+
+def _make_session(
+    folder: Path, terrain: str, trials: int, noise: random.Random, size: int
+) -> None:
+    for name in ("trials", "rejected", "faults"):
+        (folder / name).mkdir(parents=True)
+    events: list[dict[str, object]] = [
+        {"event": Event.STARTED, "terrain": terrain, "trials": trials},
+        {"event": Event.ACTIVATED},
+    ]
+    for number in range(1, trials + 1):
+        recording = noise.randbytes(size)
+        sums = {"sha256": hashlib.sha256(recording).hexdigest(), "size": size}
+        trial = {"trial": number, "attempt": 1}
+        events += [
+            {"event": Event.TRIAL_STARTED, **trial},
+            {"event": Event.TRIAL_RECORDED, **trial},
+            {"event": Event.TRIAL_KEPT, **trial, **sums},
+        ]
+        stem = folder / "trials" / f"T{number:02d}"
+        stem.with_suffix(".mcap").write_bytes(recording)
+        sidecar = {"trial": stem.name, "attempt": 1, "verdict": "keep", **sums}
+        stem.with_suffix(".json").write_text(json.dumps(sidecar))
+    events.append({"event": Event.ENDED, "reason": "complete"})
+    lines = [journal_line({**event, "utc": _UTC}) for event in events]
+    (folder / "events.jsonl").write_bytes(b"".join(lines))
+    summary = {"id": folder.name[11:15], "phase": "complete", "operator": "made"}
+    (folder / "session.json").write_text(json.dumps(summary))
+    (folder / ".lock").write_text("{}")

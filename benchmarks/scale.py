@@ -1,0 +1,176 @@
+"""How cost grows: folds with the number of trials, the board with that of sessions.
+
+    python -m benchmarks.scale [--json]
+
+Time is processor time, memory the peak of what Python and numpy allocate. The exponent
+is that of the growth from the largest but one size to the largest; beyond 1.25, which
+leaves room for a busy machine, the exit code is 1.
+"""
+
+import argparse
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from analysis.study import FitOptions, plan_folds
+from analysis.study.store import task_key
+from benchmarks.made_sessions import TERRAINS, make_sessions
+from benchmarks.rows import BenchRow
+
+TRIALS, SESSIONS = (10, 80, 240, 800), (10, 100, 1000)
+_KEPT = 450  # rows of a trial that models are fitted to
+_LINEAR = 1.25
+_REPEATS = 3
+
+
+def made_trials(count: int) -> dict[str, list[Any]]:
+    """Return prepared trials on eight terrains that have only their kept samples."""
+    noise = np.random.default_rng(count)
+    trials: dict[str, list[Any]] = {}
+    for k in range(count):
+        F_n, v_t, F_t = noise.normal(size=(3, _KEPT))
+        made = SimpleNamespace(name=f"T{k}", kept=_KEPT, F_n=F_n, v_t=v_t, F_t=F_t)
+        trials.setdefault(TERRAINS[k % len(TERRAINS)], []).append(made)
+    return trials
+
+
+def folds_of(count: int) -> dict[str, float]:
+    """Return what planning so many folds takes, and what a task ships."""
+    trials, times = made_trials(count), []
+    for _ in range(_REPEATS):
+        start = time.process_time()
+        plan, _ = plan_folds(trials, FitOptions())
+        for k in range(len(plan)):
+            task_key(plan.outline(k))
+        times.append(time.process_time() - start)
+    tracemalloc.start()
+    plan, _ = plan_folds(trials, FitOptions())
+    for k in range(len(plan)):
+        task_key(plan.outline(k))
+    for k in range(0, len(plan), max(1, len(plan) // 10)):
+        _ = plan[k].training
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return {"count": count, "seconds": min(times), "megabytes": peak / 1e6}
+
+
+def board_of(count: int) -> dict[str, float]:
+    """Return the processor time of `traction status` over so many sessions [s].
+
+    The second look counts, at files that have not changed; the first one hashes all.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        data, home = Path(folder) / "data", Path(folder) / "cache"
+        make_sessions(data, count)
+        time.sleep(2.1)  # what has just changed is read again
+        _status(data, home)
+        times = [_status(data, home) for _ in range(_REPEATS)]
+    return {"count": count, "seconds": min(times)}
+
+
+def _status(data: Path, home: Path) -> float:
+    """Return the processor time of one status [s]."""
+    before = os.times()
+    subprocess.run(
+        [sys.executable, "-m", "traction", "status", "--data", str(data)],
+        env={**os.environ, "XDG_CACHE_HOME": str(home)},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=True,
+    )
+    after = os.times()
+    return (
+        after.children_user
+        + after.children_system
+        - before.children_user
+        - before.children_system
+    )
+
+
+def shipped_bytes() -> int:
+    """Return the pickled call of a task: a function's name, a number, a future's key.
+
+    The samples are scattered once. Dask's own envelope is not counted.
+    """
+    from distributed.protocol.pickle import dumps
+
+    from analysis.study import run_fold
+
+    return len(dumps((run_fold, 799, "future")))
+
+
+def exponent(points: list[dict[str, float]], key: str) -> float:
+    """Return p of cost ~ size^p between the two largest sizes."""
+    *_, small, large = points
+    growth = math.log(large[key] / small[key])
+    return growth / math.log(large["count"] / small["count"])
+
+
+def measured() -> dict[str, Any]:
+    """Return costs by size."""
+    with tempfile.TemporaryDirectory() as folder:
+        empty = Path(folder) / "data"
+        _status(empty, Path(folder))
+        nothing = min(_status(empty, Path(folder)) for _ in range(_REPEATS))
+    return {
+        "folds": [folds_of(count) for count in TRIALS],
+        "boards": [board_of(count) for count in SESSIONS],
+        "empty": nothing,
+    }
+
+
+def rows_of(found: dict[str, Any]) -> list[BenchRow]:
+    """Return the table's lines."""
+    folds, boards = found["folds"], found["boards"]
+    last, board = folds[-1], boards[-1]
+    unchanged = "`status`, 1,000 sessions, nothing changed"
+    grown = {
+        "planning grows as trials to the power of": exponent(folds, "seconds"),
+        "its memory grows to the power of": exponent(folds, "megabytes"),
+        "`status` grows as sessions to the power of": exponent(boards, "seconds"),
+    }
+    return [
+        BenchRow("folds of 800 trials: memory", last["megabytes"], "MB", 300),
+        BenchRow("folds of 800 trials: planned and known", last["seconds"], "s", 1),
+        BenchRow("shipped per Dask task", shipped_bytes() / 1e3, "kB", 40),
+        BenchRow("`status`, an empty folder", 1e3 * found["empty"], "ms", 150),
+        BenchRow(unchanged, board["seconds"], "s", 1.0),
+        *(BenchRow(what, power, "", _LINEAR) for what, power in grown.items()),
+    ]
+
+
+def rows() -> list[BenchRow]:
+    """Return what was measured, for the table."""
+    return rows_of(measured())
+
+
+def main() -> int:
+    """Print costs by size and what they grow with; 1 beyond linear."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--json", action="store_true", help="print JSON instead")
+    arguments = parser.parse_args()
+    found = measured()
+    lines = rows_of(found)
+    if arguments.json:
+        print(json.dumps(found | {"rows": [row.plain() for row in lines]}, indent=1))
+    else:
+        for point in [*found["folds"], *found["boards"]]:
+            print("  ".join(f"{key} {value:.3g}" for key, value in point.items()))
+        for row in lines:
+            print("  ".join(row.cells()))
+    grown = [row for row in lines if "power" in row.what and row.verdict == "not met"]
+    return 1 if grown else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

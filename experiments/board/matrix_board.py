@@ -1,0 +1,179 @@
+"""The matrix board: kept trials per terrain, counted from verified files only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from acquisition import SettingsError
+from experiments.board.session_summaries import SeenSession, facts_of
+from experiments.session import list_sessions
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from experiments.board.board_cache import BoardCache, BoardRow
+    from experiments.session import Deviation
+
+KEYS = ("terrain", "stones", "incline_deg", "foot", "kind", "session", "operator")
+
+
+def see_sessions(
+    data: Path, where: Mapping[str, str], cache: BoardCache
+) -> list[SeenSession]:
+    """Return all sessions below `data`, each read once, oldest number first.
+
+    Args:
+        data: the data folder.
+        where: checksums are needed only of sessions with these values.
+        cache: what is known of sessions that have not changed.
+    """
+    seen: list[SeenSession] = []
+    for folder in list_sessions(data):
+        is_asked = matches(facts_of(folder), where)
+        look = cache.summary if is_asked else cache.glance
+        seen.append(SeenSession(folder, look(folder)))
+    return seen
+
+
+@dataclass(frozen=True, slots=True)
+class MatrixRow:
+    """One terrain, live or simulated: what is kept of what is wanted.
+
+    Attributes:
+        terrain: its name.
+        is_simulated: trials of simulated devices.
+        kept: how many verified trials are kept.
+        wanted: how many there are to be.
+        rejected: how many attempts were rejected or interrupted.
+        sessions: ids of the sessions.
+        trials: in how many sessions T01, T02 ... are kept, in this order.
+    """
+
+    terrain: str
+    is_simulated: bool
+    kept: int
+    wanted: int
+    rejected: int
+    sessions: tuple[str, ...]
+    trials: tuple[int, ...]
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the line for JSON."""
+        return asdict(self)
+
+    def cells(self) -> str:
+        """Return one sign per trial: kept, kept in several sessions, missing."""
+        signs = {0: "·", 1: "█"}
+        return "".join(signs.get(n, str(min(n, 9))) for n in self.trials)
+
+
+def count_board(
+    seen: Sequence[SeenSession],
+    rows: Sequence[BoardRow],
+    where: Mapping[str, str] | None = None,
+) -> list[MatrixRow]:
+    """Return a line per terrain of the matrix, live first, simulated where there is.
+
+    Args:
+        seen: the sessions.
+        rows: the terrains.
+        where: only terrains and sessions with these values, by a name of `KEYS`.
+    """
+    where = where or {}
+    sessions = counted_of(seen, where)
+    lines: list[MatrixRow] = []
+    for row in rows:
+        if not matches(facts_of_row(row), where):
+            continue
+        for is_simulated in (False, True):
+            own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
+            is_wanted = not is_simulated and where.get("kind") != "simulated"
+            if own or (is_wanted and not {"session", "operator"} & set(where)):
+                lines.append(_line(row, own, is_simulated=is_simulated))
+    return lines
+
+
+def counted_of(
+    seen: Sequence[SeenSession], where: Mapping[str, str]
+) -> list[SeenSession]:
+    """Return the sessions of pushes with these values that can be read."""
+    return [
+        s
+        for s in seen
+        if s.summary.problem is None and not s.summary.is_of_stances
+        if matches(s.facts, where)
+    ]
+
+
+def is_of(session: SeenSession, row: BoardRow, *, is_simulated: bool) -> bool:
+    """Return whether a session is of this terrain, and live or simulated as asked."""
+    folder = session.folder
+    return folder.terrain == row.name and folder.is_simulated is is_simulated
+
+
+def compare_board(
+    seen: Sequence[SeenSession], where: Mapping[str, str]
+) -> list[Deviation]:
+    """Return what is missing or changed of the kept trials on the board.
+
+    Args:
+        seen: the sessions.
+        where: only sessions with these values, as in `count_board`; what cannot be
+            read is named of every session.
+    """
+    asked = [s for s in seen if s.summary.problem or matches(s.facts, where)]
+    found = [d for s in asked for d in s.summary.deviations]
+    found += [s.summary.problem for s in seen if s.summary.problem is not None]
+    return list(dict.fromkeys(found))
+
+
+def parse_where(text: str) -> dict[str, str]:
+    """Return the conditions in `K=V,K=V`.
+
+    Raises:
+        SettingsError: it is not of that form, or a key is unknown.
+    """
+    conditions: dict[str, str] = {}
+    for part in filter(None, text.split(",")):
+        key, sign, value = part.partition("=")
+        if key not in KEYS or not sign or not value:
+            raise SettingsError(
+                f"--where {part!r} - expected KEY=VALUE, e.g. kind=live.",
+                hint=f"Keys: {', '.join(KEYS)}.",
+            )
+        conditions[key] = value
+    return conditions
+
+
+def facts_of_row(row: BoardRow) -> dict[str, str]:
+    """Return what conditions can ask of a row of the matrix."""
+    incline = f"{row.incline_deg:g}"
+    return {
+        "terrain": row.name,
+        "stones": row.stones,
+        "incline_deg": incline,
+        "foot": row.foot,
+    }
+
+
+def matches(fields: Mapping[str, str], where: Mapping[str, str]) -> bool:
+    """Return whether every fact that is asked for has the value."""
+    return all(fields[key] == value for key, value in where.items() if key in fields)
+
+
+def _line(
+    row: BoardRow, sessions: Sequence[SeenSession], *, is_simulated: bool
+) -> MatrixRow:
+    kept = [name for s in sessions for name in s.summary.kept]
+    names = [f"T{number:02d}" for number in range(1, row.trials + 1)]
+    return MatrixRow(
+        terrain=row.name,
+        is_simulated=is_simulated,
+        kept=len(kept),
+        wanted=row.trials,
+        rejected=sum(s.summary.rejected for s in sessions),
+        sessions=tuple(s.folder.id for s in sessions),
+        trials=tuple(kept.count(name) for name in names),
+    )

@@ -1,0 +1,167 @@
+"""What the board needs to know of one session, and a sign that its files changed."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from hashlib import blake2b
+from typing import TYPE_CHECKING
+
+from acquisition import TrialFileError
+from experiments.session import list_sessions
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from experiments.session import Deviation, SessionFolder
+
+_FOLDERS = ("", "trials", "rejected", "faults")
+
+
+@dataclass(frozen=True, slots=True)
+class SessionSummary:
+    """One session as the board counts it.
+
+    Attributes:
+        kept: names of the kept trials whose checksum is right, "T01".
+        pushes: how many kept trials tell about the next push.
+        rejected: how many attempts were rejected or interrupted.
+        is_of_stances: the foot stands in its trials.
+        is_resumable: its journal leaves something to be recorded, or to be put away.
+        operator: who recorded it, as session.json has it.
+        phase: where it stands, as session.json has it.
+        deviations: what is missing or changed of the kept trials.
+        problem: what leads out of the session or cannot be read; None for nothing.
+            Such a session is not counted.
+    """
+
+    kept: tuple[str, ...] = ()
+    pushes: int = 0
+    rejected: int = 0
+    is_of_stances: bool = False
+    is_resumable: bool = False
+    operator: str = ""
+    phase: str = ""
+    deviations: tuple[Deviation, ...] = ()
+    problem: Deviation | None = None
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether every file is there, can be read and is what the journal says."""
+        return self.problem is None and not self.deviations
+
+
+@dataclass(frozen=True, slots=True)
+class SeenSession:
+    """A session, and what it looked like when it was read.
+
+    Attributes:
+        folder: the session.
+        summary: what the board needs of it.
+    """
+
+    folder: SessionFolder
+    summary: SessionSummary
+
+    @property
+    def facts(self) -> dict[str, str]:
+        """What conditions can ask of it."""
+        return {**facts_of(self.folder), "operator": self.summary.operator}
+
+
+def summarise(folder: SessionFolder) -> SessionSummary:
+    """Return what a session is; kept trials are held against their checksums."""
+    from experiments.session import sha256_of
+
+    return _summarise(folder, cache(sha256_of))
+
+
+def glance(folder: SessionFolder) -> SessionSummary:
+    """Return the same without checksums: no trial counts as kept or as changed."""
+    return _summarise(folder, None)
+
+
+def _summarise(
+    folder: SessionFolder, digest: Callable[[Path], str] | None
+) -> SessionSummary:
+    from experiments.session import (
+        compare_kept,
+        kept_pushes,
+        owner_of,
+        read_json,
+        unreadable,
+    )
+
+    deviations = tuple(compare_kept(folder, digest)) if digest else ()
+    try:
+        kept = folder.kept_trials(digest or (lambda _: ""))
+        rejected = len(folder.rejected_sidecars())
+        owner_of(folder)
+        fields = read_json(folder.path / "session.json")
+        return SessionSummary(
+            kept=tuple(path.stem for path in kept),
+            pushes=len(kept_pushes(folder)),
+            rejected=rejected,
+            is_of_stances=folder.is_of_stances,
+            is_resumable=_is_resumable(folder),
+            operator=str(fields.get("operator", "")),
+            phase=str(fields.get("phase", "opening")),
+            deviations=deviations,
+        )
+    except TrialFileError as error:
+        return SessionSummary(deviations=deviations, problem=unreadable(folder, error))
+
+
+def _is_resumable(folder: SessionFolder) -> bool:
+    from experiments.session import is_unfinished, replay
+
+    return is_unfinished(replay(folder.events()))
+
+
+def glance_sessions(data: Path) -> list[SeenSession]:
+    """Return all sessions below `data` without a look at any checksum."""
+    return [SeenSession(folder, glance(folder)) for folder in list_sessions(data)]
+
+
+def facts_of(folder: SessionFolder) -> dict[str, str]:
+    """Return what conditions can ask of a session that was not read."""
+    kind = "simulated" if folder.is_simulated else "live"
+    return {"kind": kind, "session": folder.id}
+
+
+def signature_of(folder: Path) -> tuple[str, int]:
+    """Return a digest of the state of every file of a session, and its newest change.
+
+    Of every entry of the folder and of trials/, rejected/ and faults/ it has the name,
+    kind, size, inode, links and the times of the last change of content and of inode.
+    The kernel sets the latter, no program can. What changes the bytes behind the back
+    of the file system has no sign: a disk that rots, a block device written to.
+
+    Returns:
+        The digest, and the newest of all these times [ns since 1970].
+
+    Raises:
+        OSError: a folder cannot be listed.
+    """
+    digest, newest = blake2b(digest_size=16), 0
+    for name in _FOLDERS:
+        path = os.path.join(folder, name)  # noqa: PTH118 - a thousand times
+        try:
+            status = os.stat(path, follow_symlinks=False)  # noqa: PTH116
+        except FileNotFoundError:
+            continue
+        states = [(name, status)]
+        if stat.S_ISDIR(status.st_mode):
+            with os.scandir(path) as entries:
+                states += [(e.name, e.stat(follow_symlinks=False)) for e in entries]
+        for entry, s in sorted(states, key=lambda state: state[0]):
+            newest = max(newest, s.st_mtime_ns, s.st_ctime_ns)
+            text = (
+                f"{entry}\0{s.st_mode} {s.st_size} {s.st_mtime_ns} {s.st_ctime_ns} "
+                f"{s.st_dev} {s.st_ino} {s.st_nlink}\0"
+            )
+            digest.update(text.encode("utf-8", "surrogateescape"))
+    return digest.hexdigest(), newest

@@ -1,0 +1,192 @@
+"""What comes next: sessions to be resumed, terrains that have enough, a good order."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from acquisition import TrialFileError
+from experiments.arguments import data_option
+from experiments.board.matrix_board import counted_of, facts_of_row, is_of, matches
+from experiments.session import owner_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from experiments.board.board_cache import BoardRow
+    from experiments.board.session_summaries import SeenSession
+
+_DRAWS = 400  # orders
+_SEED = 1  # the same data give the same advice
+
+
+def next_steps(
+    data: Path,
+    seen: Sequence[SeenSession],
+    rows: Sequence[BoardRow],
+    *,
+    is_simulated: bool,
+) -> list[str]:
+    """Return what others have open, what is to be resumed, which terrain comes next."""
+    own = [s for s in seen if s.summary.problem is None]
+    own = [s for s in own if s.folder.is_simulated is is_simulated]
+    steps = [text for text in map(_opened, own) if text]
+    option = data_option(data)
+    for session in own:
+        text = _left(session) if session.summary.is_resumable else ""
+        if text:
+            number = session.folder.id
+            steps.append(f"{text} To go on: traction resume {number}{option}")
+    done = [s.folder.terrain for s in own if not s.summary.is_of_stances]
+    order = suggest_order(rows, done)
+    if order:
+        steps.append(f"Suggested order, randomised against drift: {' '.join(order)}")
+    return steps
+
+
+def _opened(session: SeenSession) -> str:
+    """Return by which other process a session is open; empty for none."""
+    owner = owner_of(session.folder)
+    if owner is None or owner.pid == os.getpid():
+        return ""
+    return (
+        f"{session.folder.id} {session.folder.terrain} is open in process {owner.pid} "
+        f"since {owner.since} UTC: {session.summary.phase}."
+    )
+
+
+def _left(session: SeenSession) -> str:
+    """Return what there is to be resumed of a session; empty for nothing."""
+    from experiments.session import inspect_session
+
+    with suppress(OSError, TrialFileError):
+        unfinished = inspect_session(session.folder)
+        return "" if unfinished is None else unfinished.text()
+    return ""
+
+
+def enough_lines(
+    seen: Sequence[SeenSession], rows: Sequence[BoardRow], where: Mapping[str, str]
+) -> list[str]:
+    """Return the terrains whose kept trials are enough for their target.
+
+    Nothing is said, nor read, of one of which as many are kept as are wanted.
+
+    Args:
+        seen: the sessions.
+        rows: the terrains and their targets.
+        where: only these, as in `count_board`.
+    """
+    lines: list[str] = []
+    sessions = counted_of(seen, where)
+    for row in rows:
+        if not matches(facts_of_row(row), where):
+            continue
+        for is_simulated in (False, True):
+            own = [s for s in sessions if is_of(s, row, is_simulated=is_simulated)]
+            if 0 < sum(s.summary.pushes for s in own) < row.trials:
+                lines.append(_enough(own, row))
+    return [text for text in lines if text]
+
+
+def _enough(own: Sequence[SeenSession], row: BoardRow) -> str:
+    from experiments.session import enough_of
+
+    return enough_of([s.folder for s in own], row)
+
+
+def suggest_order(rows: Sequence[BoardRow], done: Sequence[str]) -> list[str]:
+    """Return the terrains still to be recorded in a good order.
+
+    A foot that wears, a sensor that drifts and a person who learns change with time.
+    If the inclines came in rising order, these could not be told from the incline. So
+    of many random orders that one is taken in which inclination, size of the stones
+    and tread go least with the place in the whole sequence.
+
+    Args:
+        rows: the matrix.
+        done: names of the terrains recorded so far, oldest first.
+    """
+    factors = {row.name: _factors(row) for row in rows}
+    begun = [name for name in done if name in factors]
+    rest = [row.name for row in rows if row.name not in begun]
+    if not rest:
+        return []
+    columns = _columns([*begun, *rest], factors, len(begun))
+    dice = random.Random(_SEED)
+    orders = [dice.sample(rest, len(rest)) for _ in range(_DRAWS)]
+    return min(orders, key=lambda order: max((c.of(order) for c in columns), default=0))
+
+
+def confounding(order: Sequence[str], factors: Mapping[str, Sequence[float]]) -> float:
+    """Return the largest |correlation| of a factor with the place in `order`."""
+    columns = _columns(order, factors, 0)
+    return max((column.of(order) for column in columns), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class _Column:
+    """One factor of the terrains in a sequence whose beginning is fixed.
+
+    Attributes:
+        centred: the factor less its mean, by the name of the terrain.
+        size: its spread times that of the places in the sequence.
+        places: those that are still to be filled, less the mean of all.
+        begun: products of place and factor at the beginning, exactly: their sum.
+    """
+
+    centred: Mapping[str, float]
+    size: float
+    places: Sequence[float]
+    begun: Sequence[float]
+
+    def of(self, order: Sequence[str]) -> float:
+        """Return |correlation| with the place if the rest comes in this order."""
+        own = [p * self.centred[n] for p, n in zip(self.places, order, strict=True)]
+        return abs(math.fsum((*self.begun, *own))) / self.size
+
+
+def _columns(
+    order: Sequence[str], factors: Mapping[str, Sequence[float]], begun: int
+) -> list[_Column]:
+    """Return the factors that vary; the first `begun` terrains keep their places."""
+    count = len(order)
+    places = [place - (count - 1) / 2 for place in range(count)]
+    squares = math.fsum(p * p for p in places)
+    columns: list[_Column] = []
+    for values in zip(*(factors[name] for name in order), strict=True):
+        mean = math.fsum(values) / count
+        centred = [value - mean for value in values]
+        size = math.sqrt(math.fsum(c * c for c in centred) * squares)
+        if size > 0.0:
+            pairs = zip(places[:begun], centred[:begun], strict=True)
+            first = _parts([p * c for p, c in pairs])
+            named = dict(zip(order, centred, strict=True))
+            columns.append(_Column(named, size, places[begun:], first))
+    return columns
+
+
+def _parts(values: Sequence[float]) -> list[float]:
+    """Return a few numbers whose exact sum is that of `values` (Shewchuk, 1997)."""
+    parts: list[float] = []
+    for value in values:
+        rest, kept = value, list[float]()
+        for part in parts:
+            large, small = (rest, part) if abs(rest) > abs(part) else (part, rest)
+            rest = large + small
+            error = small - (rest - large)
+            if error:
+                kept.append(error)
+        parts = [*kept, rest]
+    return parts
+
+
+def _factors(row: BoardRow) -> tuple[float, ...]:
+    """Return inclination and, as 0 or 1: big stones, a plate, a bare foot."""
+    signs = (row.stones == "big", row.stones == "none", row.foot == "bare")
+    return (row.incline_deg, *map(float, signs))

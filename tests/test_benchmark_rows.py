@@ -1,0 +1,65 @@
+"""A line of the table says whether its goal is met; growth is an exponent."""
+
+import importlib.util
+
+import pytest
+
+from benchmarks.__main__ import NAMES, PAGE, table_of, with_table
+from benchmarks.rows import BenchRow
+from benchmarks.scale import exponent, rows_of
+
+
+@pytest.mark.parametrize(
+    ("row", "verdict"),
+    [
+        (BenchRow("x", 1.0, "s", 2.0), "met"),
+        (BenchRow("x", 3.0, "s", 2.0), "not met"),
+        (BenchRow("x", 3.0, "times", 2.0, is_least=True), "met"),
+        (BenchRow("x", 1.0, "times", 2.0, is_least=True), "not met"),
+        (BenchRow("x", 1.0, "s"), ""),
+        (BenchRow("x", None, "s", 2.0, note="not installed"), ""),
+    ],
+)
+def test_a_row_says_whether_its_goal_is_met(row, verdict):
+    assert row.verdict == verdict
+
+
+def test_a_row_without_a_value_says_why():
+    what, today, goal, _ = BenchRow("x", None, "s", 2.0, note="no GPy").cells()
+    assert (what, today, goal) == ("x (no GPy)", "-", "≤ 2 s")
+
+
+@pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
+def test_growth_is_told_as_a_power(power):
+    points = [{"count": n, "seconds": 3.0 * n**power} for n in (10, 100, 1000)]
+    assert exponent(points, "seconds") == pytest.approx(power)
+
+
+def test_growth_beyond_linear_is_not_met():
+    def costs(power):
+        return [
+            {"count": n, "seconds": n**power, "megabytes": n * 1e-3} for n in (80, 800)
+        ]
+
+    found = {"folds": costs(2.0), "boards": costs(0.9), "empty": 0.1}
+    verdicts = {row.what: row.verdict for row in rows_of(found)}
+    assert verdicts["planning grows as trials to the power of"] == "not met"
+    assert verdicts["`status` grows as sessions to the power of"] == "met"
+
+
+def test_the_table_goes_between_its_marks_and_again():
+    page = PAGE.read_text()
+    text = table_of({"scale": [BenchRow("x", 1.0, "s", 2.0)]})
+    once = with_table(page, text)
+    assert "| x | 1 s | ≤ 2 s | met | scale |" in once
+    assert with_table(once, text) == once
+    assert with_table(once, "").count("| x |") == 0
+
+
+def test_a_page_without_marks_is_refused():
+    with pytest.raises(ValueError, match="no marks"):
+        with_table("# Measured", "")
+
+
+def test_every_benchmark_is_there():
+    assert all(importlib.util.find_spec(f"benchmarks.{name}") for name in NAMES)
