@@ -142,7 +142,7 @@ def board_notes(
                 "counted. Give it back its name."
             )
     notes += [
-        f"{session.path.name}: {session.terrain} is no terrain of the matrix; it is "
+        f"{session.path.name}: {session.terrain} is not a terrain of the matrix; it is "
         "not counted."
         for session in known
         if session.terrain not in terrains

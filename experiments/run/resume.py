@@ -120,6 +120,7 @@ class ResumeRequest:
         operator: name; empty = the one of the session.
         script: of an operator; None = the keyboard.
         can_log: file that the bus is logged to.
+        foresight: terrain database; None = the one of the session.
         faults: to be injected into the simulation.
     """
 
@@ -133,6 +134,7 @@ class ResumeRequest:
     operator: str = ""
     script: str | None = None
     can_log: Path | None = None
+    foresight: Path | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -261,7 +263,7 @@ def _reopen(
         console=console,
         faults=request.faults,
         can_log=request.can_log,
-        foresight=_path_of(before, "foresight"),
+        foresight=request.foresight or _path_of(before, "foresight"),
         stance=read_stance_task(folder),
     )
     state = journal.state

@@ -166,7 +166,7 @@ def test_no_text_is_read_from_a_pipe(tmp_path, name):
     (tmp_path / "rig.toml").write_text(load_settings(None).rig_text)
     (tmp_path / name).unlink(missing_ok=True)
     os.mkfifo(tmp_path / name)
-    with pytest.raises(SettingsError, match="no file"):
+    with pytest.raises(SettingsError, match="not a file"):
         READERS[name](tmp_path / name)
 
 

@@ -79,22 +79,20 @@ def test_enough_is_said_with_what_the_matrix_wants(folder, row):
     row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(12))
     assert next_push(folder, row).enough.endswith("; 20 are wanted")
-    board = enough_of([folder], row, is_simulated=False)
+    board = enough_of([folder], row)
     assert board.startswith("S0: enough after 12: two more trials would move the grid")
     assert board.endswith("; 20 are wanted.")
 
 
 def test_nothing_is_said_of_a_terrain_that_is_complete(folder, row):
     keep(folder, everywhere(12))
-    assert enough_of([folder], row, is_simulated=False) == ""
+    assert enough_of([folder], row) == ""
     more = row.model_copy(update={"trials": 13})
-    assert enough_of([folder], more, is_simulated=False) != ""
+    assert enough_of([folder], more) != ""
 
 
-def test_six_trials_are_not_enough_and_simulated_ones_do_not_count(folder, row):
+def test_six_trials_are_not_enough(folder, row):
     row = row.model_copy(update={"trials": 20})
     keep(folder, everywhere(6))
     assert next_push(folder, row).enough == ""
-    assert enough_of([folder], row, is_simulated=False) == ""
-    keep(folder, everywhere(12))
-    assert enough_of([folder], row, is_simulated=True) == ""
+    assert enough_of([folder], row) == ""

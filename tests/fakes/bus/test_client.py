@@ -256,7 +256,7 @@ def test_a_socket_left_behind_is_taken_over(path):
 
 def test_another_file_is_never_replaced(path):
     path.write_text("precious")
-    with pytest.raises(SettingsError, match="no socket"):
+    with pytest.raises(SettingsError, match="not a socket"):
         SocketHub(path)
     assert path.read_text() == "precious"
 
