@@ -131,6 +131,47 @@ _EIGHTH = "there is no eighth motor that would read it"
 EQUIVALENT: dict[tuple[str, str], str] = {
     (
         f"{_CONTROL}/friction_compensation.py",
+        "if now == before: -> pass",
+    ): "a step of nothing bends nothing",
+    (
+        f"{_CONTROL}/soft_walls.py",
+        "if not low <= angle <= high: -> if not low < angle <= high:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/position_control.py",
+        "elif t <= T - ramp: -> elif t < T - ramp:",
+    ): _AT_REST,
+    (
+        f"{_CONTROL}/controller.py",
+        "self._pushed = np.zeros(7) -> self._pushed = np.zeros(8)",
+    ): _UNREAD,
+    (
+        f"{_DRIVER}/home.py",
+        "wrapped = (apart + turn / 2) % turn - turn / 2 -> "
+        "wrapped = (apart - turn / 2) % turn - turn / 2",
+    ): "half a turn more or less is the same of a whole one",
+    (
+        f"{_DRIVER}/safety_module.py",
+        "while self._clock.now_ns() < deadline_ns: -> "
+        "while self._clock.now_ns() <= deadline_ns:",
+    ): _BELOW,
+    (
+        f"{_DRIVER}/safety_module.py",
+        "self._properties.pause(_RETRY_NS // 10) -> "
+        "self._properties.pause(_RETRY_NS // 20)",
+    ): "how often is asked within a fixed time",
+    (
+        "ft_sensor/payload.py",
+        "if force_7.ndim == 1: -> pass",
+    ): "the general product gives the same of one reading, slower",
+    (
+        "acquisition/ipc/loop_server.py",
+        "if self._cycle.is_recording and now_ns - heartbeats.last_ns(_RECORDER) > "
+        "SILENT_NS: -> if self._cycle.is_recording and "
+        "now_ns - heartbeats.last_ns(_RECORDER) >= SILENT_NS:",
+    ): _BELOW,
+    (
+        f"{_CONTROL}/friction_compensation.py",
         "self._borne = [0.0] * 7 -> self._borne = [0.0] * 8",
     ): _UNREAD,
     (

@@ -311,3 +311,7 @@ def test_identifiers_have_eleven_bits(can_id):
     for beyond in (-1, 0x800):
         with pytest.raises(ValueError, match="11-bit"):
             frames.split_id(beyond)
+
+
+def test_the_safety_module_is_node_10():
+    assert frames.SAFETY_NODE == 10

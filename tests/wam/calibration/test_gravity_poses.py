@@ -27,6 +27,7 @@ from wam.calibration.poses import (
 )
 from wam.control.position_control import JointMove
 from wam.model.arm_model import ArmModel
+from wam.model.clearance import BodyGap
 from wam.model.constants import load_constants
 from wam.model.moments import regressor
 
@@ -237,6 +238,36 @@ def test_a_way_is_no_lower_than_the_floor_or_its_ends(
 ):
     monkeypatch.setattr(free_space, "lowest", lambda *_: np.array(heights))
     assert is_clear(model, np.zeros(7), np.ones(7), 0.33) is is_free
+
+
+class FarApart:
+    """A clearance in which nothing is near, and something may be on the way."""
+
+    def __init__(self, hit=None):
+        self.hit = hit
+
+    def nearest(self, q):
+        return BodyGap("the foot", "the base", 1.0)
+
+    def first_hit(self, start, goal):
+        return self.hit
+
+
+def test_a_pose_to_which_the_way_dips_is_refused(model, monkeypatch):
+    space = FreeSpace(FLOOR, FarApart())
+    check_poses(model, [np.array(UPRIGHT)], space)
+
+    monkeypatch.setattr(free_space, "is_clear", lambda *_: False)
+    with pytest.raises(SettingsError, match=r"Pose 1 .* would come below"):
+        check_poses(model, [np.array(UPRIGHT)], space)
+
+
+def test_a_pose_behind_something_is_refused(model):
+    hit = BodyGap("the elbow", "the container", 0.012)
+    space = FreeSpace(-5.0, FarApart(hit))
+
+    with pytest.raises(SettingsError, match="on the way to it the elbow 12 mm from"):
+        check_poses(model, [np.array(UPRIGHT)], space)
 
 
 def test_a_pose_is_chosen_only_if_it_is_free_on_both_sides_of_it(model):

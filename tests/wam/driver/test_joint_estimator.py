@@ -106,3 +106,15 @@ def test_the_fastest_of_two_jumps_is_named(estimator):
     assert estimator.jump.motor == (1 if first > last else 7)
     estimator.update(102 * 2 * MS, [count + 2 * STEP for count in counts])
     assert estimator.jump is None
+
+
+@pytest.mark.parametrize(("counts", "is_believed"), [(4, True), (5, False)])
+def test_a_motor_may_seem_to_move_by_four_counts_in_no_time(counts, is_believed):
+    """Two replies of one instant: whatever the speed limit, no way lies between."""
+    transmission = Transmission(load_constants().j2mp, CTS, IPNM)
+    estimator = JointEstimator(transmission, ArmSettings())
+    estimator.begin(0, [0] * 7)
+    estimator.update(0, [counts, 0, 0, 0, 0, 0, 0])
+
+    assert (estimator.jump is None) is is_believed
+    assert estimator.counts[0] == (counts if is_believed else 0)

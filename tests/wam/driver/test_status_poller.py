@@ -301,3 +301,15 @@ def test_the_first_cycle_asks_for_the_mode_and_the_others_are_spread():
     settings = ArmSettings()
     health = settings.health_poll_cycles // 3 - 1
     assert first[:3] == sorted({0, PERIOD // 2 - 1, health})[:3]
+
+
+def test_the_pendant_of_a_start_is_known_before_the_first_question():
+    bench = Bench()
+    bench.rig.network.pendant("activate")
+    bench.rig.network.set_bus_voltage(33.0)
+    bench.run(30)
+    assert bench.arm.safety_warnings() == ("voltage",)
+
+    again = WamArm(bench.rig.link, bench.rig.clock)
+    again.start()
+    assert again.safety_warnings() == ("voltage",)
