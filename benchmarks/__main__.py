@@ -3,8 +3,7 @@
     python -m benchmarks [--only NAME ...] [--write]
 
 Each benchmark runs in a process of its own, one after the other, with one thread of
-linear algebra. `--write` puts the table into docs/measured.md, between its marks. A
-whole run takes less than 15 minutes.
+linear algebra. `--write` puts the table into docs/measured.md, between its marks.
 """
 
 import argparse
