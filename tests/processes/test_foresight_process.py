@@ -80,6 +80,7 @@ def test_a_process_at_rest_says_nothing(tmp_path, cycles):
     assert not np.isnan(cycles["foot_position"]).any()
 
 
+@pytest.mark.timeout(400)
 def test_a_session_goes_on_when_its_foresight_is_killed(tmp_path):
     path = write_database(tmp_path / "terrains.json")
     is_kept, share = judged(tmp_path, lambda data: kept_without(data, path))
@@ -99,7 +100,7 @@ def kept_without(data, path):
         wait(2.0)
         if seen.has_trial_ended():
             return None
-        os.kill(children_of(seen.process.pid)["traction-foresi"], signal.SIGKILL)
+        os.kill(children_of(seen.process.pid)["traction-sight"], signal.SIGKILL)
         assert until(lambda: not is_running(seen.process.pid), 60.0), seen.output()
         if seen.has_stalled():
             return None

@@ -78,7 +78,7 @@ def test_the_report_states_family_worth_and_oracle(results):
     assert [row[0] for row in oracle.rows] == ["S0", "S0", "TF", "TF"]
     for row, result in zip(worth.rows, results.study.terrains.values(), strict=True):
         is_told_apart = result.components.gain >= TOLD_APART
-        assert ("not told apart" in row[1]) != is_told_apart
+        assert ("not distinguishable" in row[1]) != is_told_apart
 
 
 @pytest.mark.parametrize("draw", [draw_shares, draw_new_trial])

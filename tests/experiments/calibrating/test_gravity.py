@@ -269,6 +269,6 @@ def test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint(tmp_path):
 
 
 def test_how_well_the_zero_is_known_is_told(calibrated):
-    (line,) = [row for row in calibrated[0].out.splitlines() if "of the zero" in row]
+    (line,) = [row for row in calibrated[0].out.splitlines() if "zero errors estimated" in row]
     assert "joint 2" in line
-    assert "1, 6 and 7 do not show" in line
+    assert "1, 6 and 7 are not observable" in line

@@ -216,7 +216,7 @@ def test_a_sensor_whose_sign_was_changed_since_is_refused(tmp_path, calibrated):
 def test_a_session_uses_sensor_and_container_as_calibrated(tmp_path, calibrated):
     done = record_with(tmp_path, calibrated)
     assert done.code == 0, done.err
-    assert "mounting proven" in done.out
+    assert "mounting verified" in done.out
     path = only_session(tmp_path / "data") / "trials" / "T01.mcap"
     # A wrong sign or angle makes it several newtons; drift and bias 0.3-0.5.
     assert force_error(path) < 1.0
@@ -242,8 +242,8 @@ def test_a_foot_calibrated_with_another_foot_is_refused(tmp_path, calibrated):
     ("text", "said"),
     [
         ("", "is missing"),
-        ("mass = 1\n" * 2, "no calibration of a wrist sensor"),
-        ("x = [" * 3000, "no calibration of a wrist sensor"),
+        ("mass = 1\n" * 2, "not a calibration of a wrist sensor"),
+        ("x = [" * 3000, "not a calibration of a wrist sensor"),
     ],
 )
 def test_a_file_that_is_no_calibration_is_named(text, said):

@@ -480,7 +480,7 @@ CASES = {
     "pendant-idle": struck("pendant-idle"),
     "safety-idle": struck("safety-torque", words="torque fault"),
     "safety-stop": struck("safety-voltage", E_STOP, "voltage fault"),
-    "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 stands still"),
+    "motor-stuck": acted(Prompt.LIFT, _pull_in_vain, 4, "Motor 2 does not turn"),
     "motor-still": acted(Prompt.RECORDING, _stand_still, 4, "(limit 0)"),
     "not-a-number": acted(Prompt.LIFT, _not_a_number, 4),
     "console-lost": acted(Prompt.READY, _orphan, since=0.0),

@@ -84,7 +84,7 @@ def odd(tmp_path_factory):
         "twice: 1400 duplicate rows were dropped",
         "short, fold 1, Tustin: 2 samples are too few",
         "short, fold 1, GP (SE): No Gaussian process from 2 samples",
-        "its health and its limits are unknown",
+        "health and limits are unknown",
     ],
 )
 def test_the_report_says_what_it_cannot_do(odd, sentence):

@@ -17,7 +17,7 @@ from tests.ft_sensor.sensor_bench import MAKES
 
 pytestmark = pytest.mark.slow
 
-ABSENT = "23 never came"  # of 31 ids asked for, seven pucks and the module are there
+ABSENT = "23 did not come"  # of 31 ids asked for, seven pucks and the module are there
 PATIENCE = 30.0  # s, for a machine that stalls; met at once on one that does not
 
 
@@ -70,7 +70,7 @@ def test_another_program_finds_the_arm_and_stdin_is_its_pendant(serve, tmp_path)
     assert words.code == 0
     assert "host asks puck 1 for STAT" in words.out
     assert "puck 1 answers STAT = 0 (reset)" in words.out
-    assert "3 answers asked for: 3 came" in words.out
+    assert "3 answers requested: 3 came" in words.out
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
@@ -186,7 +186,7 @@ def test_check_logs_its_bus_and_replay_finds_every_answer(config, tmp_path):
     done = traction("replay", "--can", log)
     assert done.code == 0
     assert "host asks puck 7 for IPNM" in done.out
-    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came unasked" in done.out
+    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came without a request" in done.out
     summary = traction("replay", "--can", log, "--summary")
     assert done.out.endswith(summary.out)
     assert "host asks" not in summary.out
@@ -200,7 +200,7 @@ def test_a_session_logs_its_cycles(config, tmp_path):
     assert text.count(" fake0 404#30\n") > 500
     assert text.count(" fake0 402#AA") > 500
     told = traction("replay", "--can", log, "--summary").out
-    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came unasked" in told
+    assert f" 0 of them after more than 1 ms, {ABSENT}; 0 came without a request" in told
 
 
 def test_a_log_is_never_written_over_a_file(config, tmp_path):

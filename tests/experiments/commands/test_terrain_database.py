@@ -67,4 +67,4 @@ def test_a_file_that_is_no_database_is_refused(exported, tmp_path):
     (tmp_path / "db.json").write_text("{}")
     done = traction("identify", exported[1], "--terrain-db", tmp_path / "db.json")
     assert done.code == 2
-    assert "no terrain database" in done.err
+    assert "not a terrain database" in done.err

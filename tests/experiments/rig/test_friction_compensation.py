@@ -140,7 +140,7 @@ def test_the_review_names_a_motor_that_ended_the_compensation(
     monkeypatch.setattr(FrictionCompensation, "metadata", lambda self: ended)
     done = run_short(folder / "rig.toml", folder, "TF", 1, "--friction", "0.4")
     assert done.code == 0, done.err
-    assert ("motor 3 swung" in done.out) == (motor == 3)
+    assert ("motor 3 oscillated" in done.out) == (motor == 3)
 
 
 def test_every_parameter_of_the_motors_is_in_the_file():

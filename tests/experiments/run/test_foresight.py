@@ -101,7 +101,7 @@ def test_a_trial_that_was_not_foreseen_cannot_be_compared(recorded, foreseen):
         *("--foresight", foreseen[2]),
     )
     assert done.code == 2
-    assert "nothing was foreseen" in done.err
+    assert "no foresight channel" in done.err
 
 
 def test_foresight_of_no_trial_is_refused(foreseen):
@@ -136,7 +136,7 @@ def test_a_damaged_database_of_the_study_does_not_stop_a_session(tmp_path, confi
     (tmp_path / "study" / "terrains.json").write_text("{")
     done = run_short(config, tmp_path, STONES, 1)
     assert done.code == 0, done.err
-    assert "Nothing is foreseen" in done.out
+    assert "Foresight is off." in done.out
     assert not TrialReader(only_session(tmp_path) / "trials" / "T01.mcap").has_foresight
 
 
