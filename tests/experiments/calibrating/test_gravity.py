@@ -269,6 +269,7 @@ def test_an_arm_that_was_zeroed_elsewhere_is_refused_with_the_joint(tmp_path):
 
 
 def test_how_well_the_zero_is_known_is_told(calibrated):
-    (line,) = [row for row in calibrated[0].out.splitlines() if "zero errors estimated" in row]
+    rows = calibrated[0].out.splitlines()
+    (line,) = [row for row in rows if "zero errors estimated" in row]
     assert "joint 2" in line
     assert "1, 6 and 7 are not observable" in line
