@@ -32,6 +32,7 @@ NAMES = {
 }
 STALLED = re.compile(
     "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
+    "|does not answer GET"  # before the loop: the simulated devices stood still
 )
 WITNESS = """import sys, time
 while True:
