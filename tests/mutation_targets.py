@@ -171,6 +171,12 @@ EQUIVALENT: dict[tuple[str, str], str] = {
         "now_ns - heartbeats.last_ns(_RECORDER) >= SILENT_NS:",
     ): _BELOW,
     (
+        "ft_sensor/tare.py",
+        "lasted = float(times[-1] - times[0]) * count / (count - 1) if count > 1 "
+        "else 0.0 -> lasted = float(times[-1] - times[0]) * count / (count - 1) "
+        "if count > 1 else 1.0",
+    ): _BELOW,
+    (
         f"{_CONTROL}/friction_compensation.py",
         "self._borne = [0.0] * 7 -> self._borne = [0.0] * 8",
     ): _UNREAD,

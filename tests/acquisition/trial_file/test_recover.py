@@ -234,6 +234,9 @@ def test_what_was_lost_is_told_in_seconds(put, left):
     recovery = recover_file(put(left[: last.end - 5]))
     # 50 cycles of 2 ms in the lost chunk, none of them missed
     assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
+    # also where nothing but its head is left: first and last time of 8 bytes each
+    recovery = recover_file(put(left[: last.body + 16], "T08.mcap.partial"))
+    assert recovery.seconds_dropped == pytest.approx(0.1, abs=1e-6)
 
 
 def test_an_impossible_time_in_a_torn_chunk_is_not_believed(put, left):

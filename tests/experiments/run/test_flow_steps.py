@@ -51,6 +51,18 @@ def test_quit_twice_ends_at_once(tmp_path):
         wait_ready(context, FIRST)
 
 
+def test_the_aim_that_was_shown_is_the_trials(tmp_path, monkeypatch):
+    aim = object()
+    told = SimpleNamespace(text="slowly", enough="", aim=aim)
+    monkeypatch.setattr(ready, "next_push", lambda folder, row: told)
+    context = make_context(tmp_path, Keys())
+    assert ready_view(context).suggestion == "slowly"
+    assert context.aim is aim
+    context.stance = object()  # a stance is not pushed by a person
+    assert ready_view(context).suggestion == ""
+    assert context.aim is None
+
+
 def test_a_pause_holds_the_arm_and_is_in_the_journal(tmp_path):
     context = make_context(tmp_path, Keys("p", "", " ", " "))
     wait_ready(context, FIRST)

@@ -17,6 +17,7 @@ from experiments.operator.prompts import Prompt
 from experiments.run.stop import StopRequestedError
 from experiments.run.tare import (
     known_bias,
+    prove_mounting,
     residual_force,
     take_end_tare,
     take_tare,
@@ -47,6 +48,13 @@ def test_a_calibrated_sensor_is_known_with_its_foot_only():
     known = known_bias(calibration("tread"), "tread", is_simulated=False)
     np.testing.assert_array_equal(known, BIAS)
     assert known_bias(calibration("tread"), "bare", is_simulated=False) is None
+
+
+def test_a_wrist_is_not_turned_for_a_sensor_that_nobody_calibrated(tmp_path):
+    context = make_context(tmp_path, Keys())
+    context.rig.settings.calibrations, context.rig.row.foot = {}, "tread"
+    prove_mounting(context)
+    assert (context.loop_client.requested, context.loop_client.advanced) == ([], 0.0)
 
 
 def test_a_real_sensor_that_nobody_calibrated_is_not_known():

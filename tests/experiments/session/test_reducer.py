@@ -184,6 +184,16 @@ def test_a_redo_records_one_trial_and_is_over():
     assert apply(state, END).phase is SessionPhase.COMPLETE
 
 
+def test_a_redo_whose_verdict_is_undone_is_not_over():
+    whole = [*BEGIN, *attempt(1, "kept"), *attempt(2, "kept"), END]
+    redone = [event("trial-set-aside", 1, attempt=1), *attempt(1, "kept")]
+    state = replay([*whole, event("redo-started", 1), ACTIVE, *redone])
+    state = apply(state, verdict(1, 2, "reject"))
+    assert (state.redoing, state.next_trial, state.is_over) == (1, 1, False)
+    state = apply(state, verdict(1, 2, "keep"))
+    assert (state.redoing, state.is_over) == (None, True)
+
+
 def test_a_redo_of_what_was_never_recorded_is_refused():
     state = replay([*BEGIN, *attempt(1, "kept"), END])
     assert refusal(state, event("redo-started", 2)) == "T02 was never recorded"

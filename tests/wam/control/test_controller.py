@@ -200,6 +200,19 @@ def test_a_floating_arm_is_not_moved(law):
         law.move_to(DOWN, 0.5, reading(0.0))
 
 
+def test_a_move_from_a_hold_begins_with_the_torque_of_the_hold(law):
+    """The springs of the hold are bent by as much as an unknown weight bends them."""
+    law.enter(ArmState.HOLD, reading(0.0))
+    law.torque(reading(1.0))
+    sagged = DOWN.copy()
+    sagged[1] += 0.001
+    before, weight = law.torque(reading(2.0, q=sagged))
+    law.move_to(DOWN + 0.01, 0.5, reading(2.0, q=sagged))
+    after = law.torque(reading(2.0, q=sagged))[0]
+    assert before[1] - weight[1] < -0.5
+    assert after == pytest.approx(before, abs=1e-9)
+
+
 def test_a_move_that_follows_another_begins_where_that_one_holds_the_arm(law):
     law.enter(ArmState.HOLD, reading(0.0))
     law.move_to(DOWN, 0.5, reading(0.0))
@@ -249,6 +262,17 @@ def test_a_hold_uses_its_share_of_the_limit_and_no_more_weight_included(
     tau, gravity = law.torque(reading(5.0, qd=np.full(7, -way * 100.0)))
     assert abs(gravity[1]) > 5.0
     assert tau[:6] == pytest.approx(np.full(6, way * 0.9 * 40.0))
+
+
+def test_a_hold_adds_nothing_to_a_weight_beyond_its_share(foot_model):
+    law = with_walls(foot_model, torque=4.0)
+    law.enter(ArmState.HOLD, reading(0.0))
+    gravity = law.torque(reading(5.0))[1]
+    assert abs(gravity[1]) > 5.0
+    falling = -np.sign(gravity) * 100.0
+    assert law.torque(reading(5.0, qd=falling))[0][1] == gravity[1]
+    rising = law.torque(reading(5.0, qd=-falling))[0][1]
+    assert abs(rising) == pytest.approx(0.9 * 4.0)
 
 
 def test_an_arm_that_floated_is_held_where_it_is_then(law):
