@@ -1,0 +1,38 @@
+"""A newcomer types what README says, and presses what the screens ask for."""
+
+from benchmarks.newcomer import ROOT, Newcomer, commands_of, example_of
+
+README = (ROOT / "README.md").read_text()
+
+
+def test_the_commands_of_readme_are_typed_without_their_comments():
+    commands = commands_of(README)
+    assert commands[0].startswith("git clone")
+    assert {"make demo", "make test"} < set(commands)
+    assert not any("#" in command or "```" in command for command in commands)
+
+
+def test_the_example_of_readme_is_python():
+    assert "tr.load_session" in example_of(README)
+
+
+def test_a_key_is_pressed_that_is_asked_for_and_a_folder_stays(tmp_path):
+    somebody = Newcomer(tmp_path)
+    assert somebody.type("mkdir there && cd there").code == 0
+    asking = "IFS= read -rsn1 -p 'begin [space]' key; test \"$key\" = ' '"
+    assert somebody.type(asking).code == 0
+    kept = somebody.type(
+        "read -rsn1 -p '[k]eep [space]' key; echo; echo \"$key\"; pwd; stty size"
+    )
+    assert kept.code == 0
+    assert kept.words.split()[-4:] == ["k", str(tmp_path / "there"), "24", "80"]
+
+
+def test_a_failure_shows_its_last_words(tmp_path):
+    step = Newcomer(tmp_path).type("echo no such stone >&2; exit 4")
+    assert (step.code, step.words.strip()) == (4, "no such stone")
+
+
+def test_the_home_is_empty(tmp_path):
+    step = Newcomer(tmp_path).type("ls -A ~; echo $HOME; echo ${VIRTUAL_ENV:-none}")
+    assert step.words.split() == [str(tmp_path), "none"]
