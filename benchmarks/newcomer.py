@@ -120,8 +120,12 @@ class Newcomer:
 
 
 def _sit_at(screen: int, process: subprocess.Popen, end: float) -> str:
-    """Press what is asked for until the program has ended; return its last words."""
-    words, pressed = "", time.monotonic() - _PATIENCE
+    """Press what is asked for until the program has ended; return its last words.
+
+    A key that comes with its question may be forgotten: it is pressed again where
+    nothing follows.
+    """
+    words, asked, pressed = "", "", time.monotonic() - _PATIENCE
     while time.monotonic() < end:
         if select.select([screen], [], [], 0.2)[0]:
             try:
@@ -132,10 +136,11 @@ def _sit_at(screen: int, process: subprocess.Popen, end: float) -> str:
             return words[-_LAST:]
         if time.monotonic() - pressed < _PATIENCE:
             continue
-        for asked, key in _KEYS:
-            if asked in words[-_LAST:]:
+        shown = words[-_LAST:] or asked
+        for question, key in _KEYS:
+            if question in shown:
                 os.write(screen, key.encode())
-                words, pressed = "", time.monotonic()
+                words, asked, pressed = "", question, time.monotonic()
                 break
     process.kill()
     return words[-_LAST:]
