@@ -122,10 +122,10 @@ class Newcomer:
 def _sit_at(screen: int, process: subprocess.Popen, end: float) -> str:
     """Press what is asked for until the program has ended; return its last words.
 
-    A key that comes with its question may be forgotten: it is pressed again where
-    nothing follows.
+    A key that comes with its question may be forgotten: it is pressed again while the
+    question is the last.
     """
-    words, asked, pressed = "", "", time.monotonic() - _PATIENCE
+    words, pressed = "", time.monotonic() - _PATIENCE
     while time.monotonic() < end:
         if select.select([screen], [], [], 0.2)[0]:
             try:
@@ -134,16 +134,21 @@ def _sit_at(screen: int, process: subprocess.Popen, end: float) -> str:
                 return words[-_LAST:]
         elif process.poll() is not None:
             return words[-_LAST:]
-        if time.monotonic() - pressed < _PATIENCE:
-            continue
-        shown = words[-_LAST:] or asked
-        for question, key in _KEYS:
-            if question in shown:
-                os.write(screen, key.encode())
-                words, asked, pressed = "", question, time.monotonic()
-                break
+        key = _key_for(words[-_LAST:])
+        if key and time.monotonic() - pressed >= _PATIENCE:
+            os.write(screen, key.encode())
+            pressed = time.monotonic()
     process.kill()
     return words[-_LAST:]
+
+
+def _key_for(words: str) -> str:
+    """Return the key that the last question on a screen asks for, empty for none."""
+    for line in reversed(words.splitlines()):
+        for question, key in _KEYS:
+            if question in line:
+                return key
+    return ""
 
 
 def walk(home: Path, without: list[str]) -> list[Step]:

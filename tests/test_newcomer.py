@@ -28,6 +28,12 @@ def test_a_key_is_pressed_that_is_asked_for_and_a_folder_stays(tmp_path):
     assert kept.words.split()[-4:] == ["k", str(tmp_path / "there"), "24", "80"]
 
 
+def test_a_key_that_was_forgotten_is_pressed_again(tmp_path):
+    asked = "printf 'begin [space]'; sleep 0.5; read -rst 0.1 -N 99; printf '\\rwait'"
+    step = Newcomer(tmp_path).type(f'{asked}; IFS= read -rsn1 key; echo "<$key>"')
+    assert step.words.endswith("< >\r\n")
+
+
 def test_a_failure_shows_its_last_words(tmp_path):
     step = Newcomer(tmp_path).type("echo no such stone >&2; exit 4")
     assert (step.code, step.words.strip()) == (4, "no such stone")

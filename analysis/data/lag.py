@@ -15,11 +15,12 @@ import numpy as np
 
 from analysis.data.series import Array
 
-# Bands [Hz], the first that explains enough. In the upper one an arm and a hand are a
-# mass with a damper and little else; a coarse velocity has noise there.
-BANDS = ((10.0, 80.0), (3.0, 40.0))
+# Bands [Hz] and the share of the force's variance below which each says nothing; the
+# first that explains enough. In the upper one an arm and a hand are a mass with a damper
+# and little else; a coarse velocity has noise there. In the lower one the ground's own
+# force varies too, and half of the variance was explained 4 ms beside the truth.
+BANDS = ((10.0, 80.0, 0.5), (3.0, 40.0, 0.65))
 LONGEST = 0.05  # s
-EXPLAINED = 0.5  # of the force's variance in the band, below which nothing is said
 _SLOWEST_RATE = 200.0  # Hz
 _SHORTEST = 1.0  # s of a trial
 _FEWEST_ROWS = 0.5  # share of its rows that a trial may have lost
@@ -58,9 +59,9 @@ def force_lag(t: Array, v_t: Array, F_t: Array) -> ForceLag | None:
     even = t[0] + np.arange(count) / rate  # a lost row is no shift of those behind it
     rows = (even, np.interp(even, t, v_t), np.interp(even, t, F_t))
     with np.errstate(all="ignore"):  # absurd numbers come to nothing by themselves
-        for band in BANDS:
-            lag = _in_band(rows, rate, band)
-            if lag.explained >= EXPLAINED:
+        for low, high, least in BANDS:
+            lag = _in_band(rows, rate, (low, high))
+            if lag.explained >= least:
                 return lag
     return None
 
