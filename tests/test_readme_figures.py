@@ -1,7 +1,10 @@
 """README's figures are those of a run: a drift of 5 % is noticed."""
 
+import json
+
 import pytest
 
+from benchmarks import readme
 from benchmarks.readme import README, demo_rows, is_same
 
 
@@ -25,3 +28,18 @@ def test_another_sentence_is_another_row():
 def test_readme_has_every_row():
     words = {row.split("|")[1].strip()[:30] for row in demo_rows(results(0.4))}
     assert all(word in README.read_text() for word in words)
+
+
+def test_a_warning_of_the_demo_is_a_failure(tmp_path, monkeypatch, capsys):
+    rows = demo_rows(results(0.4))
+    page = tmp_path / "README.md"
+    page.write_text("\n".join(rows))
+    monkeypatch.setattr(readme, "README", page)
+    (tmp_path / "study").mkdir()
+    fits = tmp_path / "study" / "fits.json"
+    monkeypatch.setattr("sys.argv", ["readme", "--folder", str(tmp_path)])
+    fits.write_text(json.dumps({**results(0.4), "warnings": []}))
+    assert readme.main() == 0
+    fits.write_text(json.dumps({**results(0.4), "warnings": ["the force is late"]}))
+    assert readme.main() == 1
+    assert "! the force is late" in capsys.readouterr().out
