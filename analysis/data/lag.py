@@ -16,9 +16,9 @@ import numpy as np
 from analysis.data.series import Array
 
 # Bands [Hz] and the share of the force's variance below which each says nothing; the
-# first that explains enough. In the upper one an arm and a hand are a mass with a damper
-# and little else; a coarse velocity has noise there. In the lower one the ground's own
-# force varies too, and half of the variance was explained 4 ms beside the truth.
+# first that explains enough. In the upper one an arm and a hand are a mass with a
+# damper and little else; a coarse velocity has noise there. In the lower one the
+# ground's force varies too: half of it was explained 4 ms beside the truth.
 BANDS = ((10.0, 80.0, 0.5), (3.0, 40.0, 0.65))
 LONGEST = 0.05  # s
 _SLOWEST_RATE = 200.0  # Hz

@@ -5,6 +5,7 @@ the file carries, so a better calibration can be applied years later.
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -208,8 +209,10 @@ def load_trial(path: Path | str) -> RecordedTrial:
         payload=payload,
         constants=at_hand.constants,
         sole_point=at_hand.sole_point,
-        bracket=_bracket(reader, payload, int(cycles["host_ns"][0])),
-        sensor_height=_sensor_height(reader),
+        bracket=read_bracket(
+            path, reader.metadata["trial"], payload.bias, int(cycles["host_ns"][0])
+        ),
+        sensor_height=_sensor_height(reader.attachments.get("config.toml", b"")),
         friction_text=friction.decode(errors="ignore"),
     )
     try:
@@ -252,16 +255,11 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
     return _Calibrated(payload, point, terrain, frame, constants, model)
 
 
-def _bracket(
-    reader: TrialReader, payload: Payload, start_ns: int
-) -> TareBracket | None:
-    return read_bracket(reader.path, reader.metadata["trial"], payload.bias, start_ns)
-
-
-def _sensor_height(reader: TrialReader) -> float | None:
+@lru_cache(maxsize=16)  # the trials of a study have one or a few
+def _sensor_height(config: bytes) -> float | None:
     try:
-        height = parse_toml(_text(reader, "config.toml"))["ft_sensor"]["height"]
-    except (TrialFileError, ValueError, KeyError, TypeError):
+        height = parse_toml(config.decode())["ft_sensor"]["height"]
+    except (ValueError, KeyError, TypeError):
         return None
     return float(height) if type(height) in {int, float} and 0 <= height < 1 else None
 

@@ -62,7 +62,7 @@ def summary(study: Study) -> ReportTable:
         "the fit, mean over trials ± its standard error. Constant: always the median "
         "F_t of the other trials. F_n ≤ 0: share of the kept samples with the foot off "
         "the ground, where it hops in a slip, or the tare wrong; a warning where it is "
-        f"below -{SENSOR_ERROR:g} N in more than {PULLED_WARNING:.0%}.",
+        f"below −{SENSOR_ERROR:g} N in more than {PULLED_WARNING:.0%}.",
         section=ReportSection.SUMMARY,
     )
 

@@ -1,6 +1,7 @@
 """The arm's constants, read from TOML and checked."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import resources
 from typing import Self
 
@@ -189,6 +190,11 @@ def _reason(error: Exception) -> str:
     return ": ".join(filter(None, (".".join(map(str, first["loc"])), first["msg"])))
 
 
+@lru_cache(maxsize=8)  # every trial of a study carries the same
+def _parsed(text: str) -> ConstantsFile:
+    return ConstantsFile.model_validate(parse_toml(text))
+
+
 def load_constants(text: str | None = None) -> ArmConstants:
     """Return the constants in `text` (TOML), by default those shipped.
 
@@ -198,7 +204,7 @@ def load_constants(text: str | None = None) -> ArmConstants:
     if text is None:
         text = (resources.files("wam.data") / "wam7.toml").read_text()
     try:
-        file = ConstantsFile.model_validate(parse_toml(text))
+        file = _parsed(text)
     except ValueError as error:
         raise SettingsError(
             f"The arm model cannot be read: {_reason(error)}.",
