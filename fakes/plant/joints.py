@@ -111,8 +111,12 @@ class JointDrives:
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
         self._tau = self._of_units.dot(units)
-        self._sent = [u / ipnm for u, ipnm in zip(units, self._ipnm, strict=True)]
+        self._units = tuple(units)
         self._add_up()
+
+    def sent(self) -> list[float]:
+        """Return the torques applied to motors 1 to 7 [N m]."""
+        return [u / ipnm for u, ipnm in zip(self._units, self._ipnm, strict=True)]
 
     def rest(self) -> None:
         """Unbend the bristles, as brakes do."""
@@ -150,7 +154,7 @@ class JointDrives:
 
     def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
         if t_ns % _BEARING_NS == 0:
-            against = zip(self._sent, self._bristles.torques(speeds), strict=True)
+            against = zip(self.sent(), self._bristles.torques(speeds), strict=True)
             borne = [sent + friction for sent, friction in against]
             self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)
 
@@ -161,10 +165,12 @@ class JointDrives:
     def _resist(self, speeds: Sequence[float]) -> None:
         bristles = self._bristles
         bristles.take(speeds)
-        damping = self._dampings.dot(bristles.damping)
+        armature = self._dampings.dot(bristles.damping)
         if self._stopping.is_near:
-            damping += self._stopping.damping
-        self.armature = self._inertia + self._dt * damping
+            armature += self._stopping.damping
+        armature *= self._dt
+        armature += self._inertia
+        self.armature = armature
 
     def _add_up(self) -> None:
         driving = self._tau + self.disturbance
