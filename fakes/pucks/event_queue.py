@@ -59,7 +59,8 @@ class EventQueue:
     def advance(self, t_ns: int) -> None:
         """Carry out all that is due until `t_ns`, in order of time; let it be then."""
         while (next_ns := self.next_ns) <= t_ns:
-            self.now_ns = max(self.now_ns, next_ns)
+            if next_ns > self.now_ns:
+                self.now_ns = next_ns
             # At one instant plans come first: what they do may put the alarm off.
             if self._plans and self._plans[0][0] <= self.now_ns:
                 action = heappop(self._plans)[2]
@@ -67,7 +68,8 @@ class EventQueue:
                 action()
             else:
                 self._on_alarm()
-        self.now_ns = max(self.now_ns, t_ns)
+        if t_ns > self.now_ns:
+            self.now_ns = t_ns
 
     def put(self, can_id: int, data: bytes) -> None:
         """Hand a frame to the wire now."""
@@ -86,5 +88,5 @@ class EventQueue:
         return frames
 
     def _find_next(self) -> None:
-        plan_ns = self._plans[0][0] if self._plans else NEVER
-        self.next_ns = min(plan_ns, self._alarm_ns)
+        plans, alarm_ns = self._plans, self._alarm_ns
+        self.next_ns = plans[0][0] if plans and plans[0][0] < alarm_ns else alarm_ns

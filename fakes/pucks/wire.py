@@ -55,7 +55,8 @@ class WiredNetwork:
         """
         schedule = self._schedule
         if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
-            schedule.now_ns = max(schedule.now_ns, t_ns)
+            if t_ns > schedule.now_ns:
+                schedule.now_ns = t_ns
             return []
         while True:
             # At one instant the network is first: its frame may win the arbitration.
