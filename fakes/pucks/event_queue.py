@@ -59,8 +59,7 @@ class EventQueue:
     def advance(self, t_ns: int) -> None:
         """Carry out all that is due until `t_ns`, in order of time; let it be then."""
         while (next_ns := self.next_ns) <= t_ns:
-            if next_ns > self.now_ns:
-                self.now_ns = next_ns
+            self.now_ns = max(self.now_ns, next_ns)
             # At one instant plans come first: what they do may put the alarm off.
             if self._plans and self._plans[0][0] <= self.now_ns:
                 action = heappop(self._plans)[2]
@@ -68,8 +67,7 @@ class EventQueue:
                 action()
             else:
                 self._on_alarm()
-        if t_ns > self.now_ns:
-            self.now_ns = t_ns
+        self.now_ns = t_ns if t_ns > self.now_ns else self.now_ns
 
     def put(self, can_id: int, data: bytes) -> None:
         """Hand a frame to the wire now."""

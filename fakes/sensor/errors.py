@@ -121,7 +121,7 @@ class SensorErrors:
         next_normal = self._normals.next
         shown: list[float] = []
         drifts: list[float] = []
-        rows = zip(wrench, self._slow, self._drifts, self._steps, strict=True)
+        rows = zip(wrench, self._slow, self._drifts, self._steps)
         for load, slow, drift, (keep, kick, white, step) in rows:
             moved = keep * drift + kick * next_normal()
             value = load + slow + moved + white * next_normal()
