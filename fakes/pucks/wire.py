@@ -66,8 +66,10 @@ class WiredNetwork:
                 self._carry(min(t_ns, own_ns - 1))
             else:
                 break
-        if schedule.now_ns < t_ns or schedule.outbox:
+        if schedule.outbox:
             self._take_due(t_ns)
+        elif schedule.now_ns < t_ns:  # nothing is planned till then
+            schedule.now_ns = t_ns
         sent, self._sent = self._sent, []
         return sent
 
