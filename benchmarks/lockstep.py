@@ -1,6 +1,6 @@
 """How much faster than the clock a stepped simulation runs, and where the time goes.
 
-    python benchmarks/lockstep.py [--seconds 20] [--rounds 3] [--json]
+    python -m benchmarks.lockstep [--seconds 20] [--rounds 3] [--json]
 
 The loop, the drivers, the recorder and the simulated devices are the ones of a session;
 everything runs in one thread. The whole is processor time of runs that nothing watches;
