@@ -127,9 +127,10 @@ class PartClock:
         spent_ns: by part; what no watched call takes is the loop's own.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, now_ns: Callable[[], int] = time.perf_counter_ns) -> None:
         self.spent_ns = dict.fromkeys((*PARTS, LOOP), 0)
-        self._part, self._since_ns = LOOP, time.perf_counter_ns()
+        self._now_ns = now_ns
+        self._part, self._since_ns = LOOP, now_ns()
 
     def shares(self) -> dict[str, float]:
         """Return the share of every part."""
@@ -145,7 +146,7 @@ class PartClock:
                 for owner, name in calls:
                     watched = self._watched(part, getattr(owner, name))
                     stack.enter_context(patch.object(owner, name, watched))
-            self._since_ns = time.perf_counter_ns()
+            self._since_ns = self._now_ns()
             yield
 
     def _watched(self, part: str, call: Callable[P, R]) -> Callable[P, R]:
@@ -160,7 +161,7 @@ class PartClock:
 
     def _enter(self, part: str) -> str:
         """Let the time of `part` begin; return whose ended."""
-        now_ns, before = time.perf_counter_ns(), self._part
+        now_ns, before = self._now_ns(), self._part
         self.spent_ns[before] += now_ns - self._since_ns
         self._part, self._since_ns = part, now_ns
         return before
