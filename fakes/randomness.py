@@ -3,6 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Iterator
+from functools import lru_cache
 from itertools import chain
 from operator import length_hint
 from typing import NamedTuple
@@ -93,6 +94,7 @@ class DrawnAhead:
             self._rest = _nothing()
 
 
+@lru_cache(maxsize=64)  # every 10 ms a sensor asks for the same seven again
 def exact_step(sd: float, time: float, dt: float) -> tuple[float, float]:
     """Return (a, b) of a step x <- a x + b n of an Ornstein-Uhlenbeck process.
 

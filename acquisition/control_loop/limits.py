@@ -94,11 +94,13 @@ def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector
         last: joint torques as sent last [N m], shape (7,).
         limits: torque limits of the joints [N m], seven.
     """
-    # Plain numbers: seven of them are bounded faster than numpy looks at an array.
+    # Plain numbers: seven of them are bounded faster than numpy looks at an array, and
+    # comparisons cost half of what `min` and `max` do. A NaN is neither less nor more.
     rows = zip(tau.tolist(), last.tolist(), limits, TORQUE_STEP, strict=True)
     bounded: list[float] = []
     for wanted, before, limit, share in rows:
         step = share * limit
-        value = min(max(wanted, before - step), before + step)
-        bounded.append(min(max(value, -limit), limit))
+        low, high = before - step, before + step
+        value = low if wanted < low else high if wanted > high else wanted
+        bounded.append(-limit if value < -limit else limit if value > limit else value)
     return np.array(bounded)

@@ -32,7 +32,6 @@ from experiments.rig.law_calibrations import LawCalibrations, twin_gravity
 from experiments.settings import RigSettings, Settings, TerrainRow, read_foot
 from ft_sensor.serial_line import SerialPort, SerialSensor
 from ft_sensor.vendors import AnySensor
-from wam.bus import PythonCanDoor
 from wam.calibration import (
     FrictionCalibration,
     friction_from_toml,
@@ -142,6 +141,7 @@ def stepped(
     `law`: models and compensation of the control law.
     """
     from fakes import SteppedClock
+    from fakes.bus import InProcessDoor
     from fakes.world import simulated_rig
 
     clock = SteppedClock()
@@ -149,7 +149,7 @@ def stepped(
     simulation = simulated_rig(world.metadata(), constants, clock)
     simulated = simulation.rig
     clock.attach(simulated)
-    link = build_link(PythonCanDoor(simulated.bus, clock), shared, clock)
+    link = build_link(InProcessDoor(simulated.bus, clock), shared, clock)
     arm = build_arm(settings.rig, constants, link, clock)
 
     def sensor() -> WrenchSensor:

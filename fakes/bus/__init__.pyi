@@ -1,9 +1,10 @@
 from .hub import CanPort, Frame, SocketHub
-from .in_process import FakeCanBus
+from .in_process import FakeCanBus, InProcessDoor
 
 __all__ = [
     "CanPort",
     "FakeCanBus",
     "Frame",
+    "InProcessDoor",
     "SocketHub",
 ]

@@ -7,7 +7,9 @@ from typing import NoReturn
 import can
 
 from acquisition import NS_PER_S, Clock
-from fakes.pucks import PuckNetwork, WiredNetwork
+from fakes.pucks import OutFrame, PuckNetwork, WiredNetwork
+from wam.bus import DRAIN_AT_MOST, PythonCanDoor
+from wam.bus import Frame as DoorFrame
 
 _PATIENCE_NS = NS_PER_S
 _QUEUE = 11  # frames: txqueuelen 10, and one in the driver
@@ -26,7 +28,7 @@ class FakeCanBus(can.BusABC):
         self.network = network
         self._faults = network.faults
         self._clock = clock
-        self._inbox: deque[can.Message] = deque()
+        self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
         self._wired = WiredNetwork(network)
         self._t_ns = -1  # how far it has gone on
@@ -58,6 +60,32 @@ class FakeCanBus(can.BusABC):
         if not (msg.is_extended_id or msg.is_remote_frame or msg.is_error_frame):
             self._wired.send(now_ns, msg.arbitration_id, bytes(msg.data))
 
+    @property
+    def is_undisturbed(self) -> bool:
+        """Whether every plain frame comes and goes as it is."""
+        faults = self._faults
+        return not (
+            faults.is_down
+            or faults.is_off
+            or faults.is_unheard
+            or faults.error_frames
+            or self._stuck
+            or self._is_shutdown
+            or self._filters is not None
+        )
+
+    def put(self, can_id: int, data: bytes) -> None:
+        """Send a data frame as `send` does; only while `is_undisturbed`."""
+        now_ns = self._clock.now_ns()
+        self.advance(now_ns)
+        self._wired.send(now_ns, can_id, data)
+
+    def arrived(self) -> deque[OutFrame]:
+        """Return what has arrived and waits to be taken, oldest first."""
+        if not self._inbox and (now_ns := self._clock.now_ns()) != self._t_ns:
+            self.advance(now_ns)
+        return self._inbox
+
     def _release(self, now_ns: int) -> None:
         """Let the frames leave that waited while nobody acknowledged."""
         while self._stuck:
@@ -81,10 +109,7 @@ class FakeCanBus(can.BusABC):
     def advance(self, t_ns: int) -> None:
         """Let wire and network go on to `t_ns`."""
         self._t_ns = t_ns
-        for last_bit_ns, can_id, data in self._wired.advance(t_ns):
-            # positionally: stamp, identifier, is it an extended one
-            message = can.Message(last_bit_ns / NS_PER_S, can_id, False, data=data)
-            self._inbox.append(message)
+        self._inbox.extend(self._wired.advance(t_ns))
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
         """Return the next frame, None when `timeout` [s] of the clock has passed.
@@ -102,12 +127,9 @@ class FakeCanBus(can.BusABC):
             return can.Message(arbitration_id=classes, is_error_frame=True, data=detail)
         clock = self._clock
         if self._filters is None:  # the way that nearly every question takes
-            inbox = self._inbox
             # What is sent is on the wire for a while: at one instant nothing new comes.
-            if not inbox and (now_ns := clock.now_ns()) != self._t_ns:
-                self.advance(now_ns)
-            if inbox:
-                return inbox.popleft()
+            if self.arrived():
+                return self._take()
             if timeout == 0:
                 return None
         patience_ns = 0 if timeout is None else int(timeout * NS_PER_S)
@@ -126,7 +148,12 @@ class FakeCanBus(can.BusABC):
         can_wait = timeout is None or timeout > 0
         if not is_ready and can_wait and not self._is_shutdown:
             is_ready = self._await(timeout)
-        return (self._inbox.popleft() if is_ready else None), self._filters is None
+        return (self._take() if is_ready else None), self._filters is None
+
+    def _take(self) -> can.Message:
+        t_ns, can_id, data = self._inbox.popleft()
+        # positionally: stamp, identifier, is it an extended one
+        return can.Message(t_ns / NS_PER_S, can_id, False, data=data)
 
     def _await(self, timeout: float | None) -> bool:
         patience_ns = _PATIENCE_NS if timeout is None else int(timeout * NS_PER_S)
@@ -137,6 +164,40 @@ class FakeCanBus(can.BusABC):
         self._inbox.clear()
         self._wired.drop_waiting()
         raise can.CanOperationError("Network is down", errno.ENETDOWN)
+
+
+class InProcessDoor(PythonCanDoor):
+    """The door of python-can to a `FakeCanBus`, without a message for every frame.
+
+    Only where nothing is out of the ordinary: a bus that is disturbed, and frames that
+    have waited long, take python-can's way. What comes and goes is the same on both.
+    """
+
+    def __init__(self, bus: FakeCanBus, clock: Clock) -> None:
+        """Take a bus over; times are of `clock`."""
+        super().__init__(bus, clock)
+        self._fake, self._now_ns = bus, clock.now_ns
+
+    def send(self, can_id: int, data: bytes) -> None:
+        """Queue a data frame with an 11-bit identifier; raises LinkError."""
+        if self._fake.is_undisturbed:
+            self._fake.put(can_id, data)
+        else:
+            super().send(can_id, data)
+
+    def receive(self) -> list[DoorFrame]:
+        """Return what has arrived, oldest first; raises LinkError."""
+        fake = self._fake
+        if not fake.is_undisturbed or self._error is not None:
+            return super().receive()
+        inbox = fake.arrived()
+        if not inbox:
+            return []
+        if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
+            return super().receive()
+        frames = [DoorFrame(can_id, data, t_ns) for t_ns, can_id, data in inbox]
+        inbox.clear()
+        return frames
 
 
 class _Inbox:

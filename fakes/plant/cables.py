@@ -94,7 +94,7 @@ class CableDrives(JointDrives):
         held = damping + dt * stiffness
         inertia = self._rotor + dt * (np.array(bristles.damping) + held)
         against = np.array(speeds)
-        push = np.array(self._sent) + bent - stiffness * self.twist + held * against
+        push = np.array(self.sent()) + bent - stiffness * self.twist + held * against
         self._speeds = motor = (self._rotor * self._speeds + dt * push) / inertia
         return (stiffness * self.twist + held * (motor - against)).tolist()
 

@@ -136,9 +136,9 @@ class MotorBristles:
             dt: length of a step [s].
         """
         self._dt = dt
-        self._columns = _columns(friction, inertia, dt)
-        self._bent_springs = [s0 for _, _, s0, _, _, _ in self._columns]
-        self._bent_damping = [s0 * dt + s1 + b for _, _, s0, s1, _, b in self._columns]
+        self._columns = columns = _columns(friction, inertia, dt)
+        self._bent_springs = [s0 for _, _, s0, _, _, _, _ in columns]
+        self._bent_damping = [bent + b for _, _, _, bent, _, _, b in columns]
         self._lively: list[float] = (_LIVELY / _PERIOD * friction.presliding).tolist()
         load_and_ripple = np.stack(
             (
@@ -168,7 +168,7 @@ class MotorBristles:
             tau: torques that they bear [N m].
         """
         ways: list[tuple[float, float]] = []
-        for angle, torque, row in zip(angles, tau, self._levels, strict=True):
+        for angle, torque, row in zip(angles, tau, self._levels):
             coulomb, load, asymmetry, of_sin, of_cos = row
             level = coulomb + load * abs(torque)
             ripple = 1.0 + of_sin * math.sin(angle) + of_cos * math.cos(angle)
@@ -178,46 +178,51 @@ class MotorBristles:
     def follow(self, speeds: Sequence[float]) -> None:
         """Bend the bristles by a step at `speeds` of the motors [rad/s]."""
         dt = self._dt
-        state = zip(self._keep, self._z, speeds, strict=True)
+        state = zip(self._keep, self._z, speeds)
         self._z = [keep * (z + dt * w) for keep, z, w in state]
 
     def is_lively(self, speeds: Sequence[float]) -> bool:
         """Return whether a motor bends its bristle far within a cycle."""
-        for w, limit in zip(speeds, self._lively, strict=True):
-            if not -limit <= w <= limit:
+        for speed, limit in zip(speeds, self._lively):
+            if not -limit <= speed <= limit:
                 return True
         return False
 
     def take(self, speeds: Sequence[float]) -> None:
         """Take c, D and a anew at `speeds` of the motors [rad/s]."""
         dt = self._dt
-        keeps, dampings = [1.0] * 7, list(self._bent_damping)
-        springs = list(self._bent_springs)
-        state = zip(speeds, self._z, self._ways, self._columns, strict=True)
+        keeps, dampings = [1.0] * 7, self._bent_damping.copy()
+        springs = self._bent_springs.copy()
+        state = zip(speeds, self._z, self._ways, self._columns)
         for i, (w, z, (forward, backward), row) in enumerate(state):
             if z * w <= 0.0:
                 continue
-            more, slow, s0, s1, s1_dt, b = row
+            more, slow, s0, of_bent, of_still, s1_dt, b = row
             x = w * slow
-            g = forward if w > 0.0 else backward
+            # Bristle and speed have one sign: both are taken without it.
+            speed, bend, g = (w, z, forward) if w > 0.0 else (-w, -z, backward)
             g *= 1.0 + more / (1.0 + x * x)
-            bent = abs(z) * s0 / g
+            bent = bend * s0 / g
             if bent > ELASTIC:
-                rate = plastic_share(bent) * s0 * abs(w) / g
+                rate = plastic_share(bent) * s0 * speed / g
                 keeps[i] = keep = 1.0 / (1.0 + dt * rate)
-                dampings[i] = keep * (s0 * dt + s1) + b
-                springs[i] = keep * (s0 + s1_dt) - s1_dt
+                dampings[i] = keep * of_bent + b
+                springs[i] = keep * of_still - s1_dt
         self._keep, self.damping, self._springs = keeps, dampings, springs
 
     def torques(self, speeds: Sequence[float]) -> list[float]:
         """Return the torques on the motors [N m], taken at their `speeds` [rad/s]."""
-        state = zip(self._springs, self._z, self.damping, speeds, strict=True)
+        state = zip(self._springs, self._z, self.damping, speeds)
         return [-c * z - d * w for c, z, d, w in state]
 
 
 def _columns(friction: MotorFriction, inertia: Array, dt: float) -> list[list[float]]:
-    """Return for each motor: s - 1, 1 / w_s, s0, s1, s1 / dt, b."""
+    """Return what `MotorBristles.take` needs of each motor.
+
+    s - 1, 1 / w_s, s0, s0 dt + s1, s0 + s1 / dt, s1 / dt, b: seven numbers of each.
+    """
     s0 = friction.coulomb * friction.breakaway / friction.presliding
     s1 = _DAMPED * np.sqrt(s0 * inertia)
-    rows = (friction.breakaway - 1.0, 1.0 / friction.stribeck, s0, s1, s1 / dt)
-    return np.stack((*rows, friction.viscous), axis=-1).tolist()
+    of_speed = (friction.breakaway - 1.0, 1.0 / friction.stribeck)
+    of_bristle = (s0, s0 * dt + s1, s0 + s1 / dt, s1 / dt)
+    return np.stack((*of_speed, *of_bristle, friction.viscous), axis=-1).tolist()

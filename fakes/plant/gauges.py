@@ -67,7 +67,7 @@ class WristGauges:
     def _compute(self) -> Wrench:
         """Work in plain numbers: for three of them numpy takes ten times as long."""
         before, now, period = self._before, self._rates, self._period
-        change = [(v - u) / period for u, v in zip(before, now, strict=True)]
+        change = [(v - u) / period for u, v in zip(before, now)]
         _FELT.pack_into(self._buffer, 0, *self._ground, *change, *now[3:])
         felt = self._felt.dot(self._rotation.dot(self._turn))
         force, moment, a, alpha, w, (gx, gy, gz) = felt.tolist()

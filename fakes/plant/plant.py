@@ -221,9 +221,8 @@ class ArmPlant:
         if not self._is_held:
             k, b = _GRIP if self.hand.is_holding else _NO_GRIP
             ex, ey, ez = self._tilt
-            ground = (-F_t, F_y, F_n, M_x, M_y, M_z)
             turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
-            self._integrate((*ground, *self._held, *turned))
+            self._integrate((-F_t, F_y, F_n, M_x, M_y, M_z, *self._held, *turned))
         if self.t_ns % PERIOD_NS == 0:
             self._end_cycle()
 

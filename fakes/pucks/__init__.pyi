@@ -1,6 +1,6 @@
 from .bank import MotorSide
 from .bus_faults import BusFaults
-from .event_queue import FRAME_NS
+from .event_queue import FRAME_NS, OutFrame
 from .ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from .network import PuckNetwork
 from .options import NetworkOptions
@@ -16,6 +16,7 @@ __all__ = [
     "Load",
     "MotorSide",
     "NetworkOptions",
+    "OutFrame",
     "PendantAction",
     "PuckNetwork",
     "WiredNetwork",

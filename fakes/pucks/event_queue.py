@@ -67,7 +67,7 @@ class EventQueue:
                 action()
             else:
                 self._on_alarm()
-        self.now_ns = max(self.now_ns, t_ns)
+        self.now_ns = t_ns if t_ns > self.now_ns else self.now_ns
 
     def put(self, can_id: int, data: bytes) -> None:
         """Hand a frame to the wire now."""
@@ -86,5 +86,5 @@ class EventQueue:
         return frames
 
     def _find_next(self) -> None:
-        plan_ns = self._plans[0][0] if self._plans else NEVER
-        self.next_ns = min(plan_ns, self._alarm_ns)
+        plans, alarm_ns = self._plans, self._alarm_ns
+        self.next_ns = plans[0][0] if plans and plans[0][0] < alarm_ns else alarm_ns

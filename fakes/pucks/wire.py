@@ -55,7 +55,7 @@ class WiredNetwork:
         """
         schedule = self._schedule
         if schedule.next_ns > t_ns < self._next_ns and not schedule.outbox:
-            schedule.now_ns = max(schedule.now_ns, t_ns)
+            schedule.now_ns = t_ns if t_ns > schedule.now_ns else schedule.now_ns
             return []
         while True:
             # At one instant the network is first: its frame may win the arbitration.
@@ -66,8 +66,10 @@ class WiredNetwork:
                 self._carry(min(t_ns, own_ns - 1))
             else:
                 break
-        if schedule.now_ns < t_ns or schedule.outbox:
+        if schedule.outbox:
             self._take_due(t_ns)
+        elif schedule.now_ns < t_ns:  # nothing is planned till then
+            schedule.now_ns = t_ns
         sent, self._sent = self._sent, []
         return sent
 
@@ -90,8 +92,8 @@ class WiredNetwork:
     def _carry(self, until_ns: int) -> None:
         """Carry frames until `until_ns`, or until the network has got one of a host."""
         waiting, is_far, sent = self._waiting, self._is_far, self._sent
-        while (t_ns := self._next_ns) <= until_ns:
-            frame = self._on_wire
+        t_ns, frame = self._next_ns, self._on_wire
+        while t_ns <= until_ns:
             if frame is None:
                 frame = heappop(waiting)
                 if is_far:
@@ -99,18 +101,20 @@ class WiredNetwork:
                 else:
                     t_ns += FRAME_NS[len(frame[2])]
                 if t_ns > until_ns:  # its end is of a later call
-                    self._on_wire, self._next_ns = frame, t_ns
-                    return
+                    break
             can_id, _, data, is_of_host = frame
-            self._on_wire = None
+            frame = None
             self._free_ns = t_ns
-            # Whoever waits by now has been ready for a while.
-            self._next_ns = t_ns if waiting else NEVER
             if is_of_host:
+                self._on_wire, self._next_ns = None, t_ns if waiting else NEVER
                 self.network.receive(t_ns, can_id, data)
                 return
             if not is_far:
                 sent.append((t_ns, can_id, data))
+            # Whoever waits by now has been ready for a while.
+            if not waiting:
+                t_ns = NEVER
+        self._on_wire, self._next_ns = frame, t_ns
 
     def _start(self, t_ns: int, frame: _Waiting) -> int:
         """Begin a frame of far hosts at `t_ns`; return when it ends."""

@@ -152,7 +152,8 @@ class SensorStream:
 
     def due(self, t_ns: int) -> list[Saying]:
         """Return (time, bytes) of all that has left the wire by `t_ns`, in order."""
-        self._sample_until(t_ns)
+        if self._schedule is not None and self._sample_ns <= t_ns:
+            self._sample_until(t_ns)
         pending = self._pending
         gone: list[Saying] = []
         while pending and pending[0][0] <= t_ns:

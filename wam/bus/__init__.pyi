@@ -33,7 +33,7 @@ from .frames import (
     wrap_position,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
-from .link import CanLink, Door, FrameTap, Link
+from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -62,6 +62,7 @@ from .properties import (
 from .property_client import PropertyClient
 
 __all__ = [
+    "DRAIN_AT_MOST",
     "FIRST_RELEASED",
     "GROUP_BIT",
     "LONGEST_LINE",
@@ -84,6 +85,7 @@ __all__ = [
     "DecodedLine",
     "Device",
     "Door",
+    "Frame",
     "FrameError",
     "FrameTap",
     "Group",

@@ -112,28 +112,31 @@ class PythonCanDoor:
 
     def receive(self) -> list[Frame]:
         """Return what has arrived, oldest first; raises LinkError."""
-        frames: list[Frame] = []
+        arrived: list[can.Message] = []
         receive = self._bus.recv
         try:
             if self._error is not None:
                 error, self._error = self._error, None
                 raise error
-            for _ in range(DRAIN_AT_MOST):
+            while len(arrived) < DRAIN_AT_MOST:
                 message = receive(0)
                 if message is None:
                     break
-                frames.append(self._frame(message))
+                arrived.append(message)
         except (can.CanError, OSError) as error:
-            if not frames:
+            if not arrived:
                 raise broken_link(self._bus.channel_info, error) from error
             self._error = error
-        return frames
+        if not arrived:
+            return []
+        now_ns = self._clock.now_ns()
+        return [self._frame(message, now_ns) for message in arrived]
 
     def close(self) -> None:
         """Shut the bus down."""
         self._bus.shutdown()
 
-    def _frame(self, message: can.Message) -> Frame:
+    def _frame(self, message: can.Message, now_ns: int) -> Frame:
         can_id = message.arbitration_id
         if message.is_error_frame:
             can_id |= ERROR_FLAG
@@ -141,16 +144,13 @@ class PythonCanDoor:
             can_id |= EXTENDED_FLAG
         elif message.is_remote_frame:
             can_id |= REMOTE_FLAG
-        return Frame(can_id, bytes(message.data), self._host_ns(message.timestamp))
-
-    def _host_ns(self, stamp: float) -> int:
-        if not stamp:
-            return 0
-        now_ns, t_ns = self._clock.now_ns(), round(stamp * NS_PER_S)
-        if is_plausible(t_ns, now_ns):
-            return t_ns
-        t_ns -= self._clock.utc_ns() - now_ns
-        return t_ns if is_plausible(t_ns, now_ns) else 0
+        stamp = message.timestamp
+        t_ns = round(stamp * NS_PER_S) if stamp else 0
+        if t_ns and not is_plausible(t_ns, now_ns):
+            t_ns -= self._clock.utc_ns() - now_ns
+            if not is_plausible(t_ns, now_ns):
+                t_ns = 0
+        return Frame(can_id, bytes(message.data), t_ns)
 
 
 def _require_up(channel: str) -> None:

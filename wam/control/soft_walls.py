@@ -16,6 +16,7 @@ _REACH = 0.2  # rad in which the spring would reach the torque limit
 # A wall takes a joint no further than this: beyond the limit the guard steps in, and
 # would blame the foot's mass.
 _SHARE = 0.95  # of the torque limit
+_ALL_ARMED = 0x7F
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,8 @@ class SoftWalls:
 
         Never so much that a joint would get more than its torque limit in all.
         """
-        may_arm = reading.is_complete  # an extrapolated position arms nothing
+        # An extrapolated position arms nothing.
+        may_arm = reading.is_complete and self._armed != _ALL_ARMED
         rows = zip(reading.q.tolist(), self._free, strict=True)
         for joint, (angle, (lower, upper)) in enumerate(rows):
             if lower <= angle <= upper:

@@ -21,6 +21,7 @@ from wam.model.constants import ArmConstants, Array
 
 _LARGEST = 1e4  # of any parameter
 ELASTIC = 0.7  # share of the sliding deflection below which a bristle only bends
+_PLASTIC = 1.0 - ELASTIC
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,8 @@ def plastic_share(deflection: float) -> float:
     Args:
         deflection: |z|, 1 = that of steady sliding.
     """
-    return min(max((deflection - ELASTIC) / (1.0 - ELASTIC), 0.0), 1.0)
+    share = (deflection - ELASTIC) / _PLASTIC
+    return 0.0 if share < 0.0 else 1.0 if share > 1.0 else share
 
 
 def joint_coulomb(constants: ArmConstants, coulomb: Array) -> Array:

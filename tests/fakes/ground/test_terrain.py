@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fakes.ground.contact import NO_CONTACT
-from fakes.ground.footing import Footing, stretched
+from fakes.ground.footing import Footing
 from fakes.ground.stone_sizes import STONES, slope_factor
 from fakes.ground.stones import StoneBed
 from fakes.ground.terrain import PLATES, Plate, make_terrain
@@ -124,17 +124,27 @@ def test_a_slope_weakens_a_bed():
     assert 0.7 < factors[-1] < 0.9
 
 
+def pushed_aside(footing, by, F_n=PRESS):
+    """Move the sole `by` [m] to its side; return what holds it against y [N]."""
+    return -footing.step(0.001, (0.0,) * 4 + (by / 0.001,) + (0.0,) * 4, 0.0, F_n, 0.6)[
+        1
+    ]
+
+
 def test_a_bristle_stretches_up_to_its_limit_and_back_from_there():
-    assert stretched(0.0, 0.001, 0.002) == 0.001
-    assert stretched(0.001, 0.009, 0.002) == 0.002
-    assert stretched(0.002, -0.001, 0.002) == pytest.approx(0.001)
-    assert stretched(0.001, -0.009, 0.002) == -0.002
+    footing, most = Footing(2200.0, 0.0, 0.01, rng()), 0.6 * PRESS
+    assert pushed_aside(footing, 0.001) == pytest.approx(2.2)
+    assert pushed_aside(footing, 0.009) == pytest.approx(most)
+    assert pushed_aside(footing, -0.001) == pytest.approx(most - 2.2)
+    assert pushed_aside(footing, -0.009) == pytest.approx(-most)
 
 
 def test_a_bristle_that_was_let_slip_does_not_stretch_again_by_pressing():
-    slipped = stretched(0.002, 0.0, 0.0005)
-    assert slipped == 0.0005
-    assert stretched(slipped, 0.0, 0.002) == 0.0005
+    footing = Footing(2200.0, 0.0, 0.01, rng())
+    pushed_aside(footing, 0.01)
+    slipped = pushed_aside(footing, 0.0, PRESS / 4)
+    assert slipped == pytest.approx(0.6 * PRESS / 4)
+    assert pushed_aside(footing, 0.0, PRESS) == slipped
 
 
 def test_a_sole_that_was_lifted_has_forgotten_where_it_stuck():

@@ -136,7 +136,8 @@ def test_going_and_coming_differ_by_the_hysteresis():
 
 def test_another_axis_shows_in_proportion_to_its_load_and_no_axis_in_itself():
     errors = load_errors(cross_talk=0.003)
-    once, twice = (errors.update(0.0, tuple(k * f for f in PRESSED)) for k in (1, 2))
+    loads = np.outer((1.0, 2.0), PRESSED)
+    once, twice = (np.array(errors.update(0.0, load)) for load in loads.tolist())
     assert once[2] == 0.0
     assert np.abs(once[:2]).max() > 0.001
     assert twice == pytest.approx(2 * once)
