@@ -12,7 +12,7 @@ import termios
 
 import pytest
 
-from tests.processes.watching import STALLED, judged, patient_config
+from tests.processes.watching import is_stalled, judged, patient_config
 
 pytestmark = [pytest.mark.wall_clock, pytest.mark.timeout(200)]
 PATIENCE, LOOK = 20.0, 0.3  # s without a word, in all and at a time
@@ -118,7 +118,7 @@ def is_restored(folder, leave):
         try:
             leave_in_trial(person, leave)
         except AssertionError:
-            if STALLED.search(person.shown) and person.settings() == person.before:
+            if is_stalled(person.shown) and person.settings() == person.before:
                 return None
             raise
     return True

@@ -23,7 +23,7 @@ from tests.experiments.program import changed, write_config
 
 ROOT = Path(__file__).parents[2]
 CLOCK = SystemClock()
-TRIES = 8  # of sessions on a machine that stalls
+TRIES = 5  # of sessions on a machine that stalls
 NAMES = {
     "control": "traction-contro",  # the kernel keeps 15 characters
     "recorder": "traction-record",
@@ -34,6 +34,8 @@ STALLED = re.compile(
     "late cycles in|No reply from the arm|not answered for|F/T sample [0-9]+ ms"
     "|does not answer GET"  # before the loop: the simulated devices stood still
 )
+MEASURED = re.compile(r"missed (\d+)/(\d+)")  # what the preflight says of the loop
+MOST_MISSED = 0.05  # share of cycles beyond which any limit of the guard may be reached
 WITNESS = """import sys, time
 while True:
     start = time.monotonic_ns()
@@ -83,6 +85,13 @@ def is_running(pid):
     return state not in {"Z", "X"}
 
 
+def is_stalled(text):
+    """Return whether what a session said is that of a machine that stands still."""
+    measured = MEASURED.search(text)
+    missed, cycles = map(int, measured.groups()) if measured else (0, 1)
+    return STALLED.search(text) is not None or missed > MOST_MISSED * cycles
+
+
 class Session:
     """A `traction run --fake` in a process of its own."""
 
@@ -113,8 +122,12 @@ class Session:
         self.shared = SharedLayout(SharedMemory(self._open_board()))
 
     def has_stalled(self):
-        """Return whether the arm was stopped because the machine stood still."""
-        return STALLED.search(self.output()) is not None
+        """Return whether the arm was stopped because the machine stood still.
+
+        Either the message says so, or the preflight had measured a loop that misses so
+        many cycles that joint 7, whose lock is stiff, shakes.
+        """
+        return is_stalled(self.output())
 
     def journal(self):
         paths = list(self.data.glob("sessions/*/events.jsonl"))
