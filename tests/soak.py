@@ -313,8 +313,8 @@ processes:
 {rows}
 
 Measured by `python tests/soak.py --seed N --hours H --record FILE` for each row; this
-page by `python tests/soak.py --write docs/soak.md FILE ...`. Descriptors and memory
-(MB): after the first sessions, and at the end.
+page by `python tests/soak.py --write docs/soak.md tests/data/soak/*.json`. Descriptors
+and memory (MB): after the first sessions, and at the end.
 """
 TITLES = ("seed", "commit", "date", "hours", "sessions", "trials", "with a fault")
 TITLES += ("resumes", "descriptors", "memory")
