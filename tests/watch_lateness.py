@@ -22,7 +22,7 @@ from tests.processes.watching import CLOCK, session, stall_witness, wait
 
 SETTLING = 5.0  # s of a window
 LOOK = 0.5  # s between two looks at the ring
-TRIALS = 100  # more than are recorded meanwhile
+TRIALS = 99  # more than are recorded meanwhile
 
 
 @contextmanager
