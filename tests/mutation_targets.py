@@ -438,3 +438,12 @@ for _sum in ("sum(q) - sum(qd) + sum(tau)", "sum(q) + sum(qd) - sum(tau)"):
     EQUIVALENT[f"{_LOOP}/guard.py", f"{_text} -> {_VERDICTS.format(_sum)}"] = (
         "of no number every sum and difference is none"
     )
+_BOUNDED = (
+    "value = low if wanted < low else high if wanted > high else wanted",
+    "bounded.append(-limit if value < -limit else limit if value > limit else value)",
+)
+for _text in _BOUNDED:
+    for _strict, _loose in (("< ", "<= "), ("> ", ">= ")):
+        EQUIVALENT[
+            f"{_LOOP}/limits.py", f"{_text} -> {_text.replace(_strict, _loose)}"
+        ] = "a number at its bound is the bound"
