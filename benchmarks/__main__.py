@@ -7,17 +7,15 @@ linear algebra. `--write` puts the table into docs/measured.md, between its mark
 """
 
 import argparse
-import datetime
 import importlib
-import importlib.metadata
 import json
 import os
-import platform
 import subprocess
 import sys
 from pathlib import Path
 
 from benchmarks.rows import BenchRow
+from benchmarks.surroundings import surroundings
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "measured.md"
@@ -49,40 +47,6 @@ def run_one(name: str) -> list[BenchRow]:
         return [BenchRow(name, None, "", note=f"failed: {type(error).__name__}")]
     (line,) = (x for x in done.stdout.splitlines() if x.startswith(_MARK))
     return [BenchRow(**row) for row in json.loads(line.removeprefix(_MARK))]
-
-
-def surroundings() -> str:
-    """Return commit, machine, date and versions in one paragraph."""
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty", "--abbrev=10"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout.strip()
-    today = datetime.datetime.now(datetime.UTC).date()
-    load = os.getloadavg()[0]
-    return (
-        f"Commit {commit or 'unknown'}, {today}, Python {platform.python_version()}, "
-        f"{len(os.sched_getaffinity(0))} cores ({processor()}), load {load:.1f} at the "
-        f"end. {', '.join(map(version_of, PEERS))}."
-    )
-
-
-def processor() -> str:
-    """Return the name of the processor."""
-    for line in Path("/proc/cpuinfo").read_text().splitlines():
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return platform.machine()
-
-
-def version_of(name: str) -> str:
-    """Return a library with its version."""
-    try:
-        return f"{name} {importlib.metadata.version(name)}"
-    except importlib.metadata.PackageNotFoundError:
-        return f"{name} not installed"
 
 
 def table_of(found: dict[str, list[BenchRow]]) -> str:
@@ -126,7 +90,7 @@ def main() -> int:
         found[name] = run_one(name)
         for row in found[name]:
             print("  ".join(row.cells()), flush=True)
-    text = f"\n{surroundings()}\n\n{table_of(found)}\n"
+    text = f"\n{surroundings(PEERS)}\n\n{table_of(found)}\n"
     print(text)
     if arguments.write:
         PAGE.write_text(with_table(PAGE.read_text(), text))

@@ -1,6 +1,6 @@
 """README's commands, one after the other as on a fresh machine, timed.
 
-    python -m benchmarks.newcomer [--without "make test"] [--write docs/first-hour.md]
+    python -m benchmarks.newcomer [--without "make test"]
 
 Every command of README, its Python example last, runs in an empty folder with an empty
 home, where only what the shell needs is set; the repository is cloned from here. A
@@ -9,10 +9,8 @@ first that fails ends the run with its last words.
 """
 
 import argparse
-import datetime
 import fcntl
 import os
-import platform
 import pty
 import re
 import select
@@ -25,7 +23,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from benchmarks.readme import README, ROOT
+from benchmarks.surroundings import surroundings
+
 ADDRESS = "URL-OF-THIS-REPOSITORY"
 _BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 _COMMENT = re.compile(r"\s{2,}#.*")
@@ -35,17 +35,6 @@ _KEYS = (("[k]", "k"), ("[space]", " "))  # what a screen asks for, and what is 
 _PATIENCE = 1.0  # s between two keys
 _LAST = 2000  # characters of a screen that are looked at
 _LIMIT_S = 1800.0
-PAGE = """# The first hour
-
-Every command of the README, one after the other, in an empty folder with an empty home
-(`python -m benchmarks.newcomer --write docs/first-hour.md`{without}). Commit {commit},
-{date}, Python {python}, {cores} cores ({processor}), load {load:.1f} at the end.
-
-| command | time |
-|---|---|
-{rows}
-| all | {total:.0f} s |
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,59 +140,37 @@ def _key_for(words: str) -> str:
     return ""
 
 
+def told(step: Step) -> Step:
+    """Print what a step took."""
+    print(f"{step.seconds:7.1f} s  {step.text}", flush=True)
+    return step
+
+
 def walk(home: Path, without: list[str]) -> list[Step]:
     """Return the steps of a newcomer, up to the first that fails."""
-    page = (ROOT / "README.md").read_text()
+    page = README.read_text()
     somebody = Newcomer(home)
     steps = list[Step]()
     for text in (x for x in commands_of(page) if x not in without):
-        steps.append(somebody.type(text))
-        print(f"{steps[-1].seconds:7.1f} s  {text}", flush=True)
+        steps.append(told(somebody.type(text)))
         if steps[-1].code:
             return steps
     (somebody.folder / "example.py").write_text(example_of(page))
-    steps.append(somebody.type(".venv/bin/python example.py"))
+    steps.append(told(somebody.type(".venv/bin/python example.py")))
     return steps
-
-
-def page_of(steps: list[Step], without: list[str]) -> str:
-    """Return the page of what they took."""
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short=10", "HEAD"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.strip()
-    names = re.search(r"model name\s*: (.*)", Path("/proc/cpuinfo").read_text())
-    return PAGE.format(
-        without="".join(f", without `{text}`" for text in without),
-        commit=commit,
-        date=datetime.datetime.now(datetime.UTC).date(),
-        python=platform.python_version(),
-        cores=len(os.sched_getaffinity(0)),
-        processor=names[1] if names else platform.machine(),
-        load=os.getloadavg()[0],
-        rows="\n".join(f"| `{step.text}` | {step.seconds:.0f} s |" for step in steps),
-        total=sum(step.seconds for step in steps),
-    )
 
 
 def main() -> int:
     """Run the commands, print what they took; return 1 where one failed."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--without", action="append", default=[], metavar="COMMAND")
-    parser.add_argument("--write", type=Path)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as home:
         steps = walk(Path(home), given.without)
     if steps[-1].code:
         print(steps[-1].words)
         return 1
-    page = page_of(steps, given.without)
-    print(page)
-    if given.write:
-        given.write.write_text(page)
+    print(f"{sum(step.seconds for step in steps):7.1f} s  all. {surroundings()}")
     return 0
 
 

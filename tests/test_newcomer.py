@@ -1,19 +1,18 @@
 """A newcomer types what README says, and presses what the screens ask for."""
 
-from benchmarks.newcomer import ROOT, Newcomer, commands_of, example_of
-
-README = (ROOT / "README.md").read_text()
+from benchmarks.newcomer import Newcomer, commands_of, example_of
+from benchmarks.readme import README
 
 
 def test_the_commands_of_readme_are_typed_without_their_comments():
-    commands = commands_of(README)
+    commands = commands_of(README.read_text())
     assert commands[0].startswith("git clone")
     assert {"make demo", "make test"} < set(commands)
     assert not any("#" in command or "```" in command for command in commands)
 
 
 def test_the_example_of_readme_is_python():
-    assert "tr.load_session" in example_of(README)
+    assert "tr.load_session" in example_of(README.read_text())
 
 
 def test_a_key_is_pressed_that_is_asked_for_and_a_folder_stays(tmp_path):

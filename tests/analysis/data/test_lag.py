@@ -82,6 +82,25 @@ def test_a_force_that_has_nothing_to_do_with_the_motion_says_nothing():
     assert force_lag(series.t, series.v_t, jamming(seed=9).F_t) is None
 
 
+def test_a_motion_that_explains_half_of_the_slow_force_says_nothing():
+    """On a plate the ground's own force varies below 40 Hz, and the noise is above."""
+    from scipy.signal import butter, sosfilt
+
+    series, rng = jamming(0.004), np.random.default_rng(3)
+    slow, fast = (
+        np.asarray(sosfilt(butter(2, band, kind, fs=500.0, output="sos"), noise))
+        for band, kind, noise in (
+            (15.0, "low", rng.normal(size=series.t.size)),
+            (50.0, "high", rng.normal(size=series.t.size)),
+        )
+    )
+    noisy = replace(series, F_t=series.F_t + 6.0 * fast)
+    lag = lag_of(noisy)  # the motion explains what is below 40 Hz
+    assert lag is not None
+    assert lag.explained > 0.65
+    assert lag_of(replace(noisy, F_t=noisy.F_t + 4.0 * slow)) is None
+
+
 @pytest.mark.parametrize(
     "change",
     [
