@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.stalls import WallClock
+
 DATA = Path(__file__).parent / "data"
 # A machine that stalls fails no test: how long an example takes is no claim.
 settings.register_profile(
@@ -16,14 +18,15 @@ settings.register_profile(
 settings.load_profile("untimed")
 
 
-def pytest_configure() -> None:
-    """Hear the signals that the tests send.
+def pytest_configure(config: pytest.Config) -> None:
+    """Repeat what a stall spoils, and hear the signals that the tests send.
 
     A shell that starts the suite in the background, or nohup, has it ignore them, and
     every program that a test starts would inherit that.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    config.pluginmanager.register(WallClock(), "wall-clock")
 
 
 @pytest.fixture(autouse=True, scope="session")

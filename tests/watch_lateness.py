@@ -19,7 +19,8 @@ import numpy as np
 
 from tests.experiments.live.viewer import Viewer
 from tests.processes.test_second_screen import end, watching
-from tests.processes.watching import CLOCK, session, stall_witness, wait
+from tests.processes.watching import CLOCK, session, wait
+from tests.stalls import stall_witness
 
 SETTLING = 5.0  # s of a window
 LOOK = 0.5  # s between two looks at the ring

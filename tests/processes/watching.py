@@ -20,6 +20,7 @@ from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import SharedMemory
 from fakes.bus.client import SocketBus
 from tests.experiments.program import changed, write_config
+from tests.stalls import stall_witness
 
 ROOT = Path(__file__).parents[2]
 CLOCK = SystemClock()
@@ -36,15 +37,6 @@ STALLED = re.compile(
 )
 MEASURED = re.compile(r"missed (\d+)/(\d+)")  # what the preflight says of the loop
 MOST_MISSED = 0.05  # share of cycles beyond which any limit of the guard may be reached
-WITNESS = """import sys, time
-while True:
-    start = time.monotonic_ns()
-    time.sleep(0.001)
-    end = time.monotonic_ns()
-    if end - start > float(sys.argv[1]) * 1e6:
-        print(end, flush=True)
-"""
-STALL = 6.0  # ms, of a sleep of 1 ms: three cycles
 START = "import sys; from experiments.__main__ import main; sys.exit(main())"
 
 
@@ -197,54 +189,6 @@ def patient_config(folder, **options):
 def not_judged(tries):
     """Skip a test whose sessions the machine ended, each of them, by standing still."""
     pytest.skip(f"not judged: the machine stood still in each of {tries} sessions")
-
-
-class StallWitness:
-    """A program that only sleeps, on every core: it shows when the machine stood still.
-
-    The simulated devices share the machine with the loop. When it stalls, the guard
-    stops the arm, which is right, but not what a test looks at.
-    """
-
-    def __init__(self, folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        self._paths = []  # a file for each core: two writers of one file tear its lines
-        self._processes = [
-            self._watch(core, folder / f"stalls-{core}.txt")
-            for core in os.sched_getaffinity(0)
-        ]
-
-    def _watch(self, core, path):
-        command = [sys.executable, "-c", WITNESS, str(STALL)]
-        with path.open("w") as out:
-            process = subprocess.Popen(command, stdout=out)
-        os.sched_setaffinity(process.pid, {core})
-        self._paths.append(path)
-        return process
-
-    def stalls_since(self, t_ns):
-        """Return how often a core stood still since `t_ns` [monotonic ns]."""
-        return sum(
-            int(line) > t_ns
-            for path in self._paths
-            for line in path.read_text().splitlines(keepends=True)
-            if line.strip() and line.endswith("\n")  # not one that is being written
-        )
-
-    def close(self):
-        for process in self._processes:
-            process.kill()
-            process.wait()
-
-
-@contextmanager
-def stall_witness(folder):
-    """Watch for stalls of the machine; yield the witness."""
-    witness = StallWitness(folder)
-    try:
-        yield witness
-    finally:
-        witness.close()
 
 
 def judged(folder, attempt, tries=TRIES):
