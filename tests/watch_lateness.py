@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.experiments.live.viewer import Viewer
+from lab.guest.viewer import Viewer
 from tests.processes.test_second_screen import end, watching
 from tests.processes.watching import CLOCK, session, wait
 from tests.stalls import stall_witness

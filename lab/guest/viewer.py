@@ -9,12 +9,17 @@ import json
 import os
 import socket
 import struct
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Self
 
 SUBPROTOCOL = "foxglove.sdk.v1"
 _TEXT, _BINARY, _CLOSE = 1, 2, 8
 _MESSAGE, _TIME = 1, 2
 _HEAD = struct.Struct("<BIQ")
+_PATIENCE = 5.0  # s for an answer of the server
 
 
 @dataclass
@@ -22,22 +27,25 @@ class Viewer:
     """Subscribes to every channel and keeps what it gets.
 
     Attributes:
+        port: of the server on this computer.
         info: of the server.
         channels: as advertised, by topic.
         messages: (ns, payload) by topic, in order.
         times: what the server said of the time [ns].
-        statuses: opcodes of other binary messages.
+        others: other binary messages.
     """
 
     port: int
-    info: dict = field(default_factory=dict)
-    channels: dict = field(default_factory=dict)
-    messages: dict = field(default_factory=dict)
-    times: list = field(default_factory=list)
-    others: list = field(default_factory=list)
+    info: dict[str, Any] = field(default_factory=dict[str, Any])
+    channels: dict[str, Any] = field(default_factory=dict[str, Any])
+    messages: dict[str, list[tuple[int, bytes]]] = field(
+        default_factory=dict[str, list[tuple[int, bytes]]]
+    )
+    times: list[int] = field(default_factory=list[int])
+    others: list[bytes] = field(default_factory=list[bytes])
 
-    def __post_init__(self):
-        self._socket = socket.create_connection(("127.0.0.1", self.port), 5.0)
+    def __post_init__(self) -> None:
+        self._socket = socket.create_connection(("127.0.0.1", self.port), _PATIENCE)
         key = base64.b64encode(os.urandom(16)).decode()
         lines = (
             "GET / HTTP/1.1",
@@ -53,11 +61,16 @@ class Viewer:
         while b"\r\n\r\n" not in self._data:
             self._more()
         head, _, self._data = self._data.partition(b"\r\n\r\n")
-        assert b" 101 " in head.splitlines()[0], head
-        self._topics = {}
+        if b" 101 " not in head.splitlines()[0]:
+            raise ConnectionError(head.decode(errors="replace"))
+        self._topics: dict[int, str] = {}
 
-    def look(self, until):
-        """Take frames until `until(self)` is true."""
+    def look(self, until: Callable[["Viewer"], object]) -> "Viewer":
+        """Take frames until `until(self)` is true.
+
+        Raises:
+            ConnectionError: the server hung up.
+        """
         while not until(self):
             kind, body = self._frame()
             if kind == _TEXT:
@@ -68,17 +81,22 @@ class Viewer:
                 raise ConnectionError("closed")
         return self
 
-    def ask(self, body: bytes):
+    def ask(self, body: bytes) -> None:
         """Send a binary message."""
         self._send(_BINARY, body)
 
-    def __enter__(self):
+    def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._socket.close()
 
-    def _hear(self, message):
+    def _hear(self, message: dict[str, Any]) -> None:
         if message["op"] == "serverInfo":
             self.info = message
         elif message["op"] == "advertise":
@@ -89,7 +107,7 @@ class Viewer:
             text = json.dumps({"op": "subscribe", "subscriptions": wanted})
             self._send(_TEXT, text.encode())
 
-    def _take(self, body):
+    def _take(self, body: bytes) -> None:
         if body[0] == _MESSAGE:
             _, subscription, t_ns = _HEAD.unpack_from(body)
             topic = self._topics[subscription]
@@ -100,7 +118,7 @@ class Viewer:
         else:
             self.others.append(body)
 
-    def _frame(self):
+    def _frame(self) -> tuple[int, bytes]:
         first, second = self._bytes(2)
         length = second & 0x7F
         if length >= 126:
@@ -108,7 +126,7 @@ class Viewer:
             length = int.from_bytes(self._bytes(size), "big")
         return first & 0x0F, self._bytes(length)
 
-    def _send(self, kind, body):
+    def _send(self, kind: int, body: bytes) -> None:
         mask = os.urandom(4)
         size = len(body)
         head = bytes([0x80 | kind])
@@ -119,14 +137,38 @@ class Viewer:
         masked = bytes(byte ^ mask[i % 4] for i, byte in enumerate(body))
         self._socket.sendall(head + mask + masked)
 
-    def _bytes(self, count):
+    def _bytes(self, count: int) -> bytes:
         while len(self._data) < count:
             self._more()
         taken, self._data = self._data[:count], self._data[count:]
         return taken
 
-    def _more(self):
+    def _more(self) -> None:
         data = self._socket.recv(65536)
         if not data:
             raise ConnectionError("the server hung up")
         self._data += data
+
+
+def main() -> None:
+    """Read everything of the port that the first operand names, until it ends.
+
+    Each 50th message of the loop's cycles is told.
+    """
+    count = 0
+
+    def tell(viewer: Viewer) -> bool:
+        nonlocal count
+        seen = len(viewer.messages.get("/cycle", ()))
+        if seen - count >= 50:
+            count = seen
+            sys.stdout.write(f"{seen} cycles\n")
+            sys.stdout.flush()
+        return False
+
+    with Viewer(int(sys.argv[1])) as viewer:
+        viewer.look(tell)
+
+
+if __name__ == "__main__":
+    main()
