@@ -205,6 +205,22 @@ def add_analysis(parser: ArgumentParser) -> None:
     )
 
 
+def add_scheduler(parser: ArgumentParser) -> None:
+    """Declare where models are fitted."""
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
+    )
+
+
+def add_pdf(parser: ArgumentParser) -> None:
+    """Declare that figures are wanted as PDF, too."""
+    parser.add_argument(
+        "--pdf", action="store_true", help="figures as PDF, too; takes seconds more"
+    )
+
+
 def add_reopening(parser: ArgumentParser) -> None:
     """Declare what every command takes that opens a session once more."""
     parser.add_argument(

@@ -97,7 +97,7 @@ class Picture:
     Attributes:
         key: name of its files, e.g. "fig4_excerpts".
         png: the figure as PNG.
-        pdf: the figure as vector PDF.
+        pdf: the figure as vector PDF; empty = it was not asked for.
         width: at which a page shows it [pixels of CSS].
         svg: the figure as an element of a page, which says where its axes are; empty =
             it is shown as PNG.
@@ -105,7 +105,7 @@ class Picture:
 
     key: str
     png: bytes
-    pdf: bytes
+    pdf: bytes = b""
     width: int = 0
     svg: str = ""
 
@@ -185,7 +185,12 @@ def shade_table(ax: Axes, table: Sequence[Sequence[float]], top: float) -> None:
 
 
 def render(
-    key: str, figure: Figure, is_simulated: bool, *, is_vector: bool = False
+    key: str,
+    figure: Figure,
+    is_simulated: bool,
+    *,
+    is_vector: bool = False,
+    with_pdf: bool = False,
 ) -> Picture:
     """Return the finished figure as files, watermarked if simulated.
 
@@ -194,6 +199,7 @@ def render(
         figure: the figure.
         is_simulated: its data were.
         is_vector: a page shows it as SVG, which can be enlarged and read.
+        with_pdf: it is wanted as PDF, too; embedding its fonts takes as long as the rest.
     """
     if is_simulated:
         mark_simulated(figure)
@@ -207,7 +213,9 @@ def render(
         canvas.draw()
         png = _few_colours(np.asarray(canvas.buffer_rgba()))
         figure.set_layout_engine("none")  # the layout is found; do not search again
-        FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
+        if with_pdf:
+            metadata = {"CreationDate": None}
+            FigureCanvasPdf(figure).print_pdf(pdf, metadata=metadata)
         svg = _svg(key, figure) if is_vector else ""
     width = round(_SHOWN * figure.get_figwidth())
     return Picture(key, png, pdf.getvalue(), width, svg)

@@ -104,14 +104,17 @@ FIGURES: tuple[FigureSpec, ...] = tuple(
 )
 
 
-def report_figures(results: StudyResults, n_jobs: int = 1) -> list[ReportFigure]:
+def report_figures(
+    results: StudyResults, n_jobs: int = 1, *, with_pdf: bool = False
+) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
         results: what is shown.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
+        with_pdf: figures are wanted as PDF, too.
     """
-    batches = [FigureBatch(results, k, n_jobs) for k in range(n_jobs)]
+    batches = [FigureBatch(results, k, n_jobs, with_pdf) for k in range(n_jobs)]
     drawn: dict[str, ReportFigure] = {}
     for batch in run_tasks(draw_batch, batches, n_jobs):
         drawn |= {figure.picture.key: figure for figure in batch}
@@ -126,28 +129,35 @@ class FigureBatch:
         results: what is shown.
         first: number of its first figure.
         step: from one of its figures to the next.
+        with_pdf: figures are wanted as PDF, too.
     """
 
     results: StudyResults
     first: int
     step: int
+    with_pdf: bool = False
 
 
 def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
     """Return the figures of a batch that there are numbers for."""
     with styled():
-        figures = [
-            _draw(spec, batch.results) for spec in FIGURES[batch.first :: batch.step]
-        ]
+        figures = [_draw(spec, batch) for spec in FIGURES[batch.first :: batch.step]]
     return [figure for figure in figures if figure is not None]
 
 
-def _draw(spec: FigureSpec, results: StudyResults) -> ReportFigure | None:
+def _draw(spec: FigureSpec, batch: FigureBatch) -> ReportFigure | None:
+    results = batch.results
     figure = spec.draw(results)
     if figure is None:
         return None
     is_simulated = results.study.simulated
-    picture = render(spec.key, figure, is_simulated, is_vector=spec.is_vector)
+    picture = render(
+        spec.key,
+        figure,
+        is_simulated,
+        is_vector=spec.is_vector,
+        with_pdf=batch.with_pdf,
+    )
     return ReportFigure(
         spec.section, spec.title, spec.alt, spec.caption(results), picture
     )
@@ -163,8 +173,9 @@ _NO_RIG = "External data have no record of the rig: health and limits are unknow
 def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     """Write the report of a study and return the path of its page.
 
-    Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, *.pdf,
-    and terrains.json with foresight; each file is replaced whole, the page last.
+    Below `out_dir`: report/index.html, fits.json, fits.csv and figures/*.png, with
+    `context.with_pdf` *.pdf, with foresight terrains.json; each file is replaced whole,
+    the page last. Figures that an earlier report left there are removed.
 
     Raises:
         SettingsError: the folder cannot be written.
@@ -177,14 +188,24 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     if context.foresight is not None:
         text = _database(study, results, context.generated_utc, context.foresight)
         write_atomic(out_dir / "terrains.json", text.encode())
-    shown = report_figures(results, _processes(study))
-    for figure in shown:
-        picture = figure.picture
-        write_atomic(out_dir / "figures" / f"{picture.key}.png", picture.png)
-        write_atomic(out_dir / "figures" / f"{picture.key}.pdf", picture.pdf)
+    shown = report_figures(results, _processes(study), with_pdf=context.with_pdf)
+    _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())
     return page
+
+
+def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
+    """Write the files of the figures; remove those of a report that stood there."""
+    files = {f"{figure.picture.key}.png": figure.picture.png for figure in shown}
+    files |= {f"{figure.picture.key}.pdf": figure.picture.pdf for figure in shown}
+    for name, content in files.items():
+        if content:
+            write_atomic(folder / name, content)
+    for spec in FIGURES:
+        for name in (f"{spec.key}.png", f"{spec.key}.pdf"):
+            if not files.get(name):
+                (folder / name).unlink(missing_ok=True)
 
 
 def _database(

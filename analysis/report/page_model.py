@@ -118,6 +118,7 @@ class ReportContext:
         further_numbers: further plain values for fits.json, by name.
         foresight: for a terrain database beside the report; None = none is written.
         photos: of the bed after the trials.
+        with_pdf: figures are filed as PDF, too.
     """
 
     title: str
@@ -131,6 +132,7 @@ class ReportContext:
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
     foresight: ForesightModel | None = None
     photos: Sequence[BedPhoto] = field(default=())
+    with_pdf: bool = False
 
     @property
     def kind(self) -> str:

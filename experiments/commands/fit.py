@@ -6,7 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_analysis, add_seed, number_within
+from experiments.arguments import (
+    add_analysis,
+    add_pdf,
+    add_scheduler,
+    add_seed,
+    number_within,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -52,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=SIZE,..",
         help="stones of a terrain: small, big or none for a plate",
     )
+    add_scheduler(parser)
+    add_pdf(parser)
     add_seed(parser)
     add_analysis(parser)
 
@@ -84,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     count = sum(len(series) for series in trials.values())
     console.say(f"{count} trials on {len(trials)} terrains: fitting ...")
     fit = FitOptions(bounds=choices.bounds, seed=args.seed, models=REPORTED)
-    options = StudyOptions(prepare=choices.prepare, fit=fit)
+    options = StudyOptions(choices.prepare, fit=fit, scheduler=args.scheduler)
     with fitting(console) as progress:
         study = run_study(trials, options, is_simulated, progress)
     require_samples(study)
@@ -99,6 +107,7 @@ def run(args: argparse.Namespace) -> int:
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others]
         },
+        with_pdf=args.pdf,
     )
     page = write_report(study, args.to, context)
     for warning in study.warnings:

@@ -6,7 +6,13 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from experiments.arguments import add_allow_missing, add_analysis, add_seed
+from experiments.arguments import (
+    add_allow_missing,
+    add_analysis,
+    add_pdf,
+    add_scheduler,
+    add_seed,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,11 +30,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "sessions", nargs="*", metavar="SESSION", help="id, folder name or path"
     )
     parser.add_argument("--all", action="store_true", help="every session with trials")
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="fit on the Dask cluster there: tls://HOST:PORT, or tcp://127.0.0.1:8786",
-    )
+    add_scheduler(parser)
+    add_pdf(parser)
     parser.add_argument("--json", action="store_true", help="what was made, as JSON")
     add_allow_missing(parser)
     add_seed(parser)
@@ -62,7 +65,9 @@ def run(args: argparse.Namespace) -> int:
     sessions = choose_sessions(data, args.sessions, every=args.all)
     order = [row.name for row in load_settings(args.config).matrix.terrains]
     missing = tell_missing(sessions, console, allow_missing=args.allow_missing)
-    wanted = ReportRequest(order, args.seed, args.scheduler, choices, missing)
+    wanted = ReportRequest(
+        *(order, args.seed, args.scheduler, choices, missing), with_pdf=args.pdf
+    )
     page = report_sessions(sessions, data, wanted, console)
     if args.json:
         names = [session.id for session in sessions]

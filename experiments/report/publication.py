@@ -101,7 +101,8 @@ def publish_sessions(
     trials = {path: load_trial(path) for s in copies for path in s.kept_trials()}
     export_sessions(copies, to / TABLES, "csv", console)
     (to / RESULTS).mkdir()
-    report_sessions(copies, data, replace(order, out=to / RESULTS), console)
+    wanted = replace(order, out=to / RESULTS, with_pdf=True)
+    report_sessions(copies, data, wanted, console)
     code = provenance.collect()
     about = _credits(trials.values(), request, code["software"])
     _write_texts(to, about, order, code, list(trials.values()))

@@ -5,12 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
-from analysis.data import (
-    RecordedTrial,
-    doubts_of_record,
-    load_trial,
-    summed_up,
-)
+from analysis.data import RecordedTrial, doubts_of_record, load_trial, summed_up
 from analysis.findings import summarise_rig
 from analysis.foresight import fit_foresight, watch_all
 from analysis.report import (
@@ -66,6 +61,7 @@ class ReportRequest:
         choices: of the analysis.
         missing: kept trials that are missing or changed, in words.
         out: folder of the report; None = that of the session, or `data`/study.
+        with_pdf: figures are wanted as PDF, too.
     """
 
     terrains: Sequence[str]
@@ -74,6 +70,7 @@ class ReportRequest:
     choices: AnalysisChoices = field(default_factory=AnalysisChoices)
     missing: Sequence[str] = ()
     out: Path | None = None
+    with_pdf: bool = False
 
     def sorted(self, names: Iterable[str]) -> list[str]:
         """Return `names` in the matrix's order, others last by name."""
@@ -294,6 +291,7 @@ def report_sessions(
         photos=[BedPhoto(*photo) for photo in photos],
         rig=summarise_rig([trial for group in trials.values() for trial in group]),
         foresight=foresight.model if len(sessions) > 1 else None,
+        with_pdf=order.with_pdf,
     )
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))

@@ -9,7 +9,7 @@ from analysis.figures.curves import caption_gp, draw_tustin_model
 from analysis.figures.errors import draw_cross_bars, draw_cross_map, draw_errors
 from analysis.figures.excerpts import draw_excerpts
 from analysis.figures.selection import busiest_window, panels
-from analysis.figures.style import render, styled
+from analysis.figures.style import Picture, render, styled
 from analysis.figures.surfaces import near_samples
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
@@ -60,7 +60,7 @@ def context(**changes):
 def written(small_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
     table = ReportTable("Sessions", ("session", "kept"), [["S012", "10"]], "remark")
-    path = write_report(small_study, folder, context(is_simulated=True, tables=[table]))
+    path = write_report(small_study, folder, context(is_simulated=True, tables=[table], with_pdf=True))
     return folder, path, Page(path.read_text())
 
 
@@ -143,6 +143,28 @@ def test_every_number_and_figure_lies_beside_the_page(written, small_study):
     for file in (folder / "figures").iterdir():
         start = b"%PDF" if file.suffix == ".pdf" else b"\x89PNG"
         assert file.read_bytes().startswith(start)
+
+
+def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
+    small_study, tmp_path, monkeypatch
+):
+    def drawn(key, *_, with_pdf, **__):
+        return Picture(key, b"png", b"pdf" if with_pdf else b"")
+
+    monkeypatch.setattr("analysis.report.page.render", drawn)
+    write_report(small_study, tmp_path, context(with_pdf=True))
+    figures = tmp_path / "figures"
+    assert {file.suffix for file in figures.iterdir()} == {".pdf", ".png"}
+    for name in ("rig.png", "notes.pdf"):  # of no figure today, and a user's own
+        (figures / name).write_bytes(b"x")
+    page = Page(write_report(small_study, tmp_path, context()).read_text())
+    assert [file.name for file in figures.glob("*.pdf")] == ["notes.pdf"]
+    assert not (figures / "rig.png").exists()
+    links = [a["href"] for a in page.attributes("a") if "/figures/" in a["href"]]
+    assert len(links) > 10
+    for link in links:
+        assert link.endswith(".png")
+        assert (tmp_path / "report" / link).is_file()
 
 
 @pytest.fixture(scope="module")

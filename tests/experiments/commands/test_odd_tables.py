@@ -125,3 +125,13 @@ def test_every_figure_of_odd_tables_is_drawn(tmp_path):
     fitted(tmp_path)
     drawn = {path.stem for path in (tmp_path / "out/figures").glob("*.pdf")}
     assert {"fig4_excerpts", "fig9_errors", "trials", "trends", "coverage"} <= drawn
+
+
+@pytest.mark.parametrize("address", ["tcp://192.168.1.5:8786", "nonsense"])
+def test_an_insecure_scheduler_is_refused_and_nothing_written(tmp_path, address):
+    np.savez(tmp_path / "two.npz", **{f"pair/{k:02d}": made(k) for k in range(2)})
+    to = ("--to", tmp_path / "out", "--scheduler", address)
+    done = traction("fit", tmp_path / "two.npz", *to)
+    assert done.code == 2, done.err
+    assert f"The Dask scheduler {address} is neither on this machine" in done.err
+    assert not (tmp_path / "out").exists()
