@@ -199,7 +199,7 @@ def render(
         figure: the figure.
         is_simulated: its data were.
         is_vector: a page shows it as SVG, which can be enlarged and read.
-        with_pdf: it is wanted as PDF, too; embedding its fonts takes as long as the rest.
+        with_pdf: it is wanted as PDF, too; embedding fonts takes its time.
     """
     if is_simulated:
         mark_simulated(figure)

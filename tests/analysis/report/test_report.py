@@ -60,7 +60,9 @@ def context(**changes):
 def written(small_study, tmp_path_factory):
     folder = tmp_path_factory.mktemp("out")
     table = ReportTable("Sessions", ("session", "kept"), [["S012", "10"]], "remark")
-    path = write_report(small_study, folder, context(is_simulated=True, tables=[table], with_pdf=True))
+    path = write_report(
+        small_study, folder, context(is_simulated=True, tables=[table], with_pdf=True)
+    )
     return folder, path, Page(path.read_text())
 
 
