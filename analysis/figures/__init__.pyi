@@ -11,7 +11,7 @@ from . import (
     uncertainty,
 )
 from .sections import ReportSection
-from .spec import FigureSpec
+from .spec import PAGE_ORDER, FigureSpec
 from .style import (
     MODEL_COLOURS,
     MODEL_HATCHES,
@@ -27,6 +27,7 @@ from .style import (
 __all__ = [
     "MODEL_COLOURS",
     "MODEL_HATCHES",
+    "PAGE_ORDER",
     "Axes",
     "Figure",
     "FigureSpec",

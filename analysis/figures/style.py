@@ -135,9 +135,7 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 def mark_simulated(figure: Figure) -> None:
     """Write SIMULATED across a figure."""
     figure.text(
-        0.5,
-        0.5,
-        "SIMULATED",
+        *(0.5, 0.5, "SIMULATED"),
         ha="center",
         va="center",
         rotation=20,
@@ -214,11 +212,9 @@ def render(
         png = _few_colours(np.asarray(canvas.buffer_rgba()))
         figure.set_layout_engine("none")  # the layout is found; do not search again
         if with_pdf:
-            metadata = {"CreationDate": None}
-            FigureCanvasPdf(figure).print_pdf(pdf, metadata=metadata)
+            FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
         svg = _svg(key, figure) if is_vector else ""
-    width = round(_SHOWN * figure.get_figwidth())
-    return Picture(key, png, pdf.getvalue(), width, svg)
+    return Picture(key, png, pdf.getvalue(), round(_SHOWN * figure.get_figwidth()), svg)
 
 
 def _few_colours(pixels: "np.ndarray[Any, np.dtype[np.uint8]]") -> bytes:

@@ -13,6 +13,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from analysis.figures import (
+    PAGE_ORDER,
     FigureSpec,
     ReportSection,
     break_away,
@@ -69,37 +70,10 @@ _FAMILIES = (
     *(excerpts, curves, surfaces, errors, uncertainty),
     *(break_away, confusion, trials, rig),
 )
-_PAGE_ORDER = (
-    "fig2_tustin_model",
-    "fig4_excerpts",
-    "fig5_tustin",
-    "fig6_gp",
-    "fig7_gp_mean",
-    "fig8_gp_variance",
-    "fig9_errors",
-    "fig10_cross_bars",
-    "fig10_cross_map",
-    "new_trial",
-    "calibration",
-    "shares",
-    "noise",
-    "break_away",
-    "break_away_risk",
-    "confusion_terrains",
-    "confusion_stones",
-    "confusion_surface",
-    "coverage",
-    "trials",
-    "trends",
-    "residuals",
-    "stick_slip",
-    "timing",
-    "rig",
-)
 FIGURES: tuple[FigureSpec, ...] = tuple(
     sorted(
         (spec for family in _FAMILIES for spec in family.FIGURES),
-        key=lambda spec: _PAGE_ORDER.index(spec.key),
+        key=lambda spec: PAGE_ORDER.index(spec.key),
     )
 )
 

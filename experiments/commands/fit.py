@@ -67,7 +67,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit tables and write the report."""
     from acquisition import SystemClock
-    from analysis.data import load_tables, parse_columns, parse_stones, parse_units
     from analysis.report import ReportContext, plain_choice, side_by_side, write_report
     from analysis.study import FitOptions, StudyOptions, run_study
     from experiments.operator import Console
@@ -82,10 +81,7 @@ def run(args: argparse.Namespace) -> int:
 
     console = Console(color=not args.no_color)
     choices = analysis_choices(args)
-    columns = parse_columns(args.columns) if args.columns else None
-    stones = parse_stones(args.stones) if args.stones else None
-    units = parse_units(args.unit) if args.unit else None
-    trials = load_tables(args.files, columns, args.terrain, stones, units, args.rate)
+    trials = _load(args)
     for choice in choices.variants:  # refused before anything is fitted
         choice.series(next(iter(trials.values()))[0])
     is_simulated = _is_simulated(trials)
@@ -98,8 +94,10 @@ def run(args: argparse.Namespace) -> int:
     require_samples(study)
     others = repeat_study(study, trials, choices.variants, console)
     context = ReportContext(
-        title="Traction from external data",
-        subtitle=f"{count} trials from {len(args.files)} files",
+        *(
+            "Traction from external data",
+            f"{count} trials from {len(args.files)} files",
+        ),
         is_simulated=study.simulated,
         is_foreign=True,
         generated_utc=iso_utc(SystemClock().utc_ns()),
@@ -114,6 +112,16 @@ def run(args: argparse.Namespace) -> int:
         console.say(f"▲ {warning}")
     console.say(str(page))
     return 0
+
+
+def _load(args: argparse.Namespace) -> dict[str, list[TractionSeries]]:
+    """Return the trials by terrain; raises SettingsError."""
+    from analysis.data import load_tables, parse_columns, parse_stones, parse_units
+
+    columns = parse_columns(args.columns) if args.columns else None
+    stones = parse_stones(args.stones) if args.stones else None
+    units = parse_units(args.unit) if args.unit else None
+    return load_tables(args.files, columns, args.terrain, stones, units, args.rate)
 
 
 def _is_simulated(trials: Mapping[str, Sequence[TractionSeries]]) -> bool:
