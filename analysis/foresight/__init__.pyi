@@ -1,3 +1,4 @@
+from .curves import ForesightCurves, ForesightExcerpt, foresight_curves
 from .engine import (
     EVERY,
     FootSample,
@@ -7,7 +8,7 @@ from .engine import (
     RiskTable,
 )
 from .ground import GroundLaw, GroundModel, GroundRecogniser
-from .held_out import ForesightRun, folds_of, foresee, hold_out
+from .held_out import folds_of, foresee, hold_out
 from .logistic import RidgeLogistic, all_pairs, fit_logistic
 from .model import ForesightModel, Provenance, RigIdentity, SlipModel
 from .scores import (
@@ -17,6 +18,7 @@ from .scores import (
     score_slips,
 )
 from .signals import FEATURES, LAGS, Signals
+from .ticks import ForesightRun
 from .training import fit_foresight, fit_ground
 from .watching import (
     FLAT_SURFACE,
@@ -37,6 +39,8 @@ __all__ = [
     "ROCKY_SURFACE",
     "FootSample",
     "Foresight",
+    "ForesightCurves",
+    "ForesightExcerpt",
     "ForesightFlag",
     "ForesightModel",
     "ForesightRun",
@@ -60,6 +64,7 @@ __all__ = [
     "folds_of",
     "foot_samples",
     "foresee",
+    "foresight_curves",
     "hold_out",
     "score_ground",
     "score_slips",

@@ -1,37 +1,18 @@
 """Trials as foreseen by what other trials taught."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from analysis.breakaway import BreakAwayModel
 from analysis.data import Array
-from analysis.foresight.engine import Foresight, ForesightState
+from analysis.foresight.engine import Foresight
 from analysis.foresight.model import ForesightModel
+from analysis.foresight.ticks import ForesightRun
 from analysis.foresight.training import FOLDS, fit_foresight
 from analysis.foresight.watching import WatchedTrial
 
 _BINS = 10
-
-
-@dataclass(frozen=True, slots=True)
-class ForesightRun:
-    """A trial, and what was foreseen in it.
-
-    Attributes:
-        trial: as it was watched.
-        states: every 10 ms.
-        threshold: of the alarms.
-        terrains: names of the known terrains.
-        surfaces: of each of them.
-    """
-
-    trial: WatchedTrial
-    states: tuple[ForesightState, ...]
-    threshold: float
-    terrains: tuple[str, ...]
-    surfaces: tuple[str, ...]
 
 
 def hold_out(

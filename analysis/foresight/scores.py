@@ -7,14 +7,12 @@ recall that the same alarms have when they are shifted in time (chance).
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from analysis.data import Array
-from analysis.foresight.engine import EVERY, ForesightFlag
 from analysis.foresight.ground import GroundModel, GroundRecogniser
-from analysis.foresight.held_out import ForesightRun, calibration_error
+from analysis.foresight.held_out import calibration_error
+from analysis.foresight.ticks import ForesightRun, TrialTicks, leads_of, ticks_of
 from analysis.foresight.watching import (
     FLAT_SURFACE,
     HORIZON,
@@ -22,7 +20,6 @@ from analysis.foresight.watching import (
     WatchedTrial,
 )
 
-LONGEST_LEAD = 2.0  # s; an alarm that never ends has no lead
 EARLY = 0.1  # s before an onset at which a warning still helps
 SURE = 0.98
 RIGHT = 0.95  # probability of the right surface after a change of ground
@@ -85,53 +82,11 @@ class GroundScore:
     slowest: float
 
 
-class _Ticks(NamedTuple):
-    """Warnings and truth of one trial, row by row of its ticks."""
-
-    p: Array
-    t: Array
-    warned: np.ndarray
-    at_risk: np.ndarray
-    before: np.ndarray
-    alarms: list[tuple[float, float]]
-    onsets: list[float]
-
-
-def _ticks_of(run: ForesightRun) -> _Ticks:
-    trial = run.trial
-    by_tick = dict(zip(trial.tick.tolist(), range(trial.tick.size), strict=True))
-    p = np.full(trial.tick.size, np.nan)
-    is_alarm = np.zeros(trial.tick.size, dtype=np.bool_)
-    for state in run.states:
-        row = by_tick.get(state.cycle // EVERY)
-        if row is not None:
-            p[row] = state.slip_probability
-            is_alarm[row] = bool(state.flags & ForesightFlag.ALARM)
-    known = np.isfinite(p)
-    first = float(trial.t[0]) + HORIZON if trial.t.size else 0.0
-    return _Ticks(
-        p=p,
-        t=trial.t,
-        warned=known & (np.nan_to_num(p) >= run.threshold),
-        at_risk=trial.is_at_risk & known,
-        before=trial.is_before_slip,
-        alarms=_stretches(trial.t, is_alarm),
-        onsets=[onset for onset in trial.onsets.tolist() if onset >= first],
-    )
-
-
-def _stretches(t: Array, is_on: np.ndarray) -> list[tuple[float, float]]:
-    """Return (first, last) time of every run of True [s]."""
-    edges = np.diff(np.concatenate([[0], is_on.astype(np.int8), [0]]))
-    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(float(t[a]), float(t[b - 1])) for a, b in zip(starts, stops, strict=True)]
-
-
 def score_slips(runs: Sequence[ForesightRun]) -> SlipScore:
     """Return how slips were foreseen in trials together."""
-    ticks = [_ticks_of(run) for run in runs]
+    ticks = [ticks_of(run) for run in runs]
     ticks = [one for one in ticks if one.t.size]
-    leads = [lead for one in ticks for lead in _leads(one)]
+    leads = [lead for one in ticks for lead in leads_of(one)]
     onsets = sum(len(one.onsets) for one in ticks)
     calm = np.concatenate([one.warned[one.at_risk & ~one.before] for one in ticks])
     alarms, needless = _counted(ticks)
@@ -154,20 +109,7 @@ def score_slips(runs: Sequence[ForesightRun]) -> SlipScore:
     )
 
 
-def _leads(ticks: _Ticks) -> list[float | None]:
-    """Return how early every onset was warned of [s]; None = not at all."""
-    leads: list[float | None] = []
-    for onset in ticks.onsets:
-        last = (ticks.t < onset) & (ticks.t >= onset - HORIZON) & ticks.at_risk
-        if not bool((ticks.warned & last).any()):
-            leads.append(None)
-            continue
-        begun = [a for a, b in ticks.alarms if a < onset and b >= onset - HORIZON]
-        leads.append(min(onset - min(begun), LONGEST_LEAD))
-    return leads
-
-
-def _counted(ticks: Sequence[_Ticks]) -> tuple[int, int]:
+def _counted(ticks: Sequence[TrialTicks]) -> tuple[int, int]:
     """Return (number of alarms, of those that no onset followed within 0.2 s)."""
     alarms = needless = 0
     for one in ticks:
@@ -180,7 +122,7 @@ def _counted(ticks: Sequence[_Ticks]) -> tuple[int, int]:
     return alarms, needless
 
 
-def _chance(ticks: Sequence[_Ticks], onsets: int) -> float:
+def _chance(ticks: Sequence[TrialTicks], onsets: int) -> float:
     """Return the recall of the same warnings, moved round within their trial."""
     hits = 0
     for one in ticks:

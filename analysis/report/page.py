@@ -35,6 +35,7 @@ from analysis.findings import (
     plain_findings,
 )
 from analysis.foresight import ForesightModel
+from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import (
     PageSection,
@@ -162,7 +163,8 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     if context.foresight is not None:
         text = _database(study, results, context.generated_utc, context.foresight)
         write_atomic(out_dir / "terrains.json", text.encode())
-    shown = report_figures(results, _processes(study), with_pdf=context.with_pdf)
+    drawn = report_figures(results, _processes(study), with_pdf=context.with_pdf)
+    shown = [*drawn, *context.figures]
     _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())
@@ -176,8 +178,8 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
     for name, content in files.items():
         if content:
             write_atomic(folder / name, content)
-    for spec in FIGURES:
-        for name in (f"{spec.key}.png", f"{spec.key}.pdf"):
+    for key in (*(spec.key for spec in FIGURES), FORESIGHT_KEY):
+        for name in (f"{key}.png", f"{key}.pdf"):
             if not files.get(name):
                 (folder / name).unlink(missing_ok=True)
 

@@ -113,6 +113,7 @@ class ReportContext:
         is_foreign: the tables come from elsewhere, not from this rig.
         generated_utc: when the report was made, as text.
         tables: further tables, each for its section.
+        figures: further figures, each for its section.
         warnings: further warnings, shown first.
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
@@ -127,6 +128,7 @@ class ReportContext:
     is_foreign: bool
     generated_utc: str
     tables: Sequence[ReportTable] = field(default=())
+    figures: Sequence[ReportFigure] = field(default=())
     warnings: Sequence[str] = field(default=())
     rig: Sequence[RigTrial] = field(default=())
     further_numbers: Mapping[str, Any] = field(default_factory=dict)

@@ -19,12 +19,13 @@ from analysis.foresight import (
     fit_foresight,
     fit_ground,
     folds_of,
+    foresight_curves,
     hold_out,
     score_ground,
     score_slips,
     watch_all,
 )
-from analysis.report import ReportTable
+from analysis.report import ReportFigure, ReportTable, foresight_figure
 from analysis.study import Study
 from analysis.terrains import break_away_of
 from experiments.report.tables import SLID, foresight_tables
@@ -42,17 +43,21 @@ class StudyForesight:
         model: learnt from all trials; None where they are too few.
         tables: what it is worth.
         numbers: the same as plain values.
+        figures: what a page shows of it.
     """
 
     model: ForesightModel | None
     tables: tuple[ReportTable, ...]
     numbers: Mapping[str, Any]
+    figures: tuple[ReportFigure, ...] = ()
 
 
 def study_foresight(
     study: Study,
     trials: Mapping[str, Sequence[RecordedTrial]],
     progress: Callable[[], object] = lambda: None,
+    *,
+    with_pdf: bool = False,
 ) -> StudyForesight:
     """Return what the trials of a study teach, and what that is worth on others.
 
@@ -60,6 +65,7 @@ def study_foresight(
         study: gives kinds and break-away models.
         trials: recorded trials by terrain.
         progress: called after every fold.
+        with_pdf: figures are wanted as PDF, too.
     """
     watched = watch_all(trials, study.kinds)
     model = fit_foresight(watched)
@@ -77,7 +83,10 @@ def study_foresight(
         "terrain_after_sliding": grounds,
     }
     tables = foresight_tables(scores, grounds, ground)
-    return StudyForesight(model, tables, numbers)
+    figure = foresight_figure(
+        foresight_curves(runs), is_simulated=study.simulated, with_pdf=with_pdf
+    )
+    return StudyForesight(model, tables, numbers, (figure,))
 
 
 def _slip_scores(runs: Sequence[ForesightRun]) -> dict[str, SlipScore]:

@@ -268,7 +268,8 @@ def report_sessions(
     study, trials = analysed.study, analysed.trials
     store = ResultStore(data / FOLDS)
     others = repeat_study(study, trials, order.choices.variants, console, store)
-    foresight, (photos, unsound) = study_foresight(study, trials), photos_of(sessions)
+    foresight = study_foresight(study, trials, with_pdf=order.with_pdf)
+    photos, unsound = photos_of(sessions)
     count = sum(len(group) for group in trials.values())
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = ReportContext(
@@ -283,6 +284,7 @@ def report_sessions(
             *foresight.tables,
             *report_tables(sessions, trials),
         ],
+        figures=foresight.figures,
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.foresight.engine import ForesightFlag, ForesightState
-from analysis.foresight.held_out import (
-    ForesightRun,
-    calibration_error,
-    folds_of,
-    hold_out,
-)
+from analysis.foresight.held_out import calibration_error, folds_of, hold_out
 from analysis.foresight.scores import score_ground, score_slips
+from analysis.foresight.ticks import ForesightRun
 from tests.analysis.foresight.made import STONES, model, trial, trials
 
 THRESHOLD = 0.5

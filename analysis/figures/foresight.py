@@ -1,0 +1,78 @@
+"""What foresight is worth on trials that its models have not seen, in four panels."""
+
+import numpy as np
+
+from analysis.figures.style import (
+    MODEL_COLOURS,
+    SPEED_LABEL,
+    Axes,
+    Figure,
+    new_figure,
+    plain,
+)
+from analysis.foresight import ForesightCurves, ForesightExcerpt
+
+_HEIGHT = 4.6  # inches
+_STYLES = ("-", "--", "-.", ":")
+_SPEED, _RISK = "#4d4d4d", "#0072B2"
+_HORIZON = 0.2  # s
+
+
+def draw_foresight(curves: ForesightCurves) -> Figure:
+    """Return a stretch of a trial, warning times, reliability and known ground."""
+    figure = new_figure(_HEIGHT)
+    if curves.excerpt is None:
+        lower = figure.subplots(1, 3)
+    else:
+        upper, rest = figure.subfigures(2, 1, height_ratios=(1.0, 1.1))
+        lower = rest.subplots(1, 3)
+        _draw_excerpt(upper.subplots(), curves.excerpt)
+    _draw_leads(lower[0], curves)
+    _draw_reliability(lower[1], curves)
+    _draw_grounds(lower[2], curves)
+    return figure
+
+
+def _draw_excerpt(ax: Axes, excerpt: ForesightExcerpt) -> None:
+    ax.plot(excerpt.t, excerpt.p, color=_RISK, lw=1.2, label="slip within 0.2 s")
+    ax.axhline(excerpt.threshold, color=_RISK, lw=0.8, ls=":", label="alarm")
+    for k, onset in enumerate(excerpt.onsets):
+        label = "slip begins" if k == 0 else None
+        ax.axvline(onset, color="#D55E00", lw=1.0, ls="--", label=label)
+    ax.set(ylim=(0.0, 1.0), xlabel="time [s]", ylabel="probability")
+    ax.set_xlim(0.0, float(excerpt.t[-1]))
+    ax.set_title(plain(excerpt.title), loc="left")
+    speed = ax.twinx()
+    speed.plot(excerpt.t, excerpt.v_t, color=_SPEED, lw=0.9, label="slip velocity")
+    speed.set_ylabel(SPEED_LABEL)
+    speed.grid(visible=False)
+    speed.spines["right"].set_visible(True)
+    lines = [*ax.get_lines()[:3], *speed.get_lines()]
+    speed.legend(handles=lines, ncols=4, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+
+
+def _draw_leads(ax: Axes, curves: ForesightCurves) -> None:
+    ax.plot(1e3 * curves.leads, curves.warned, color=_RISK, lw=1.4)
+    ax.axvline(1e3 * _HORIZON, color="#808080", lw=0.8, ls=":")
+    ax.set(ylim=(0.0, 1.0), xlim=(0.0, 1e3 * float(curves.leads[-1])))
+    ax.set(xlabel="time before the slip [ms]", ylabel="share of slips in alarm")
+
+
+def _draw_reliability(ax: Axes, curves: ForesightCurves) -> None:
+    known = np.concatenate([curves.foreseen, curves.seen])
+    top = 1.1 * float(np.nanmax(known, initial=0.1))
+    ax.plot([0.0, top], [0.0, top], color="#808080", lw=0.8, ls=":")
+    ax.plot(curves.foreseen, curves.seen, "o-", color=_RISK, ms=3.5, lw=1.0)
+    ax.set(xlim=(0.0, top), ylim=(0.0, top))
+    ax.set(xlabel="probability foreseen", ylabel="share seen")
+
+
+def _draw_grounds(ax: Axes, curves: ForesightCurves) -> None:
+    for k, (name, means) in enumerate(curves.grounds.items()):
+        style = _STYLES[(k // len(MODEL_COLOURS) + k) % len(_STYLES)]
+        colour = MODEL_COLOURS[k % len(MODEL_COLOURS)]
+        ax.plot(curves.slid, means, style, color=colour, lw=1.2, label=plain(name))
+    ax.set(ylim=(0.0, 1.02), xlim=(0.0, float(curves.slid[-1])))
+    ax.set(xlabel="time slid [s]", ylabel="probability of the true surface")
+    if curves.grounds:
+        ax.legend(loc="lower right", ncols=2, fontsize=6.5)
