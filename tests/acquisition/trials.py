@@ -10,7 +10,12 @@ import numpy as np
 from acquisition.clock import PERIOD_NS
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE
-from acquisition.trial_file.writer import TrialHeader, TrialWriter
+from acquisition.trial_file.writer import (
+    FORESIGHT_TOPICS,
+    TRIAL_TOPICS,
+    TrialHeader,
+    TrialWriter,
+)
 
 START_NS = 5_000_000_000
 OFFSET_NS = 1_700_000_000_123_456_789
@@ -18,6 +23,7 @@ ATTACHMENTS = {
     "config.toml": b"[rig]\narm = 'wam7'\n",
     "arm_model.toml": bytes(range(256)) * 20,
 }
+FORESEEN_TOPICS = {**TRIAL_TOPICS, **FORESIGHT_TOPICS}
 MAGIC_BYTES = 8
 FOOTER_BYTES = 29
 DATA_END_BYTES = 13
@@ -53,9 +59,9 @@ def make_cycles(count=600, *, first=1000, skipped=(), seed=0) -> Any:
     return out
 
 
-def write_trial(path, cycles, header=None, *, block=125):
+def write_trial(path, cycles, header=None, *, block=125, topics=TRIAL_TOPICS):
     """Write `cycles` in blocks, one chunk each; the file is not finished."""
-    writer = TrialWriter(path, header or make_header())
+    writer = TrialWriter(path, header or make_header(), topics)
     for start in range(0, len(cycles), block):
         writer.write_cycles(cycles[start : start + block])
         writer.flush()

@@ -3,11 +3,15 @@
 import hashlib
 import io
 import json
+import tempfile
 from functools import cache
 from importlib import resources
+from pathlib import Path
 
 import numpy as np
 
+from acquisition.schema import FORESIGHT
+from acquisition.trial_file import publish
 from analysis.breakaway.censored import Family
 from analysis.breakaway.model import BREAK_AWAY, BreakAwayModel, PushLaw
 from analysis.data.data_package import TableOrigin
@@ -19,6 +23,14 @@ from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
+from tests.acquisition.trials import (
+    FORESEEN_TOPICS,
+    make_cycles,
+    make_header,
+    write_trial,
+)
+from tests.analysis.foresight.databases import database
+from tests.analysis.foresight.made import model
 from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
@@ -126,6 +138,21 @@ def _database() -> dict[str, object]:
     }
 
 
+def _foreseen() -> bytes:
+    """Return a trial with a state every fifth cycle."""
+    header = make_header(foresight={"terrains": '["S10", "TF"]', "known_rig": "true"})
+    states = np.frombuffer(bytearray(FORESIGHT.template * 12), FORESIGHT.dtype)
+    states["cycle"] = 1000 + 5 * np.arange(12)
+    states["terrains"][:, :2] = 0.5
+    with tempfile.TemporaryDirectory(prefix="corpus-") as place:
+        path = Path(place) / "T01.mcap"
+        writer = write_trial(path, make_cycles(60), header, topics=FORESEEN_TOPICS)
+        writer.write_foresight(states)
+        writer.finish("travel")
+        publish(writer)
+        return path.read_bytes()
+
+
 def _npz() -> bytes:
     rows = np.column_stack([np.arange(5.0), np.ones(5), np.ones(5), np.ones(5)])
     file = io.BytesIO()
@@ -192,6 +219,7 @@ def samples() -> dict[str, bytes]:
         "terrain": terrain_to_toml("S10", frame, {"measured": _UTC}),
         "sensor-calibration": _sensor_calibration(),
         "database": json.dumps(_database()),
+        "foresight": database(model().to_dict()),
         "sidecar": json.dumps(_SIDECAR),
         "session": json.dumps({"kept": ["T01"], "phase": "unfinished"}),
         "table": "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n",
@@ -206,6 +234,7 @@ def samples() -> dict[str, bytes]:
         "used-session": session_file("/session.json"),
         "used-journal": session_file("/events.jsonl"),
         "used-mcap": session_file("trials/T01.mcap"),
+        "foreseen": _foreseen(),
         "npz": _npz(),
         "parquet": _parquet(),
         "package": _package(),
