@@ -8,7 +8,7 @@ import argparse
 import json
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,10 +25,12 @@ from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
+from benchmarks import beside_gpy, beside_tinygp
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
-from benchmarks.beside_tinygp import fitter
 from benchmarks.rows import BenchRow, not_installed
 from benchmarks.study_race import race
+
+Fitter = Callable[[np.ndarray, np.ndarray], Callable[[Sequence[np.ndarray]], float]]
 
 SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _POINTS = 300
@@ -166,36 +168,46 @@ def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
     with threadpool_limits(1):
         found = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
-        rivals = beside_tinygp()
+        rivals = [
+            beside(what, goal, maker)
+            for what, goal, maker in (
+                ("the same against GPy", 10, beside_gpy.fitter),
+                ("the same against tinygp, compiled before", 8, beside_tinygp.fitter),
+            )
+        ]
     ratio = {name: float(str(part["ratio"])) for name, part in found.items()}
     spent = {name: float(str(part["ours_ms"])) for name, part in found.items()}
     least_squares_of = "Tustin fit against 20-start least squares"
-    beside = "against scikit-learn, equal starts"
+    equal = "against scikit-learn, equal starts"
     return [
-        BenchRow(f"SE fit, n = 300, {beside}", ratio["SE fit"], "times", 15, True),
-        BenchRow("the same against GPy", None, "times", 10, True, "not compared yet"),
-        rivals,
-        BenchRow(f"NN fit, n = 300, {beside}", ratio["NN fit"], "times"),
+        BenchRow(f"SE fit, n = 300, {equal}", ratio["SE fit"], "times", 15, True),
+        *rivals,
+        BenchRow(f"NN fit, n = 300, {equal}", ratio["NN fit"], "times"),
         BenchRow("NN fit, n = 300", spent["NN fit"], "ms", 80),
         BenchRow("one SE evaluation, n = 300", spent["evaluation"], "ms", 1.15),
         BenchRow(least_squares_of, ratio["Tustin fit"], "times", 30, is_least=True),
     ]
 
 
-def beside_tinygp() -> BenchRow:
-    """Return the ratio of SE fits, at the same likelihood within 0.01."""
-    what = "the same against tinygp, compiled before"
+def beside(what: str, goal: float, maker: Fitter) -> BenchRow:
+    """Return the ratio of SE fits from the same starts, and of what is reached.
+
+    Args:
+        what: name of the row.
+        goal: of the ratio.
+        maker: makes the peer's fit; raises ImportError where it is not installed.
+    """
     X, y = chosen(load_rows())
     try:
-        fit = fitter(X, y)
+        fit = maker(X, y)
     except ImportError:
-        return not_installed(what, 8)
+        return not_installed(what, goal)
     starts = our_starts("SE fit", X, y)
-    reached = fit(starts)  # compiles
+    reached = fit(starts)  # compiles, where it does
     ours, other = duel(lambda: fit_gp(X, y), lambda: fit(starts), 3)
     gap = fit_gp(X, y).lml - reached
     note = f"log likelihood {gap:+.3f} beside its own"
-    return BenchRow(what, other / ours, "times", 8, True, note)
+    return BenchRow(what, other / ours, "times", goal, True, note)
 
 
 def main() -> None:
