@@ -16,7 +16,13 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.data import Array
-from analysis.gp.kernels import Composable, Contraction, Evaluator, length_pairs
+from analysis.gp.kernels import (
+    Composable,
+    Contraction,
+    Evaluator,
+    length_pairs,
+    meant_parts,
+)
 
 _ROOT_2 = np.sqrt(2.0)
 _BIASES = (20.0, 0.05)  # beta that a search may start with
@@ -70,7 +76,7 @@ class Arcsine(Composable):
             A - self.c, np.sqrt(self.c * (2.0 * A - self.c))
         )
 
-    def over(self, X: Array, X_other: Array) -> Evaluator:
+    def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and its contraction for any theta."""
         return _ArcsineOver(self, X, X_other)
 
@@ -107,9 +113,11 @@ class _ArcsineOver:
     x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where two rows are close.
     """
 
-    def __init__(self, kernel: Arcsine, X: Array, X_other: Array) -> None:
+    def __init__(self, kernel: Arcsine, X: Array, X_other: Array | None) -> None:
+        is_upper, X_other = X_other is None, X if X_other is None else X_other
         self._kernel, self._X, self._X_other = kernel, X, X_other
         shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
+        self._parts = meant_parts(*shape, is_upper=is_upper)
         self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
         self._squares = np.empty((d + len(self._pairs), *shape))
         steps = [np.subtract.outer(X[:, a], X_other[:, a]) for a in range(d)]
@@ -117,7 +125,7 @@ class _ArcsineOver:
             steps.append(X[:, b, None] * steps[a] - X[:, a, None] * steps[b])
         for step, square in zip(steps, self._squares, strict=True):
             np.multiply(step, step, out=square)
-        self._K, self._N, self._D = (np.empty(shape) for _ in range(3))
+        self._K, self._N, self._D = (np.zeros(shape) for _ in range(3))
 
     def __call__(self, theta: Array) -> tuple[Array, Contraction]:
         """Return K and its contraction, with asin(u) = atan(N / D)."""
@@ -125,17 +133,20 @@ class _ArcsineOver:
         others = self._kernel.rows(theta, self._X_other)
         sf2, K, D = float(np.exp(2.0 * theta[0])), self._K, self._D
         np.matmul(rows.U, np.ascontiguousarray(others.U.T), out=self._N)
-        self._fill_partner(theta, rows, others)
-        with np.errstate(divide="ignore"):  # repeated inputs as printed: pi/2
-            np.divide(self._N, D, out=K)
-        np.arctan(K, out=K)
-        K *= sf2
+        self._fill_squares(theta, rows, others)
+        for part in self._parts:
+            np.sqrt(D[part], out=D[part])
+            with np.errstate(divide="ignore"):  # repeated inputs as printed: pi/2
+                np.divide(self._N[part], D[part], out=K[part])
+            np.arctan(K[part], out=K[part])
+            K[part] *= sf2
         if self._kernel.as_printed:
             # at repeated inputs the arcsine has its cusp: its slope is set to 0
             D[D == 0.0] = np.inf
         return K, lambda W: self._contract(W, sf2, rows, others)
 
-    def _fill_partner(self, theta: Array, rows: Augmented, others: Augmented) -> None:
+    def _fill_squares(self, theta: Array, rows: Augmented, others: Augmented) -> None:
+        """Put D^2 into the memory of D."""
         c, D, beta = self._kernel.c, self._D, np.exp(theta[-1])
         inverse = 2.0 * np.exp(-2.0 * theta[1:-1])
         weights = [beta * inverse, [inverse[a] * inverse[b] for a, b in self._pairs]]
@@ -144,7 +155,6 @@ class _ArcsineOver:
         if c:
             D += (c * (rows.A - 0.5 * c))[:, None]
             D += c * (others.A - 0.5 * c)
-        np.sqrt(D, out=D)
 
     def _contract(
         self, W: Array, sf2: float, rows: Augmented, others: Augmented

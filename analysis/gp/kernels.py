@@ -24,6 +24,7 @@ Contraction = Callable[[Array], Array]
 # theta -> K and its contraction; both are good until the next call
 Evaluator = Callable[[Array], tuple[Array, Contraction]]
 
+_STRIP = 40  # rows of a triangle computed at a time
 _LONGER = 3.0  # are the lengths of a second part, or equal parts would stay equal
 _STRETCHES = (0.1, 0.35, 1.0, 3.5)  # l / sd(x) that a search may start with
 _MOVES = (-2.5, -1.2, 1.2, 2.5, 10.0)  # of log l, to another top; the last: not used
@@ -45,8 +46,15 @@ class Kernel(Protocol):
         """Return k(x, x) of every row of X, shape (n,)."""
         ...
 
-    def over(self, X: Array, X_other: Array) -> Evaluator:
-        """Return what gives K, shape (n, m), and its contraction for any theta."""
+    def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
+        """Return what gives K, shape (n, m), and its contraction for any theta.
+
+        Args:
+            X: rows, shape (n, d).
+            X_other: other rows, shape (m, d); None for the covariances of X with
+                itself, of which only the upper triangle is good then, and the
+                contraction is asked with upper triangles.
+        """
         ...
 
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
@@ -99,7 +107,7 @@ class SquaredExponential(Composable):
         """Return sf^2 for every row."""
         return np.full(X.shape[0], np.exp(2.0 * theta[0]))
 
-    def over(self, X: Array, X_other: Array) -> Evaluator:
+    def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and its contraction for any theta."""
         return _SquaredExponentialOver(X, X_other)
 
@@ -125,9 +133,10 @@ class SquaredExponential(Composable):
 class _SquaredExponentialOver:
     """A squared exponential over two sets of rows, in memory of its own."""
 
-    def __init__(self, X: Array, X_other: Array) -> None:
-        self._X, self._X_other = X, X_other
-        (n, d), m = X.shape, X_other.shape[0]
+    def __init__(self, X: Array, X_other: Array | None) -> None:
+        self._X, self._X_other = X, X if X_other is None else X_other
+        (n, d), m = X.shape, self._X_other.shape[0]
+        self._parts = meant_parts(n, m, is_upper=X_other is None)
         self._left, self._right = np.ones((n, d + 2)), np.ones((d + 2, m))
         self._K = np.empty((n, m))
 
@@ -143,8 +152,9 @@ class _SquaredExponentialOver:
         self._left[:, -2] = 2.0 * theta[0] - 0.5 * np.einsum("nd,nd->n", Z, Z)
         self._right[-1] = -0.5 * np.einsum("nd,nd->n", Z_other, Z_other)
         np.matmul(self._left, self._right, out=K)
-        np.minimum(K, 2.0 * theta[0], out=K)
-        np.exp(K, out=K)
+        for part in self._parts:
+            np.minimum(K[part], 2.0 * theta[0], out=K[part])
+            np.exp(K[part], out=K[part])
         return K, lambda W: self._contract(W, Z, Z_other)
 
     def _contract(self, W: Array, Z: Array, Z_other: Array) -> Array:
@@ -199,7 +209,7 @@ class Sum(_Pair):
         a, b = self._split(theta)
         return self.left.diagonal(a, X) + self.right.diagonal(b, X)
 
-    def over(self, X: Array, X_other: Array) -> Evaluator:
+    def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and the contractions of both parts with the same W."""
         left, right = self.left.over(X, X_other), self.right.over(X, X_other)
 
@@ -231,7 +241,7 @@ class Product(_Pair):
         a, b = self._split(theta)
         return self.left.diagonal(a, X) * self.right.diagonal(b, X)
 
-    def over(self, X: Array, X_other: Array) -> Evaluator:
+    def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and the contractions, each W weighed by the other's K."""
         left, right = self.left.over(X, X_other), self.right.over(X, X_other)
 
@@ -252,6 +262,17 @@ class Product(_Pair):
     def bounds(self, sd_y: float, sd_x: Array) -> Array:
         """Return the bounds of both parts, shape (p, 2)."""
         return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
+
+
+def meant_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice]]:
+    """Return the parts of an (n, m) matrix that are computed, as (rows, columns).
+
+    That is all of it, or rows from their place on the diagonal: a little more than the
+    upper triangle. Exponentials cost as much as a factorisation.
+    """
+    if not is_upper:
+        return [(slice(None), slice(None))]
+    return [(slice(a, a + _STRIP), slice(a, m)) for a in range(0, n, _STRIP)]
 
 
 def length_pairs(sd_x: Array) -> list[Array]:

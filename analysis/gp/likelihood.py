@@ -56,7 +56,7 @@ def factorise(
     """Return the Cholesky factor of K + diag(S), with jitter only if it needs some.
 
     Args:
-        K: covariances, shape (n, n).
+        K: covariances, shape (n, n); only the upper triangle is read.
         S: what is added to the diagonal, shape (n,).
         blocks: what is added on the diagonal's blocks, as (rows, covariances).
         memory: where the factor is put, shape (n, n) in Fortran's order; new by
@@ -68,7 +68,7 @@ def factorise(
     C = np.empty(K.shape, order="F") if memory is None else memory
     for share in _JITTERS:
         jitter = share * float(np.mean(np.diagonal(K)))
-        # the transpose of a symmetric matrix is itself, in the order LAPACK likes
+        # the upper triangle in C's order is the lower one in Fortran's
         np.copyto(C, K.T)
         C.T.flat[:: S.size + 1] += S + jitter
         for rows, block in blocks:
@@ -122,7 +122,7 @@ class Likelihood:
         self._kernel, self._noise = model
         self._X, self._r = X, r
         self._shared = shared_over(self._noise, X, trials)
-        self._covariance = self._kernel.over(X, X)
+        self._covariance = self._kernel.over(X)
         shape = (r.size, r.size)
         self._C, self._inverse = (np.zeros(shape, order="F") for _ in range(2))
 

@@ -47,6 +47,20 @@ def test_contraction_agrees_with_differences(rows, name):
 
 
 @pytest.mark.parametrize("name", list(KERNELS))
+@pytest.mark.parametrize("count", [1, 9, 40, 95])  # of rows; strips have 40
+def test_rows_with_themselves_give_the_same_upper_triangle(name, count):
+    kernel, rng = KERNELS[name], np.random.default_rng(4)
+    X, W = rng.normal(size=(count, 2)), np.triu(rng.normal(size=(count, count)))
+    evaluate, whole = kernel.over(X), kernel.over(X, X)
+    for seed in range(3):  # what an earlier theta left below the diagonal is no harm
+        theta = np.random.default_rng(seed).normal(0, 2.0, len(kernel.names))
+        (K, contract), (expected, contract_whole) = evaluate(theta), whole(theta)
+        np.testing.assert_array_equal(np.triu(K), np.triu(expected))
+        slope = contract_whole(W.copy())
+        np.testing.assert_allclose(contract(W.copy()), slope, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", list(KERNELS))
 def test_variances_are_the_diagonal(rows, name):
     kernel, (X, _) = KERNELS[name], rows
     theta = some_theta(kernel)
