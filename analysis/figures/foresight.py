@@ -20,13 +20,12 @@ _HORIZON = 0.2  # s
 
 def draw_foresight(curves: ForesightCurves) -> Figure:
     """Return a stretch of a trial, warning times, reliability and known ground."""
-    figure = new_figure(_HEIGHT)
-    if curves.excerpt is None:
-        lower = figure.subplots(1, 3)
-    else:
-        upper, rest = figure.subfigures(2, 1, height_ratios=(1.0, 1.1))
-        lower = rest.subplots(1, 3)
-        _draw_excerpt(upper.subplots(), curves.excerpt)
+    has_excerpt = curves.excerpt is not None
+    figure = new_figure(_HEIGHT if has_excerpt else 0.5 * _HEIGHT)
+    grid = figure.add_gridspec(1 + has_excerpt, 3)
+    if curves.excerpt is not None:
+        _draw_excerpt(figure.add_subplot(grid[0, :]), curves.excerpt)
+    lower = [figure.add_subplot(grid[-1, k]) for k in range(3)]
     _draw_leads(lower[0], curves)
     _draw_reliability(lower[1], curves)
     _draw_grounds(lower[2], curves)
