@@ -18,7 +18,7 @@ from analysis.study import SHARES
 
 Rows = tuple[tuple[float, ...], ...]
 
-_AT_ONCE = 2048  # points
+_AT_ONCE = 1024  # points
 _NODES = 64  # shares that moments are integrated over
 
 
@@ -72,29 +72,32 @@ class Table:
     def over(self, F_n: Array, v_t: Array) -> Array:
         """Return the quantiles [N] at many points, shape (q, n)."""
         loads, speeds, cells = self._arrays
-        i, a = _places(loads, F_n)
-        j, b = _places(speeds, v_t)
-        cell = i * speeds.size + j
+        i, a = _places(*loads, F_n)
+        j, b = _places(*speeds, v_t)
+        cell = i * len(self.v_t) + j
         if cell.size <= _AT_ONCE:
-            return _blended(cells[:, cell], a, b)
-        forces = np.empty((len(cells), cell.size))
+            return _blended(cells.take(cell, axis=1), a, b).T
+        forces = np.empty((cell.size, cells.shape[2]))
         for start in range(0, cell.size, _AT_ONCE):  # what fits into the cache
             part = slice(start, start + _AT_ONCE)
-            forces[:, part] = _blended(cells[:, cell[part]], a[part], b[part])
-        return forces
+            corners = cells.take(cell[part], axis=1)
+            forces[part] = _blended(corners, a[part], b[part])
+        return forces.T
 
     @cached_property
-    def _arrays(self) -> tuple[Array, Array, Array]:
-        """Return both axes and, point by point, the cell above it, shape (q, n m, 4).
+    def _arrays(self) -> tuple[tuple[Array, Array], tuple[Array, Array], Array]:
+        """Return both axes with their numbers and, by point, the cell above it.
 
-        Of every cell: F_t [N] at the point, what it gains along v_t, F_t at the next
-        load, and what that gains along v_t.
+        Cells have the shape (4, n m, q): F_t [N] at the point, what it gains along v_t,
+        what it gains to the next load, and what that gains along v_t. Beyond the last
+        point of an axis nothing is gained.
         """
         forces = np.array(self.forces)
-        along = np.diff(forces, axis=2, append=0.0)
-        next_row = (np.roll(grid, -1, axis=1) for grid in (forces, along))
-        cells = np.stack([forces, along, *next_row], axis=-1)
-        return np.array(self.F_n), np.array(self.v_t), cells.reshape(len(forces), -1, 4)
+        along = np.diff(forces, axis=2, append=forces[:, :, -1:])
+        across = [np.diff(c, axis=1, append=c[:, -1:]) for c in (forces, along)]
+        cells = np.stack([forces, along, *across]).reshape(4, len(forces), -1)
+        cells = np.ascontiguousarray(cells.transpose(0, 2, 1))
+        return _numbered(self.F_n), _numbered(self.v_t), cells
 
 
 def rows_of(values: Array) -> Rows:
@@ -120,18 +123,26 @@ def _place(axis: tuple[float, ...], value: float) -> tuple[int, float]:
     return i, (value - axis[i]) / (axis[i + 1] - axis[i])
 
 
-def _places(points: Array, values: Array) -> tuple[np.ndarray, Array]:
+def _numbered(axis: tuple[float, ...]) -> tuple[Array, Array]:
+    return np.array(axis), np.arange(len(axis), dtype=np.float64)
+
+
+def _places(points: Array, numbers: Array, values: Array) -> tuple[np.ndarray, Array]:
     """Return (lower points, shares of the way to the next), clamped to the axis."""
-    inside = np.minimum(np.maximum(values, points[0]), points[-1])
-    i = points[1:-1].searchsorted(inside, "right")
-    low = points[i]
-    return i, (inside - low) / (points[i + 1] - low)
+    place = np.interp(values, points, numbers)
+    i = place.astype(np.intp)
+    return i, place - i
 
 
 def _blended(corners: Array, a: Array, b: Array) -> Array:
-    """Return F_t [N], shape (q, n), from cells of shape (q, n, 4)."""
-    low = corners[:, :, 0] + b * corners[:, :, 1]
-    return low + a * (corners[:, :, 2] + b * corners[:, :, 3] - low)
+    """Return F_t [N], shape (n, q), in the memory of cells of shape (4, n, q)."""
+    low, gains = corners[:2], corners[2:]
+    gains *= a[:, None]
+    low += gains
+    forces, along = low
+    along *= b[:, None]
+    forces += along
+    return forces
 
 
 def _blend(rows: Rows, i: int, a: float, j: int, b: float) -> float:
