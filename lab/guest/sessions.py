@@ -59,11 +59,15 @@ class LedSession:
         self.hand(f"prepare {number}", "put_down")
         self.program.run_on(_REST)
 
-    def record(self, number: int = 1) -> None:
-        """Put the foot down, begin to record, push for a while."""
+    def start_trial(self, number: int = 1) -> None:
+        """Put the foot down, begin to record and to push."""
         self.put_down(number)
         self._press(" ")
         self.hand("push")
+
+    def record(self, number: int = 1) -> None:
+        """Put the foot down, begin to record, push for a while."""
+        self.start_trial(number)
         self.program.run_on(_PUSH)
 
     def review(self) -> None:
@@ -117,9 +121,9 @@ class LedSession:
             self.arm.press(f"{action}\n")
 
 
-def begin(room: MachineRoom, arm: Program, trials: int) -> LedSession:
+def begin(room: MachineRoom, arm: Program, trials: int, *options: str) -> LedSession:
     """Return a session of `trials` trials, before its preflight."""
-    program = room.traction("run", TERRAIN, "--trials", str(trials))
+    program = room.traction("run", TERRAIN, "--trials", str(trials), *options)
     return LedSession(room, program, arm)
 
 

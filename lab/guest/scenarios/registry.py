@@ -7,6 +7,7 @@ from lab.guest.machine_room import MachineRoom
 from lab.guest.scenarios import (
     bus,
     calibration,
+    foresight,
     losses,
     recording,
     second_screen,
@@ -54,6 +55,7 @@ ALL = (
     Scenario("serial check", serial_line.check_with_serial_sensor),
     Scenario("session", recording.three_trials, weight=6),
     Scenario("second screen", second_screen.beside_a_session, weight=5),
+    Scenario("foresight", foresight.beside_a_recording, weight=5),
     Scenario("link down in every phase", losses.link_down_in_every_phase, weight=8),
     Scenario("lost in a trial", losses.lost_in_a_trial, weight=6),
     Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=5),

@@ -2,31 +2,16 @@
 
 import signal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from acquisition.ipc import SharedLayout
 from lab.guest import viewer
-from lab.guest.commands import Program, require, wait
+from lab.guest.commands import Program, wait
+from lab.guest.lateness import lateness, memory_of, require_on_time
 from lab.guest.machine_room import MachineRoom
 from lab.guest.scenarios.bus import Figures, figure
 from lab.guest.scenarios.recording import served_arm
 from lab.guest.sessions import begin, cycle_figures, verify_kept
 
-WINDOW = 2.0  # s
 _SETTLING = 1.0  # s, in which programs start
 _PATIENCE = 60.0  # s until a program has read from the host what it needs
-_CYCLES_PER_S = 500
-MOST_LATER = 3.0  # us, that a second screen may add to the 99 % quantile
-Lateness = NDArray[np.float64]
-
-
-def lateness(shared: SharedLayout) -> Lateness:
-    """Return how late each cycle of a window began [us], shape (n,)."""
-    wait(WINDOW)
-    rows = shared.timings.last(round(WINDOW * _CYCLES_PER_S))
-    late = rows["woke_ns"].astype(np.int64) - rows["deadline_ns"].astype(np.int64)
-    return np.asarray(late * 1e-3, np.float64)
 
 
 def _second_screen(room: MachineRoom) -> tuple[Program, Program]:
@@ -47,9 +32,7 @@ def beside_a_session(room: MachineRoom) -> Figures:
     """
     session = begin(room, served_arm(room), 1)
     session.await_ready()
-    shared = SharedLayout.of_process(session.program.pid)
-    require(shared is not None, "the session's memory is not found")
-    assert shared is not None
+    shared = memory_of(session.program.pid)
     wait(_SETTLING)
     alone = lateness(shared)
     server, client = _second_screen(room)
@@ -63,13 +46,5 @@ def beside_a_session(room: MachineRoom) -> Figures:
     session.keep()
     session.end()
     verify_kept(room, 1)
-    later = float(np.quantile(watched, 0.99) - np.quantile(alone, 0.99))
-    windows = {"alone": alone, "watched": watched, "killed": killed}
-    figures = {name: _words(window) for name, window in windows.items()}
-    require(later <= MOST_LATER, f"p99 {later:.1f} us later: {figures}")
+    figures = require_on_time(watched, alone, {"killed": killed})
     return {**figures, **cycle_figures(room)}
-
-
-def _words(late: Lateness) -> str:
-    low, high = np.quantile(late, [0.5, 0.99])
-    return f"p50 {low:.1f} us, p99 {high:.1f} us, worst {late.max():.1f} us"
