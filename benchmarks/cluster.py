@@ -1,0 +1,175 @@
+"""What a Dask cluster brings: two workers against one, and a schedule for more.
+
+    python -m benchmarks.cluster [--rounds 3]
+
+Workers are processes on this machine with one thread each. Windows of one and of two
+workers take turns; both are warm. The schedule for 8 and 64 workers is that of a list
+scheduler over the times of the same folds on one worker, drawn with replacement until
+there are 80 of each of 8 terrains. Tasks are handed out one after the other and the
+trials reach one worker after the other, both as long as was measured of folds without
+a model: less than a cluster does at once.
+"""
+
+import argparse
+import heapq
+import statistics
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.data import PrepareOptions, load_tables, prepare_trial
+from analysis.study import GP_NN, GP_SE, FitOptions, Workers, run_fold, run_tasks
+from analysis.study.crossval import FoldPlan, plan_folds
+from benchmarks.rows import BenchRow
+
+SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
+FOLDS = 640  # 80 trials of each of 8 terrains
+LARGER = (8, 64)  # workers of the schedules
+_GOAL = 1.8  # times that two workers are faster than one
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterCosts:
+    """What was measured of a cluster.
+
+    Attributes:
+        tasks: processor time of every fold [s].
+        alone: with one worker [s], median of the rounds.
+        ratio: of one worker's time and two's in one round, median of the rounds.
+        sending: until the same folds without a model are back from one warm worker [s].
+    """
+
+    tasks: tuple[float, ...]
+    alone: float
+    ratio: float
+    sending: float
+
+    @property
+    def work(self) -> list[float]:
+        """Times of the folds on a worker [s]."""
+        slower = max(self.alone - self.sending, 0.0) / sum(self.tasks)
+        return [slower * work for work in self.tasks]
+
+    @property
+    def beyond(self) -> float:
+        """What the scheduler needs for a task [s]."""
+        return self.sending / len(self.tasks)
+
+
+def plan(*models: str) -> FoldPlan:
+    """Return the folds of the trials in the repository, for these models."""
+    trials = {
+        f"{name} {half}": [prepare_trial(one, PrepareOptions()) for one in group]
+        for name, group in load_tables([SLICE]).items()
+        for half in "ab"  # of an even number of folds
+    }
+    return plan_folds(trials, FitOptions(models=models))[0]
+
+
+@contextmanager
+def cluster(workers: int) -> Iterator[str]:
+    """Run so many workers on this machine; yield the scheduler's address."""
+    from distributed import LocalCluster
+
+    local: Any = LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+        silence_logs=50,
+    )
+    with local:
+        yield local.scheduler_address
+
+
+def spent(folds: FoldPlan, address: str) -> float:
+    """Return how long a cluster takes for all folds [s]."""
+    before = time.perf_counter()
+    run_tasks(run_fold, folds, Workers(scheduler=address))
+    return time.perf_counter() - before
+
+
+def measured(rounds: int = _ROUNDS) -> ClusterCosts:
+    """Return what one and two workers take."""
+    folds, light = plan(GP_SE, GP_NN), plan()
+    own: list[float] = []
+    for k in range(len(folds)):
+        before = time.process_time()
+        run_fold(folds[k])
+        own.append(time.process_time() - before)
+    with cluster(1) as one, cluster(2) as two:
+        for address in (one, two):
+            spent(folds, address)  # workers import what they need
+        sending = min(spent(light, one) for _ in range(rounds))
+        pairs = [(spent(folds, one), spent(folds, two)) for _ in range(rounds)]
+    alone = statistics.median(a for a, _ in pairs)
+    ratio = statistics.median(a / b for a, b in pairs)
+    return ClusterCosts(tuple(own), alone, ratio, sending)
+
+
+def makespan(
+    tasks: Sequence[float], workers: int, beyond: float, sending: float
+) -> float:
+    """Return when the last of the tasks is done [s].
+
+    Args:
+        tasks: work of each [s], in the order in which they are handed out.
+        workers: number of workers.
+        beyond: what the scheduler needs to hand out one task [s], one after the other.
+        sending: until a worker has the trials [s], one after the other.
+    """
+    free = [sending * (k + 1) for k in range(workers)]
+    heapq.heapify(free)
+    handed = 0.0
+    for work in tasks:
+        handed += beyond
+        heapq.heappush(free, max(heapq.heappop(free), handed) + work)
+    return max(free)
+
+
+def efficiency(costs: ClusterCosts, workers: int) -> float:
+    """Return how much of their time so many workers would work, 0 to 1."""
+    drawn = np.random.default_rng(0).choice(costs.work, FOLDS).tolist()
+    whole = makespan(drawn, workers, costs.beyond, costs.sending)
+    return sum(drawn) / (workers * whole)
+
+
+def rows() -> list[BenchRow]:
+    """Return what was measured, for the table."""
+    costs = measured()
+    count = len(costs.tasks)
+    return [
+        BenchRow(
+            f"Dask: two workers against one, {count} folds",
+            *(costs.ratio, "times", _GOAL, True),
+        ),
+        *(
+            BenchRow(
+                f"Dask: {workers} workers busy, {FOLDS} folds, schedule",
+                *(100.0 * efficiency(costs, workers), "%"),
+                note=f"{1e3 * costs.beyond:.0f} ms a task beyond its work, "
+                f"{1e3 * costs.sending:.0f} ms to give a worker the trials",
+            )
+            for workers in LARGER
+        ),
+    ]
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=_ROUNDS)
+    costs = measured(parser.parse_args().rounds)
+    print(costs)
+    for workers in (1, 2, *LARGER):
+        print(f"{workers} workers: {efficiency(costs, workers):.0%} busy")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""The schedule of a cluster is what a list scheduler makes of the times given."""
+
+import pytest
+
+from benchmarks.cluster import ClusterCosts, efficiency, makespan
+
+
+def test_one_worker_does_one_after_the_other():
+    assert makespan([1.0, 2.0, 3.0], 1, 0.0, 0.5) == pytest.approx(6.5)
+
+
+def test_a_free_worker_takes_the_next_task():
+    assert makespan([3.0, 1.0, 1.0, 1.0], 2, 0.0, 0.0) == pytest.approx(3.0)
+
+
+def test_a_scheduler_hands_out_one_task_at_a_time():
+    assert makespan([0.1] * 100, 64, 0.05, 0.0) == pytest.approx(5.1)
+
+
+def test_workers_wait_for_the_trials():
+    assert makespan([1.0, 1.0], 2, 0.0, 0.5) == pytest.approx(2.0)
+
+
+def test_more_workers_are_busy_for_less_of_their_time():
+    costs = ClusterCosts((0.4, 0.5, 0.6), 1.7, 1.8, 0.2)
+    assert costs.work == pytest.approx([0.4, 0.5, 0.6])
+    assert costs.beyond == pytest.approx(0.2 / 3)
+    few, many = efficiency(costs, 2), efficiency(costs, 64)
+    assert 0.0 < many < few <= 1.0
