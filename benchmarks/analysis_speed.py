@@ -17,11 +17,10 @@ from analysis.data import load_trial
 from analysis.study import run_fold
 from analysis.terrains.table import Table
 from benchmarks.rows import BenchRow
-from benchmarks.study_race import folds_of
+from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
 from experiments.report import REPORTED
 
-SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _SECONDS = 30.0  # of a trial
 
 

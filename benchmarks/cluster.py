@@ -17,7 +17,6 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,8 +25,8 @@ from analysis.data import PrepareOptions, load_tables, prepare_trial
 from analysis.study import GP_NN, GP_SE, FitOptions, Workers, run_fold, run_tasks
 from analysis.study.crossval import FoldPlan, plan_folds
 from benchmarks.rows import BenchRow
+from benchmarks.study_race import SLICE
 
-SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules
 _GOAL = 1.8  # times that two workers are faster than one

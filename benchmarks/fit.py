@@ -28,11 +28,10 @@ from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, pr
 from benchmarks import beside_gpy, beside_tinygp
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
 from benchmarks.rows import BenchRow, not_installed
-from benchmarks.study_race import race
+from benchmarks.study_race import SLICE, race
 
 Fitter = Callable[[np.ndarray, np.ndarray], Callable[[Sequence[np.ndarray]], float]]
 
-SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _POINTS = 300
 _STARTS_OF_TUSTIN = 20
 _ROUNDS = 3  # of every fold of the short race, medians

@@ -59,7 +59,7 @@ def _errors(terrain: dict[str, Any]) -> str:
 
 
 def measured_rows(page: str) -> list[str]:
-    """Return the rows for README out of the table of docs/measured.md, in its order.
+    """Return the rows of docs/measured.md for README, in the order of `SHOWN`.
 
     Raises:
         ValueError: the table lacks one of `SHOWN`, or it was not measured.

@@ -32,6 +32,7 @@ from analysis.study.models import (
 from analysis.tustin.model import TustinFit
 from benchmarks.beside_sklearn import fit_theirs, our_starts
 
+SLICE = Path(__file__).parents[1] / "tests" / "data" / "rehearsal_slice.npz"
 _GOAL = 4.0
 # model -> its part in `benchmarks.beside_sklearn`, and is it around a Tustin curve?
 FITS = {

@@ -22,6 +22,7 @@ from .ticks import ForesightRun
 from .training import fit_foresight, fit_ground
 from .watching import (
     FLAT_SURFACE,
+    HORIZON,
     ROCKY_SURFACE,
     WatchedTrial,
     foot_samples,
@@ -35,6 +36,7 @@ __all__ = [
     "EVERY",
     "FEATURES",
     "FLAT_SURFACE",
+    "HORIZON",
     "LAGS",
     "ROCKY_SURFACE",
     "FootSample",

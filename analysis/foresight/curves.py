@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.data import Array
-from analysis.foresight.engine import ForesightFlag
+from analysis.foresight.calibration import BINS, equal_bins
+from analysis.foresight.engine import EVERY, ForesightFlag
+from analysis.foresight.signals import PERIOD
 from analysis.foresight.ticks import (
     LONGEST_LEAD,
     ForesightRun,
@@ -16,8 +18,7 @@ from analysis.foresight.ticks import (
 )
 
 SHOWN = 6.0  # s of a trial
-TICK = 0.01  # s
-_BINS = 10  # of equal numbers of ticks
+TICK = EVERY * PERIOD  # s
 _SLID = 200  # ticks of sliding over which the ground is recognised: 2 s
 _FEW = 3  # trials from which on there is a mean
 _LEADS = np.linspace(0.0, 1.0, 101)  # s
@@ -70,14 +71,16 @@ class ForesightCurves:
 
 def foresight_curves(runs: Sequence[ForesightRun]) -> ForesightCurves:
     """Return what trials show that the models have not seen."""
-    ticks = [one for run in runs if (one := ticks_of(run)).t.size]
-    foreseen, seen = _reliability(ticks)
-    leads = [lead or 0.0 for one in ticks for lead in leads_of(one)]
+    seen_by = [(run, ticks) for run in runs if (ticks := ticks_of(run)).t.size]
+    every = [ticks for _, ticks in seen_by]
+    foreseen, seen = _reliability(every)
+    leads = [lead for ticks in every for lead in leads_of(ticks)]
     warned = np.full(_LEADS.size, np.nan)
     if leads:
-        warned = (np.array(leads)[:, None] >= np.maximum(_LEADS, TICK)).mean(axis=0)
+        ahead = np.array([-1.0 if lead is None else lead for lead in leads])
+        warned = (ahead[:, None] >= _LEADS).mean(axis=0)
     return ForesightCurves(
-        excerpt=_excerpt(runs),
+        excerpt=_excerpt(seen_by),
         foreseen=foreseen,
         seen=seen,
         leads=_LEADS,
@@ -91,18 +94,19 @@ def _reliability(ticks: Sequence[TrialTicks]) -> tuple[Array, Array]:
     """Return mean probability and share of ten bins of equally many ticks."""
     p = np.concatenate([np.zeros(0), *(one.p[one.at_risk] for one in ticks)])
     truth = np.concatenate([np.zeros(0), *(one.before[one.at_risk] for one in ticks)])
-    if p.size < _BINS:
-        return np.full(_BINS, np.nan), np.full(_BINS, np.nan)
-    bins = np.array_split(np.argsort(p, kind="stable"), _BINS)
+    if p.size < BINS:
+        return np.full(BINS, np.nan), np.full(BINS, np.nan)
+    bins = equal_bins(p)
     foreseen = np.array([p[rows].mean() for rows in bins])
     return foreseen, np.array([truth[rows].mean() for rows in bins])
 
 
-def _excerpt(runs: Sequence[ForesightRun]) -> ForesightExcerpt | None:
+def _excerpt(
+    seen_by: Sequence[tuple[ForesightRun, TrialTicks]],
+) -> ForesightExcerpt | None:
     """Return the stretch that holds the most slips, the first of several."""
     best, most = None, 0
-    for run in runs:
-        ticks = ticks_of(run)
+    for run, ticks in seen_by:
         for onset in ticks.onsets:
             start = onset - LONGEST_LEAD / 2
             inside = sum(start <= other <= start + SHOWN for other in ticks.onsets)

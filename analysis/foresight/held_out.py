@@ -2,17 +2,12 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-import numpy as np
-
 from analysis.breakaway import BreakAwayModel
-from analysis.data import Array
 from analysis.foresight.engine import Foresight
 from analysis.foresight.model import ForesightModel
 from analysis.foresight.ticks import ForesightRun
 from analysis.foresight.training import FOLDS, fit_foresight
 from analysis.foresight.watching import WatchedTrial
-
-_BINS = 10
 
 
 def hold_out(
@@ -73,25 +68,3 @@ def foresee(
         seen = tuple(state for state in states if state is not None)
         runs.append(ForesightRun(trial, seen, threshold, model.terrains, surfaces))
     return runs
-
-
-def calibration_error(
-    p: Array, truth: np.ndarray, weight: Array | None = None
-) -> float:
-    """Return the mean difference of probability and share over ten bins.
-
-    Args:
-        p: probabilities, shape (n,).
-        truth: what happened, shape (n,).
-        weight: of every row; None = alike, and the bins hold equal numbers of rows.
-    """
-    if not p.size:
-        return float("nan")
-    if weight is None:
-        order = np.argsort(p, kind="stable")
-        parts = np.array_split(order, _BINS)
-        off = [abs(float((p[rows] - truth[rows]).sum())) for rows in parts]
-        return sum(off) / p.size
-    place = np.minimum((p * _BINS).astype(int), _BINS - 1)
-    total = np.bincount(place, weight * (p - truth), _BINS)
-    return float(np.abs(total).sum() / weight.sum())

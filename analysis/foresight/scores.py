@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.foresight.calibration import calibration_error
 from analysis.foresight.ground import GroundModel, GroundRecogniser
-from analysis.foresight.held_out import calibration_error
 from analysis.foresight.ticks import ForesightRun, TrialTicks, leads_of, ticks_of
 from analysis.foresight.watching import (
     FLAT_SURFACE,

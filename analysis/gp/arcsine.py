@@ -20,8 +20,8 @@ from analysis.gp.kernels import (
     Composable,
     Contraction,
     Evaluator,
+    computed_parts,
     length_pairs,
-    meant_parts,
 )
 
 _ROOT_2 = np.sqrt(2.0)
@@ -117,7 +117,7 @@ class _ArcsineOver:
         is_upper, X_other = X_other is None, X if X_other is None else X_other
         self._kernel, self._X, self._X_other = kernel, X, X_other
         shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
-        self._parts = meant_parts(*shape, is_upper=is_upper)
+        self._parts = computed_parts(*shape, is_upper=is_upper)
         self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
         self._squares = np.empty((d + len(self._pairs), *shape))
         steps = [np.subtract.outer(X[:, a], X_other[:, a]) for a in range(d)]

@@ -136,7 +136,7 @@ class _SquaredExponentialOver:
     def __init__(self, X: Array, X_other: Array | None) -> None:
         self._X, self._X_other = X, X if X_other is None else X_other
         (n, d), m = X.shape, self._X_other.shape[0]
-        self._parts = meant_parts(n, m, is_upper=X_other is None)
+        self._parts = computed_parts(n, m, is_upper=X_other is None)
         self._left, self._right = np.ones((n, d + 2)), np.ones((d + 2, m))
         self._K = np.empty((n, m))
 
@@ -264,7 +264,7 @@ class Product(_Pair):
         return np.vstack([self.left.bounds(sd_y, sd_x), self.right.bounds(1.0, sd_x)])
 
 
-def meant_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice]]:
+def computed_parts(n: int, m: int, *, is_upper: bool) -> list[tuple[slice, slice]]:
     """Return the parts of an (n, m) matrix that are computed, as (rows, columns).
 
     That is all of it, or rows from their place on the diagonal: a little more than the

@@ -142,7 +142,7 @@ class Likelihood:
         slope_noise = at.contract_noise(on_diagonal)
         if at.shared.blocks:
             slope_noise -= at.shared.contract(minus)
-        # K is symmetric: handing the transpose over keeps both in one order of memory
+        # the transpose has K's order of memory, and the triangle of K that is good
         slope = -at.contract(minus.T)
         return at.lml, np.concatenate([slope, slope_noise])
 

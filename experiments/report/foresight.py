@@ -86,7 +86,8 @@ def study_foresight(
     figure = foresight_figure(
         foresight_curves(runs), is_simulated=study.simulated, with_pdf=with_pdf
     )
-    return StudyForesight(model, tables, numbers, (figure,))
+    figures = () if figure is None else (figure,)
+    return StudyForesight(model, tables, numbers, figures)
 
 
 def _slip_scores(runs: Sequence[ForesightRun]) -> dict[str, SlipScore]:

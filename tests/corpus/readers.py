@@ -8,19 +8,15 @@ import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from acquisition.clock import SystemClock
 from acquisition.errors import TractionError, TrialFileError
 from acquisition.trial_file import TrialReader, recover_file
 from analysis.data.tables import load_tables
-from analysis.foresight.engine import ForesightState
 from analysis.terrains import database as terrain_db
 from experiments.board import BoardCache, count_board, row_of, see_sessions
 from experiments.operator.scripted import ScriptedOperator
 from experiments.report.checksums import SUMS, changed_files
 from experiments.report.rebuilding import compare_tables
-from experiments.rig.foresight import read_foresight, state_record, states_of
 from experiments.rig.law_calibrations import build_compensation
 from experiments.run.surroundings import read_poses
 from experiments.session.crash_recovery import recover_session
@@ -36,8 +32,7 @@ from ft_sensor.calibration.sensor_file import sensor_from_toml
 from ft_sensor.reading import StreamTiming
 from ft_sensor.serial_line.timestamps import SampleTimestamper
 from ft_sensor.vendors import bota, optoforce, robotous
-from tests.acquisition.trials import make_cycles
-from tests.analysis.foresight.made import OTHER_RIG, RIG
+from tests.corpus.foresight import read_foreseen, read_models
 from tests.corpus.used_session import use
 from wam.bus.decoder import BusReader
 from wam.bus.frames import (
@@ -69,8 +64,6 @@ _DECODERS = (
 )
 _RANGES = (400.0, 400.0, 1000.0, 10.0, 10.0, 10.0)
 _WRAP = 1 << 32
-_FORESEEN = 500  # cycles
-_IMPOSSIBLE = (np.nan, np.inf, -np.inf, 1e300, -1e300, 1e30, -1e30, 0.0)
 _TIMING = StreamTiming(1_250_000.0, 803_000, _WRAP, 1000.0, 50_000_000, 37)
 
 
@@ -151,40 +144,6 @@ def _database(data: bytes, folder: Path) -> None:
     for name in database.terrains:
         database.terrain(name).predict(3.0, 0.05)
         database.terrain(name).slip_risk(3.0, 3.0)
-
-
-def _foresight(data: bytes, folder: Path) -> None:
-    """Foresee a trial, and impossible samples, with what `data` teaches."""
-    path = folder / "terrains.json"
-    path.write_bytes(data)
-    source = read_foresight(path)
-    cycles = make_cycles(_FORESEEN)
-    cycles["traction"][:, 1:] = np.abs(cycles["traction"][:, 1:]) + 3.0
-    cycles["foot_position"][:, 0] = np.linspace(0.0, 0.1, _FORESEEN)
-    for k, value in enumerate(_IMPOSSIBLE):
-        cycles["traction"][50 + 40 * k, 1 + k % 2] = value
-        cycles["foot_position"][70 + 40 * k, 0] = value
-    for rig in (RIG, OTHER_RIG):
-        foresight = source.started(rig)
-        for state in states_of(foresight, cycles, (1.0, 0.0, 0.0)):
-            _check_state(state)
-            state_record(state)
-
-
-def _check_state(state: ForesightState) -> None:
-    """Raise AssertionError where a share is none."""
-    shares = (state.slip_probability, state.break_away_risk, state.none)
-    for share in (*shares, *state.terrains):
-        assert np.isnan(share) or 0.0 <= share <= 1.0, state
-
-
-def _foreseen(data: bytes, folder: Path) -> None:
-    """Read `data` as a trial that was foreseen."""
-    path = folder / "T01.mcap"
-    path.write_bytes(data)
-    reader = TrialReader(path)
-    reader.metadata.get("foresight", {})
-    reader.foresight()
 
 
 def _script(data: bytes, folder: Path) -> None:
@@ -275,8 +234,8 @@ READERS: dict[str, Callable[[bytes, Path], None]] = {
     "terrain": _text(terrain_from_toml),
     "sensor-calibration": _text(lambda text: sensor_from_toml(text, "sensor.toml")),
     "database": _database,
-    "foresight": _foresight,
-    "foreseen": _foreseen,
+    "foresight": read_models,
+    "foreseen": read_foreseen,
     "table": _table("trial.csv"),
     "npz": _table("trials.npz"),
     "parquet": _table("trial.parquet"),

@@ -8,7 +8,7 @@ from analysis.terrains.database import to_text
 from analysis.terrains.known import KnownTerrain, TerrainDatabase
 from analysis.terrains.parts import BREAK_AWAY_PART, FORESIGHT_PART
 from analysis.terrains.table import Table
-from tests.analysis.foresight.made import PLATE, STONES, model
+from tests.analysis.foresight.made import OTHER_RIG, PLATE, RIG, STONES, model
 
 UTC = "2027-01-15T08:00:00Z"
 BREAKS = BreakAwayModel(
@@ -44,6 +44,18 @@ def database(foresight=None):
     }
     parts = {} if foresight is None else {FORESIGHT_PART: foresight}
     return to_text(TerrainDatabase(terrains, True, UTC, parts))
+
+
+def laboratory_database():
+    """Return the text of tests/data/lab/terrains.json.
+
+    The laboratory's arm counts as a live one; and what it pushes with lies within all
+    that slips were learnt from, so that every state is computed in full.
+    """
+    content = model().to_dict()
+    content["provenance"]["rigs"] = [RIG.to_dict(), OTHER_RIG.to_dict()]
+    content["slip"]["reach"] = [30.0, 60.0]
+    return database(content)
 
 
 def write_database(path):

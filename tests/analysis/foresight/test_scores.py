@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from analysis.foresight.calibration import calibration_error
 from analysis.foresight.engine import ForesightFlag, ForesightState
-from analysis.foresight.held_out import calibration_error, folds_of, hold_out
+from analysis.foresight.held_out import folds_of, hold_out
 from analysis.foresight.scores import score_ground, score_slips
 from analysis.foresight.ticks import ForesightRun
 from tests.analysis.foresight.made import STONES, model, trial, trials
