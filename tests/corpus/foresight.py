@@ -13,7 +13,7 @@ from acquisition.trial_file import TrialReader
 from analysis.foresight.engine import ForesightState
 from experiments.rig.foresight import read_foresight, state_record, states_of
 from tests.acquisition.trials import make_cycles
-from tests.analysis.foresight.made import OTHER_RIG, RIG, STONES, trial
+from tests.analysis.foresight.made import OTHER_RIG, RATE, RIG, push_on_stones
 
 CYCLES = 1500
 _SPOILT_FROM = 1000  # cycle; until then the trial is sound
@@ -25,9 +25,10 @@ _ALONG = (1.0, 0.0, 0.0)
 def foreseen_cycles() -> Record:
     """Return the cycles of a push on stones, with impossible values at its end."""
     cycles = make_cycles(CYCLES)
-    for k, sample in enumerate(trial(STONES, 50).samples[:CYCLES]):
-        cycles["foot_position"][k] = (sample.x, 0.0, 0.0)
-        cycles["traction"][k] = (0.0, sample.F_t, sample.F_n)
+    v_t, F_t, F_n = (column[:CYCLES] for column in push_on_stones(50))
+    cycles["foot_position"][:] = 0.0
+    cycles["foot_position"][:, 0] = np.cumsum(v_t) / RATE
+    cycles["traction"][:, 1], cycles["traction"][:, 2] = F_t, F_n
     for k, value in enumerate(_IMPOSSIBLE):
         cycles["traction"][_SPOILT_FROM + 40 * k, 1 + k % 2] = value
         cycles["foot_position"][_SPOILT_FROM + 20 + 40 * k, 0] = value

@@ -23,14 +23,13 @@ from ft_sensor.calibration.files import payload_to_toml, terrain_to_toml
 from ft_sensor.calibration.fit import SensorFit
 from ft_sensor.calibration.sensor_file import SensorCalibration, sensor_to_toml
 from ft_sensor.payload import TerrainFrame, payload_of
+from lab.guest.scenarios.foresight import DATABASE
 from tests.acquisition.trials import (
     FORESEEN_TOPICS,
     make_cycles,
     make_header,
     write_trial,
 )
-from tests.analysis.foresight.databases import database
-from tests.analysis.foresight.made import model
 from tests.corpus.readers import PACKAGED, RESULTS, RUNNING
 from tests.corpus.used_session import session_file
 from wam.bus.frames import encode_force, encode_position, encode_torques
@@ -219,7 +218,7 @@ def samples() -> dict[str, bytes]:
         "terrain": terrain_to_toml("S10", frame, {"measured": _UTC}),
         "sensor-calibration": _sensor_calibration(),
         "database": json.dumps(_database()),
-        "foresight": database(model().to_dict()),
+        "foresight": DATABASE.read_text(),
         "sidecar": json.dumps(_SIDECAR),
         "session": json.dumps({"kept": ["T01"], "phase": "unfinished"}),
         "table": "t,v_t,F_n,F_t\n0,0.1,2,1\n0.1,0.1,2,1\n0.2,0.1,2,1\n",
