@@ -3,6 +3,7 @@
 import platform
 import shutil
 import subprocess
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -36,7 +37,12 @@ def _version(package: str) -> str:
         return "unknown"
 
 
+@cache
 def _git() -> tuple[str, str]:
+    """Return commit and uncommitted changes as they were first asked for.
+
+    What runs is what was loaded by then; later changes of the files are not of it.
+    """
     folder = Path(__file__).resolve().parent.parent
     git = shutil.which("git")
     if git is None or not (folder / ".git").exists():
