@@ -67,7 +67,7 @@ class SimulationControl(Protocol):
         ...
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground."""
+        """Return the true parameters of the ground, and what moves the arm."""
         ...
 
     def friction(self) -> dict[str, list[float]]:

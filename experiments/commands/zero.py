@@ -36,7 +36,7 @@ def run(args: argparse.Namespace) -> int:
     console = Console(color=not args.no_color)
     settings = load_settings(args.config)
     fake = FakeOptions(is_fast=True, seed=1) if args.fake else None
-    rig = connect_rig(settings, settings.matrix.terrains[0], fake)
+    rig = connect_rig(settings, settings.matrix.terrains[0], fake, console)
     try:
         info = _start(rig)
         home = rig.model.constants.home

@@ -6,8 +6,9 @@ from .conditions import (
     sensor_conditions,
     write_conditions,
 )
+from .connecting import connect_rig
 from .host_checks import free_bytes
-from .preflight import Preflight, connect_rig, run_preflight, start_devices
+from .preflight import Preflight, run_preflight, start_devices
 
 __all__ = [
     "Preflight",

@@ -6,10 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import (
-    LinkError,
-    LinkFullError,
-    LinkTimeoutError,
-    PreflightError,
     SafetyMode,
     TractionError,
 )
@@ -17,6 +13,7 @@ from acquisition.control_loop import SLOW_EXCHANGE_NS, loop_report
 from experiments import provenance
 from experiments.messages import preflight_error
 from experiments.operator import BAD, GOOD, WARNING, Console
+from experiments.preflight.connecting import as_preflight, not_reached
 from experiments.preflight.host_checks import (
     DiskProbe,
     check_code,
@@ -30,8 +27,11 @@ from experiments.preflight.host_checks import (
     reach_words,
 )
 from experiments.preflight.page import Add, CheckResult, ChecksPage
-from experiments.rig import EXCHANGE_CYCLES, FakeOptions, Rig, build_rig, law_words
-from experiments.settings import RigSettings, Settings, TerrainRow
+from experiments.rig import (
+    EXCHANGE_CYCLES,
+    Rig,
+    law_words,
+)
 from wam.driver import (
     HOME_LIMIT,
     ArmInfo,
@@ -58,18 +58,6 @@ class Preflight:
     def as_dict(self) -> dict[str, object]:
         """Return the page for preflight.json."""
         return {"checks": [asdict(check) for check in self.checks]}
-
-
-def connect_rig(settings: Settings, row: TerrainRow, fake: FakeOptions | None) -> Rig:
-    """Return the rig with its bus open.
-
-    Raises:
-        PreflightError: the CAN interface cannot be used.
-    """
-    try:
-        return build_rig(settings, row, fake)
-    except LinkError as error:
-        raise _not_reached(error, settings.rig) from error
 
 
 def run_preflight(
@@ -138,7 +126,7 @@ def _check_arm(rig: Rig, page: ChecksPage) -> ArmInfo:
         info = rig.backend.start_arm()
     except TractionError as error:
         page.add(BAD, "arm", error.message)
-        raise _not_reached(error, rig.settings.rig) from error
+        raise not_reached(error, rig.settings.rig) from error
     can = rig.settings.rig.can
     where = "simulated" if rig.is_simulated else f"{can.interface}:{can.channel}"
     page.add(GOOD, "bus", f"{where}, {info.door}")
@@ -187,7 +175,7 @@ def _check_sensor(rig: Rig, arm_state: str, add: Add) -> dict[str, str]:
         fields = rig.backend.open_sensor()
     except TractionError as error:
         add(BAD, "F/T sensor", str(error))
-        raise _as_preflight(error, arm_state) from error
+        raise as_preflight(error, arm_state) from error
     name = f"{fields['model']}, {fields['measured_rate']}"
     add(GOOD, "F/T sensor", f"{name}, {reach_words(fields, _lever(rig))}")
     return fields
@@ -219,7 +207,7 @@ def start_devices(rig: Rig) -> ArmInfo:
         info = rig.backend.start_arm()
         rig.backend.open_sensor()
     except TractionError as error:
-        raise _as_preflight(error, "not touched") from error
+        raise as_preflight(error, "not touched") from error
     rig.backend.begin()
     return info
 
@@ -275,22 +263,3 @@ def _check_loop(rig: Rig, seconds: float, add: Add) -> None:
     )
     is_late = report.missed > worst * seconds
     add(WARNING if is_late else GOOD, f"loop {seconds:g} s", text)
-
-
-def _not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
-    """Return the refusal of an arm that cannot be reached, or answers wrongly.
-
-    A bus that is down gets the catalogue's message, with the command that helps.
-    """
-    is_up = isinstance(error, LinkTimeoutError | LinkFullError)
-    is_bus = isinstance(error, LinkError) and not is_up
-    can = settings.can
-    if not is_bus or can.interface != "socketcan":
-        return _as_preflight(error, "not touched")
-    fields = {"channel": can.channel, "bitrate": can.bitrate}
-    return preflight_error("can-down", detail=error.message, **fields)
-
-
-def _as_preflight(error: TractionError, arm_state: str) -> PreflightError:
-    arm_state = error.arm_state or arm_state
-    return PreflightError(error.message, hint=error.hint, arm_state=arm_state)

@@ -1,7 +1,7 @@
 from .backend import EXCHANGE_CYCLES
 from .build import build_tool, terrain_frame
 from .bus_log import logging_bus, open_bus_log
-from .fake import ServedArm, build_sensor_server, build_server
+from .fake import ServedArm, build_sensor_server, build_server, compiling_words
 from .foresight import (
     STUDY_DATABASE,
     ForesightSource,
@@ -36,6 +36,7 @@ __all__ = [
     "build_sensor_server",
     "build_server",
     "build_tool",
+    "compiling_words",
     "foresight_view",
     "friction_path",
     "gravity_path",

@@ -129,6 +129,13 @@ def sensor_metadata(section: AnySensor) -> dict[str, Any]:
     return section.model_dump(include=options)
 
 
+def compiling_words() -> str:
+    """Return what to say before a stepped simulation that is compiled first, or ""."""
+    from fakes.kernels import is_compiled_first
+
+    return "Compiling the simulation, once: about 15 s." if is_compiled_first() else ""
+
+
 def stepped(
     world: SimulatedRig,
     settings: Settings,

@@ -4,8 +4,8 @@ import numpy as np
 
 GRID = 0.001  # spacing of the tables [m]
 _MARGIN = 0.2  # the tables begin this far before the far end [m]
-_POINTS = 1200
-_LAST = _POINTS - 1.001
+POINTS = 1200
+_LAST = POINTS - 1.001
 
 
 def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
@@ -19,7 +19,7 @@ def smooth_profile(rng: np.random.Generator, length: float) -> np.ndarray:
     """
     reach = max(int(4.0 * length / GRID), 1)
     taps = np.exp(-0.5 * (np.arange(-reach, reach + 1) * GRID / length) ** 2)
-    noise = rng.standard_normal(_POINTS + 2 * reach)
+    noise = rng.standard_normal(POINTS + 2 * reach)
     return np.convolve(noise, taps / np.sqrt((taps**2).sum()), "valid")
 
 

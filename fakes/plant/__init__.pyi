@@ -1,4 +1,5 @@
 # pyright: reportUnknownVariableType=false
+from .hand import touched_place
 from .model import PlantOptions
 from .plant import ArmPlant
 from .push import PACES, Pace
@@ -8,4 +9,5 @@ __all__ = [
     "ArmPlant",
     "Pace",
     "PlantOptions",
+    "touched_place",
 ]

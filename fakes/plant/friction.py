@@ -136,10 +136,10 @@ class MotorBristles:
             dt: length of a step [s].
         """
         self._dt = dt
-        self._columns = columns = _columns(friction, inertia, dt)
+        self._columns = columns = bristle_columns(friction, inertia, dt)
         self._bent_springs = [s0 for _, _, s0, _, _, _, _ in columns]
         self._bent_damping = [bent + b for _, _, _, bent, _, _, b in columns]
-        self._lively: list[float] = (_LIVELY / _PERIOD * friction.presliding).tolist()
+        self._lively: list[float] = lively_speeds(friction).tolist()
         load_and_ripple = np.stack(
             (
                 friction.coulomb - friction.load * friction.load_at,
@@ -216,7 +216,14 @@ class MotorBristles:
         return [-c * z - d * w for c, z, d, w in state]
 
 
-def _columns(friction: MotorFriction, inertia: Array, dt: float) -> list[list[float]]:
+def lively_speeds(friction: MotorFriction) -> Array:
+    """Return from which speed a bristle is taken anew in every step [rad/s], (7,)."""
+    return _LIVELY / _PERIOD * friction.presliding
+
+
+def bristle_columns(
+    friction: MotorFriction, inertia: Array, dt: float
+) -> list[list[float]]:
     """Return what `MotorBristles.take` needs of each motor.
 
     s - 1, 1 / w_s, s0, s0 dt + s1, s0 + s1 / dt, s1 / dt, b: seven numbers of each.

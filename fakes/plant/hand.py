@@ -26,6 +26,17 @@ _CARRY_K, _CARRY_B = 800.0, 100.0  # N/m, N s/m
 _REST_B = 18.0  # of a hand that lies on the arm, along z [N s/m]
 
 
+_ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
+
+
+def touched_place(number: int, travel: float) -> tuple[float, float]:
+    """Return where a person touches the container the `number`th time [m]."""
+    if number <= 4:
+        return (0.0 if number <= 2 else travel), (-_ASIDE if number % 2 else _ASIDE)
+    share = number * 0.618 % 1.0  # spreads out, whatever the number
+    return share * travel, _ASIDE * (2.0 * (number * 0.383 % 1.0) - 1.0)
+
+
 class HandPhase(Enum):
     """What the hand is doing."""
 

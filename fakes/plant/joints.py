@@ -10,9 +10,9 @@ from acquisition import PERIOD_NS
 from fakes.plant.friction import MotorBristles
 from wam.model import ArmConstants, Array, MotorFriction, drive_inertia_matrix
 
-_STOP_K, _STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
-_NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
-_BEARING_NS = 4 * PERIOD_NS  # between two looks at load and ripple of the friction
+STOP_K, STOP_B = 2000.0, 20.0  # N m/rad, N m s/rad
+NEAR = 0.05  # of a stop: no joint goes further in 2 ms [rad]
+BEARING_NS = 4 * PERIOD_NS  # between two looks at load and ripple of the friction
 _SEVEN = Struct("7d")  # packed in half the time in which numpy looks through a list
 
 
@@ -38,7 +38,7 @@ class JointStops:
         lower, upper = constants.q_lower, constants.q_upper
         ends = zip(lower.tolist(), upper.tolist(), strict=True)
         self._ends: list[tuple[float, float]] = list(ends)
-        free = zip((lower + _NEAR).tolist(), (upper - _NEAR).tolist(), strict=True)
+        free = zip((lower + NEAR).tolist(), (upper - NEAR).tolist(), strict=True)
         self._free: list[tuple[float, float]] = list(free)
 
     def at(self, q: Sequence[float], qd: Sequence[float]) -> StopForces:
@@ -57,8 +57,8 @@ class JointStops:
         for i, (angle, (lower, upper)) in enumerate(zip(q, self._ends, strict=True)):
             beyond = max(angle - upper, 0.0) - max(lower - angle, 0.0)
             if beyond:
-                damping[i] = _STOP_B
-                torques[i] = -_STOP_K * beyond - _STOP_B * qd[i]
+                damping[i] = STOP_B
+                torques[i] = -STOP_K * beyond - STOP_B * qd[i]
         return StopForces(torques, damping, is_near=True)
 
 
@@ -157,7 +157,7 @@ class JointDrives:
         self._bristles.follow(speeds)
 
     def _bear(self, rows: Array, speeds: Sequence[float], t_ns: int) -> None:
-        if t_ns % _BEARING_NS == 0:
+        if t_ns % BEARING_NS == 0:
             against = zip(self.sent(), self._bristles.torques(speeds))
             borne = [sent + friction for sent, friction in against]
             self._bristles.bear(self._j2mp.dot(rows[0]).tolist(), borne)

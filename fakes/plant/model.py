@@ -17,6 +17,9 @@ from wam.model import (
     drive_inertia_matrix,
 )
 
+# The model of the arm with the hand on it, and its frames: sole and hand.
+ArmAndHand = tuple["pin.Model", int, int]
+
 FOREARM_MASS = 1.0  # of the person's arm, carried by the person [kg]
 _HAND_ABOVE_PLATE = 0.030  # on the axis of joint 7 [m]
 
@@ -33,6 +36,8 @@ class PlantOptions:
         rubbing: friction of the motors, given instead of drawn; None = drawn.
         cables: resonance of the joints on their cables [Hz]; None = stiff cables.
         has_hand: a person holds the arm by its forearm, from the beginning.
+        dynamics: `fakes.kernels.COMPILED` or `PINOCCHIO`; None = as the environment
+            says, else compiled where that is possible.
     """
 
     friction: float = 0.02
@@ -41,6 +46,7 @@ class PlantOptions:
     rubbing: MotorFriction | None = None
     cables: float | None = None
     has_hand: bool = True
+    dynamics: str | None = None
 
 
 def arm_and_hand(
@@ -48,7 +54,7 @@ def arm_and_hand(
     tool: Tool,
     frame: TerrainFrame,
     forearm: float = FOREARM_MASS,
-) -> tuple["pin.Model", int, int]:
+) -> ArmAndHand:
     """Return a model whose world is the terrain frame, and its frames: sole and hand.
 
     The hand is on link 6, where a person holds the forearm, and has the mass of one:

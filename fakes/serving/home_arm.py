@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition import PERIOD_NS, Clock, SafetyMode
+from fakes.kernels import PINOCCHIO
 from fakes.plant import ArmPlant, PlantOptions
 from fakes.pucks import (
     SENSOR_FORCE_ERRORS,
@@ -24,7 +25,9 @@ from wam.bus import MOTOR_NODES
 from wam.model import ArmConstants, Body, Tool, load_constants
 
 _SEED = 1  # of the sensor's errors
-_UNAIDED = PlantOptions(friction=1.0, has_hand=False)
+# An arm that is served at once waits for no compiler.
+_AIDED = PlantOptions(dynamics=PINOCCHIO)
+_UNAIDED = PlantOptions(friction=1.0, has_hand=False, dynamics=PINOCCHIO)
 _NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))
 _PLATE = Tool(_NO_BODY, _NO_BODY, np.zeros(3), sensor_height=0.0)
 
@@ -122,7 +125,7 @@ def build_home_server(port: Port, pose: HomePose, clock: Clock) -> PuckServer:
         SettingsError: the serial line's path is in use or cannot be one.
     """
     constants, now_ns = _constants_around_home(), clock.now_ns()
-    options = PlantOptions() if pose.has_hand else _UNAIDED
+    options = _AIDED if pose.has_hand else _UNAIDED
     tool = pose.tool or _PLATE
     plant = ArmPlant(constants, tool, pose.frame, constants.home, options)
     plant.t_ns = now_ns // PERIOD_NS * PERIOD_NS

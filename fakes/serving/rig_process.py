@@ -24,6 +24,7 @@ from acquisition.ipc import (
     name_process,
 )
 from fakes.bus import SocketHub
+from fakes.kernels import PINOCCHIO
 from fakes.pucks import WiredNetwork
 from fakes.sensor import SerialPty
 from fakes.truth import Truth, truth_records
@@ -148,5 +149,7 @@ def main(station: ChildContext) -> None:
     request(RealtimeRequest(PRIORITY, station.settings.get("core")))
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:
         settings, clock = station.settings, WorldClock(SystemClock())
-        simulation = simulated_rig(settings, load_constants(), clock)
+        # What is served on the wall clock waits for no compiler.
+        fields = {**settings, "dynamics": PINOCCHIO}
+        simulation = simulated_rig(fields, load_constants(), clock)
         RigServer(simulation, clock, folder, station.channel).serve()

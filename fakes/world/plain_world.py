@@ -58,7 +58,8 @@ def simulated_rig(
 
     Args:
         fields: scene, tool, share of friction, pace, cables; "body" of a twin, which
-            has centres of mass of links and, unless None, friction of motors.
+            has centres of mass of links and, unless None, friction of motors;
+            "dynamics", by default as the environment says.
         constants: of the arm by its drawings.
         clock: of the world.
     """
@@ -69,6 +70,7 @@ def simulated_rig(
         seed=scene.seed,
         rubbing=rubbing,
         cables=fields.get("cables"),
+        dynamics=fields.get("dynamics"),
     )
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

@@ -8,8 +8,8 @@ import numpy as np
 from acquisition import PERIOD_NS, Clock, Record, SettingsError
 from fakes.bus import FakeCanBus
 from fakes.clock import SteppedClock
-from fakes.ground import Container, make_terrain
-from fakes.plant import ArmPlant, Pace, PlantOptions
+from fakes.ground import Container, Terrain, make_terrain
+from fakes.plant import ArmPlant, Pace, PlantOptions, touched_place
 from fakes.pucks import (
     SENSOR_FORCE_ERRORS,
     SENSOR_TORQUE_ERRORS,
@@ -35,7 +35,6 @@ from wam.model import ArmConstants, ArmModel, Array, Tool
 
 _START_HEIGHT = 0.05  # the foot waits this far above the far end [m]
 LAG_NS = 600_000  # more than a cycle may be late
-ASIDE = 0.035  # from the centre line to a corner that a sole can touch [m]
 _CLOSE = 1e-9  # m and rad, where the search for the start pose ends
 _LARGEST_STEP = 0.5  # rad
 _ANY_SENSOR = SensorChoice()
@@ -74,8 +73,7 @@ def solve_start(model: ArmModel, frame: TerrainFrame, q: Array, height: float) -
     """
     axes = frame.axes()
     goal = np.array(frame.far_end) + height * axes[2]
-    start, q = q, q.copy()
-    joints = [1, 3, 5]
+    start, q, joints = q, q.copy(), [1, 3, 5]
     for _ in range(20):
         position, rotation = model.sole_pose(q)
         error = axes @ (goal - position)
@@ -196,19 +194,15 @@ class FakeRig:
     def _rake(self, trial: int) -> TrialGenerators:
         scene = self.scene
         random = trial_generators(scene.seed, scene.terrain, trial)
-        self.ground = Container(
-            make_terrain(scene.stones, scene.foot, scene.frame.incline, random.ground)
-        )
+        incline = scene.frame.incline
+        drawn = make_terrain(scene.stones, scene.foot, incline, random.ground)
+        self.ground: Terrain = Container(drawn)
+        if self.plant.is_compiled:
+            from fakes.ground.compiled import compiled_ground
+
+            self.ground = compiled_ground(self.ground)
         self.plant.terrain = self.ground
         return random
-
-
-def _place(number: int, travel: float) -> tuple[float, float]:
-    """Return where a person touches the container the `number`th time [m]."""
-    if number <= 4:
-        return (0.0 if number <= 2 else travel), (-ASIDE if number % 2 else ASIDE)
-    share = number * 0.618 % 1.0  # spreads out, whatever the number
-    return share * travel, ASIDE * (2.0 * (number * 0.383 % 1.0) - 1.0)
 
 
 class LocalSimulation:
@@ -254,7 +248,7 @@ class LocalSimulation:
         1 to 4: far left, far right, near left, near right, seen from the arm; more:
         points between them.
         """
-        x, y = _place(number, self.rig.scene.frame.travel)
+        x, y = touched_place(number, self.rig.scene.frame.travel)
         self.rig.plant.hand.touch(x, y, self.rig.ground.surface(x))
 
     def push(self) -> None:
@@ -290,8 +284,9 @@ class LocalSimulation:
         return truth_records(self.rig.plant.take_truth(), self.rig.scene.frame)
 
     def parameters(self) -> dict[str, str]:
-        """Return the true parameters of the ground as strings."""
-        return {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
+        """Return the true parameters of the ground, and what moves the arm, as text."""
+        ground = {name: f"{v:.9g}" for name, v in self.rig.ground.truth().items()}
+        return {**ground, "dynamics": self.rig.plant.dynamics}
 
     def friction(self) -> dict[str, list[float]]:
         """Return the true friction of the motors, by the names of its model."""

@@ -9,9 +9,11 @@ import json
 import tempfile
 from pathlib import Path
 
+import pytest
 from mcap.reader import make_reader
 from threadpoolctl import threadpool_info
 
+from fakes.kernels import COMPILED, ENVIRONMENT, PINOCCHIO
 from tests.experiments.program import only_session, traction, write_config
 
 KEPT = Path(__file__).parents[1] / "data" / "recorded" / "cycles.json"
@@ -45,21 +47,26 @@ def digests_of(session: Path) -> dict[str, str]:
     return {name: digest_of(session / "trials" / f"{name}.mcap") for name in TRIALS}
 
 
-def record(folder: Path) -> Path:
-    """Record the session whose digests are kept; return its folder."""
+def record(folder: Path, dynamics: str) -> Path:
+    """Record the session whose digests are kept on `dynamics`; return its folder."""
     config = write_config(folder, travel=TRAVEL)
     script = folder / "script"
     script.write_text("keep\nlast\nkeep\n")
     options = ("--fake", "--fast", "--trials", 3, "--seed", 5)
     places = ("--config", config, "--data", folder, "--operator-script", script)
-    traction("run", "TF", *options, *places)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(ENVIRONMENT, dynamics)
+        traction("run", "TF", *options, *places)
     return only_session(folder)
 
 
 def main() -> None:
     """Write the digests of this machine's simulation."""
-    with tempfile.TemporaryDirectory() as folder:
-        kept = {"processor": processor(), "digests": digests_of(record(Path(folder)))}
+    digests: dict[str, dict[str, str]] = {}
+    for dynamics in (COMPILED, PINOCCHIO):
+        with tempfile.TemporaryDirectory() as folder:
+            digests[dynamics] = digests_of(record(Path(folder), dynamics))
+    kept = {"processor": processor(), "digests": digests}
     KEPT.write_text(json.dumps(kept, indent=1) + "\n")
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.recover import recover_file
+from fakes.kernels import COMPILED, PINOCCHIO
 from tests.experiments.cycle_digest import KEPT, digests_of, processor, record
 from tests.experiments.program import journal, only_session, traction
 
@@ -28,11 +29,14 @@ def recorded(tmp_path):
     return tmp_path, tmp_path / "rig.toml"
 
 
-def test_one_seed_records_the_cycles_it_always_did(tmp_path):
+@pytest.mark.parametrize("dynamics", [COMPILED, PINOCCHIO])
+def test_one_seed_records_the_cycles_it_always_did(tmp_path, dynamics):
+    if dynamics == COMPILED:
+        pytest.importorskip("numba")
     kept = json.loads(KEPT.read_text())
     if kept["processor"] != processor():
         pytest.skip(f"the digests hold for a {kept['processor']} processor")
-    assert digests_of(record(tmp_path)) == kept["digests"]
+    assert digests_of(record(tmp_path, dynamics)) == kept["digests"][dynamics]
 
 
 def test_a_session_of_version_0_1_is_counted(recorded):

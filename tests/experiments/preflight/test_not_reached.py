@@ -3,7 +3,7 @@
 import pytest
 
 from acquisition.errors import LinkError, LinkFullError, PreflightError
-from experiments.preflight import preflight
+from experiments.preflight import connecting
 from experiments.settings.load import load_settings
 from wam.bus.kernel_door import setup_command
 
@@ -12,11 +12,11 @@ def refusal(error, monkeypatch):
     def fail(*_):
         raise error
 
-    monkeypatch.setattr(preflight, "build_rig", fail)
+    monkeypatch.setattr(connecting, "build_rig", fail)
     settings = load_settings(None)
     assert settings.rig.can.interface == "socketcan"
     with pytest.raises(PreflightError) as refused:
-        preflight.connect_rig(settings, settings.matrix.terrains[0], None)
+        connecting.connect_rig(settings, settings.matrix.terrains[0], None)
     return str(refused.value)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pinocchio as pin  # noqa: TID253 - the arm cannot be simulated without it
 import pytest
 
-from fakes.plant.joints import JointLoads, JointState
+from fakes.kernels import COMPILED, ENVIRONMENT, PINOCCHIO
+from fakes.plant.joints import JointLoads, JointState, JointStops
 from tests.fakes.scenes import (
     CONSTANTS,
     CYCLE_NS,
@@ -21,6 +22,14 @@ from wam.model.arm_model import build_pinocchio, drive_inertia_matrix
 from wam.model.constants import GRAVITY
 
 S = 1_000_000_000
+
+
+@pytest.fixture(autouse=True, params=[COMPILED, PINOCCHIO])
+def dynamics(request, monkeypatch):
+    """Let every claim hold for both implementations."""
+    if request.param == COMPILED:
+        pytest.importorskip("numba")
+    monkeypatch.setenv(ENVIRONMENT, request.param)
 
 
 def total_inertia(plant):
@@ -331,12 +340,17 @@ def test_loads_on_foot_hand_and_joints_come_together_in_the_joints():
 
 @pytest.mark.parametrize(("away", "times"), [(0.5, 1), (0.02, 5)])
 def test_resistance_is_taken_at_every_substep_near_a_stop(monkeypatch, away, times):
+    monkeypatch.setenv(ENVIRONMENT, PINOCCHIO)
     plant = make_plant()
     plant.q[6] = CONSTANTS.q_upper[6] - away
     release(plant)
-    taken = []
-    at = plant.stops.at
-    monkeypatch.setattr(plant.stops, "at", lambda *state: taken.append(0) or at(*state))
+    taken, at = [], JointStops.at
+
+    def noted(stops, *state):
+        taken.append(0)
+        return at(stops, *state)
+
+    monkeypatch.setattr(JointStops, "at", noted)
     plant.advance(plant.t_ns + CYCLE_NS)
     assert len(taken) == times  # at the beginning of the cycle, and in four substeps
 

@@ -1,0 +1,60 @@
+"""Connects the rig, and says why an arm cannot be reached."""
+
+from acquisition import (
+    LinkError,
+    LinkFullError,
+    LinkTimeoutError,
+    PreflightError,
+    TractionError,
+)
+from experiments.messages import preflight_error
+from experiments.operator import Console
+from experiments.rig import FakeOptions, Rig, build_rig, compiling_words
+from experiments.settings import RigSettings, Settings, TerrainRow
+
+
+def connect_rig(
+    settings: Settings,
+    row: TerrainRow,
+    fake: FakeOptions | None,
+    console: Console | None = None,
+) -> Rig:
+    """Return the rig with its bus open.
+
+    Args:
+        settings: of the rig.
+        row: of the matrix.
+        fake: how a simulation runs; None = the real rig.
+        console: where it is said that a simulation is compiled first.
+
+    Raises:
+        PreflightError: the CAN interface cannot be used.
+    """
+    if console is not None and fake is not None and fake.is_fast:
+        words = compiling_words()
+        if words:
+            console.say(words)
+    try:
+        return build_rig(settings, row, fake)
+    except LinkError as error:
+        raise not_reached(error, settings.rig) from error
+
+
+def not_reached(error: TractionError, settings: RigSettings) -> PreflightError:
+    """Return the refusal of an arm that cannot be reached, or answers wrongly.
+
+    A bus that is down gets the catalogue's message, with the command that helps.
+    """
+    is_up = isinstance(error, LinkTimeoutError | LinkFullError)
+    is_bus = isinstance(error, LinkError) and not is_up
+    can = settings.can
+    if not is_bus or can.interface != "socketcan":
+        return as_preflight(error, "not touched")
+    fields = {"channel": can.channel, "bitrate": can.bitrate}
+    return preflight_error("can-down", detail=error.message, **fields)
+
+
+def as_preflight(error: TractionError, arm_state: str) -> PreflightError:
+    """Return `error` as a refusal to begin; `arm_state` where it names none."""
+    arm_state = error.arm_state or arm_state
+    return PreflightError(error.message, hint=error.hint, arm_state=arm_state)

@@ -1,0 +1,275 @@
+# pyright: reportMissingImports=false
+"""What moves the arm: the seam, and the dynamics in Python and Pinocchio.
+
+    (M + dt D) (qd' - qd) = dt (tau + J_s^T w_s + J_h^T w_h + T^T f - nle)
+    q' = q + dt qd'
+
+nle at q and qd + dt qdd / 2, M with drive inertia, w_s the ground's wrench at the sole,
+w_h the hand's at the forearm, T the transmission, f the friction of the motors at qd.
+D is the diagonal of the damping of friction and stops, which is an addition to the
+armature, so one articulated-body pass solves it. What a differential adds beside the
+diagonal is smaller and taken explicitly: steps stay stable.
+
+`PinocchioBody` runs wherever the program does, `compiled` has the same in machine code.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from fakes.ground import NO_CONTACT, Terrain
+from fakes.kernels import PINOCCHIO
+from fakes.plant.joints import JointDrives, JointLoads, JointState
+from fakes.plant.model import ArmAndHand
+from fakes.plant.push import Vector3
+from wam.model import Array
+
+GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
+NO_GRIP = (0.0, 0.0)
+
+
+class HandLoad(NamedTuple):
+    """What the hand does in a cycle.
+
+    Attributes:
+        force: on the hand point, with the weight that the person carries [N].
+        grip: GRIP or NO_GRIP.
+    """
+
+    force: Vector3
+    grip: tuple[float, float]
+
+
+class ArmBody(Protocol):
+    """Seven joints, foot on the ground, hand on the forearm; terrain frame.
+
+    Attributes:
+        dynamics: name of the implementation.
+        disturbance: joint torques from outside [N m], shape (7,).
+    """
+
+    dynamics: str
+    disturbance: Array
+
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], shape (7,); as they are now, also later."""
+        ...
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        ...
+
+    @property
+    def rotation(self) -> Array:
+        """Frame 7 to terrain as it was when the cycle began, shape (3, 3)."""
+        ...
+
+    def move(self, q: Array) -> None:
+        """Be at `q` [rad] with the velocities of now."""
+        ...
+
+    def hold(self, *, is_held: bool) -> None:
+        """Let the brakes hold the joints, or let go of them."""
+        ...
+
+    def drive(self, units: Sequence[float]) -> None:
+        """Apply torques [puck units] to motors 1 to 7 from now on."""
+        ...
+
+    def counts(self) -> list[float]:
+        """Return what the encoders of the motors count, seven."""
+        ...
+
+    def motion(self) -> Sequence[float]:
+        """Return position, velocity and turning rate of the sole, nine numbers."""
+        ...
+
+    def hand_motion(self) -> tuple[Vector3, Vector3]:
+        """Return position [m] and velocity [m/s] of the hand point."""
+        ...
+
+    def linearise(self) -> None:
+        """Take positions and Jacobians anew, once per cycle."""
+        ...
+
+    def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
+        """Take anew what stays as it is for 2 ms from `t_ns` on."""
+        ...
+
+    def go_on(self, steps: int, terrain: Terrain | None) -> None:
+        """Go on by `steps` substeps within a cycle."""
+        ...
+
+    def take_ground(self) -> list[float]:
+        """Return the sum of the ground's wrenches since it was taken last, six."""
+        ...
+
+
+_AXES = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+_NOTHING = (0.0,) * 6
+
+
+class PinocchioBody:
+    """Implements `ArmBody`.
+
+    Attributes:
+        dynamics: name of the implementation.
+        disturbance: joint torques from outside [N m], shape (7,).
+        drives: of the joints.
+        rotation: frame 7 to terrain as it was when the cycle began, shape (3, 3).
+    """
+
+    dynamics = PINOCCHIO
+
+    def __init__(
+        self,
+        parts: ArmAndHand,
+        drives: JointDrives,
+        j2mp: Array,
+        q: Array,
+        times: tuple[float, float],
+    ) -> None:
+        """Stand still at `q`, held; the hand keeps the turn of now.
+
+        Args:
+            parts: the arm with the hand, its frames: sole and hand.
+            drives: of the joints.
+            j2mp: motor angle = j2mp @ joint angle, shape (7, 7).
+            q: joint positions [rad], shape (7,).
+            times: length of a substep, and how far into a cycle the Jacobians are
+                taken [s].
+        """
+        self._model, self._sole, self._hand = parts
+        self._data = self._model.createData()
+        self.drives, self.disturbance = drives, drives.disturbance
+        self._dt = times[0]
+        self._midway = np.array([1.0, times[1], 0.0])
+        self._is_held = True
+        self._sum = _NOTHING
+        self._force, self._grip = (0.0, 0.0, 0.0), NO_GRIP
+        self._joints = JointState(q, self._dt)
+        self._loads = JointLoads(j2mp)
+        pin.forwardKinematics(self._model, self._data, q)
+        hand = pin.updateFramePlacement(self._model, self._data, self._hand)
+        self._wanted = hand.rotation.copy()
+        self.linearise()
+        self._begin_drives(0)
+
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], shape (7,); as they are now, also later."""
+        return self._joints.rows[0]
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        return self._joints.rows[1]
+
+    def move(self, q: Array) -> None:
+        """Be at `q` [rad] with the velocities of now."""
+        self._joints.move(q)
+
+    def hold(self, *, is_held: bool) -> None:
+        """Let the brakes hold the joints, or let go of them."""
+        self._is_held = is_held
+        if is_held:
+            self._joints.rest(self.q)
+            self._rates, self._speeds = [0.0] * 12, [0.0] * 7
+            self.drives.rest()
+
+    def drive(self, units: Sequence[float]) -> None:
+        """Apply torques [puck units] to motors 1 to 7 from now on."""
+        self.drives.drive(units)
+
+    def counts(self) -> list[float]:
+        """Return what the encoders of the motors count, seven."""
+        return self.drives.counts(self.q).tolist()
+
+    def motion(self) -> Sequence[float]:
+        """Return position, velocity and turning rate of the sole, nine numbers."""
+        return (*self._sole_at, *self._rates[:6])
+
+    def hand_motion(self) -> tuple[Vector3, Vector3]:
+        """Return position [m] and velocity [m/s] of the hand point."""
+        x, y, z = self._rates[6:9]
+        return self._hand_at, (x, y, z)
+
+    def linearise(self) -> None:
+        """Take positions and Jacobians anew, once per cycle.
+
+        Within the 2 ms sole and hand move along them; the joints themselves and their
+        dynamics are never linearised. Everything is in the terrain frame.
+        """
+        model, data, A = self._model, self._data, self._loads.A
+        pin.forwardKinematics(model, data, self.q)
+        sole = pin.updateFramePlacement(model, data, self._sole)
+        hand = pin.updateFramePlacement(model, data, self._hand)
+        self.rotation = sole.rotation.copy()
+        x, y, z = sole.translation.tolist()
+        self._sole_at = (x, y, z)
+        x, y, z = hand.translation.tolist()
+        self._hand_at = (x, y, z)
+        (_, xy, xz), (yx, _, yz), (zx, zy, _) = self._wanted.dot(
+            hand.rotation.T
+        ).tolist()
+        self._tilt = (0.5 * (zy - yz), 0.5 * (xz - zx), 0.5 * (yx - xy))
+        pin.computeJointJacobians(model, data, self._midway.dot(self._joints.rows))
+        A[:6] = pin.getFrameJacobian(model, data, self._sole, _AXES)
+        A[6:12] = pin.getFrameJacobian(model, data, self._hand, _AXES)
+        rates = A.dot(self.qd).tolist()
+        self._rates, self._speeds = rates[:12], rates[12:]
+
+    def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
+        """Take anew what stays as it is for 2 ms from `t_ns` on."""
+        self._force, self._grip = load
+        self._begin_drives(t_ns)
+
+    def go_on(self, steps: int, terrain: Terrain | None) -> None:
+        """Go on by `steps` substeps within a cycle."""
+        for _ in range(steps):
+            self._step(terrain)
+
+    def take_ground(self) -> list[float]:
+        """Return the sum of the ground's wrenches since it was taken last, six."""
+        taken, self._sum = self._sum, _NOTHING
+        return list(taken)
+
+    def _begin_drives(self, t_ns: int) -> None:
+        self.drives.begin_cycle(self._joints.rows, self._speeds, t_ns)
+        self._model.armature = self.drives.armature
+
+    def _step(self, terrain: Terrain | None) -> None:
+        sx, sy, sz, fx, fy, fz, _, _, _, wx, wy, wz = self._rates
+        contact = NO_CONTACT
+        if terrain is not None:
+            contact = terrain.step(self._dt, (*self._sole_at, sx, sy, sz, fx, fy, fz))
+        F_t, F_y, F_n, M_x, M_y, M_z = contact
+        a, b, c, d, e, f = self._sum
+        self._sum = (a - F_t, b + F_y, c + F_n, d + M_x, e + M_y, f + M_z)
+        if not self._is_held:
+            k, b = self._grip
+            ex, ey, ez = self._tilt
+            turned = (k * ex - b * wx, k * ey - b * wy, k * ez - b * wz)
+            self._integrate((-F_t, F_y, F_n, M_x, M_y, M_z, *self._force, *turned))
+
+    def _integrate(self, wrench: tuple[float, ...]) -> None:
+        """Advance by one substep under `wrench` on foot and hand, twelve numbers."""
+        dt, state, drives = self._dt, self._joints.rows, self.drives
+        armature = drives.armature
+        against = drives.torques(state, self._speeds)
+        if drives.armature is not armature:
+            self._model.armature = drives.armature
+        tau = self._loads.torques(wrench, against, drives.driving)
+        qdd = pin.aba(self._model, self._data, state[0], state[2], tau)
+        motion = self._loads.A.dot(self._joints.step(qdd)[1]).tolist()
+        self._rates, self._speeds = rates, speeds = motion[:12], motion[12:]
+        drives.follow(speeds)
+        sx, sy, sz, _, _, _, _, _, _, wx, wy, wz = rates
+        x, y, z = self._sole_at
+        self._sole_at = (x + dt * sx, y + dt * sy, z + dt * sz)
+        x, y, z = self._tilt
+        self._tilt = (x - dt * wx, y - dt * wy, z - dt * wz)

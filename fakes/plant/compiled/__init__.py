@@ -1,0 +1,9 @@
+"""The simulated arm as a record of plain numbers, moved by compiled functions.
+
+`motion` is links and dynamics, `drives` friction and stops, `substeps` puts them
+together, `body` is what the plant sees. Begin with `body`.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

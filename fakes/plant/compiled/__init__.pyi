@@ -1,0 +1,3 @@
+from .body import CompiledBody
+
+__all__ = ["CompiledBody"]

@@ -1,0 +1,170 @@
+# pyright: basic
+"""The arm's dynamics in machine code: the same model, one call for many substeps."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fakes.ground import Terrain
+from fakes.ground.compiled import DONE, GIVEN, GROUND, CompiledGround
+from fakes.kernels import COMPILED, mark_ready
+from fakes.plant.body import HandLoad
+from fakes.plant.compiled.drives import take_drives
+from fakes.plant.compiled.motion import take_links
+from fakes.plant.compiled.substeps import BODY, begin_cycle, go_on
+from fakes.plant.joints import BEARING_NS
+from fakes.plant.model import ArmAndHand
+from fakes.plant.push import Vector3
+from wam.model import ArmConstants, Array, MotorFriction
+
+
+class CompiledBody:
+    """Implements `ArmBody` over a record.
+
+    Attributes:
+        dynamics: name of the implementation.
+        disturbance: joint torques from outside [N m], shape (7,).
+    """
+
+    dynamics = COMPILED
+
+    def __init__(
+        self,
+        parts: ArmAndHand,
+        constants: ArmConstants,
+        rubbing: tuple[MotorFriction, Array],
+        q: Array,
+        times: tuple[float, float],
+    ) -> None:
+        """Stand still at `q`, held; the hand keeps the turn of now.
+
+        Args:
+            parts: the arm with the hand, its frames: sole and hand.
+            constants: of the arm.
+            rubbing: friction of the motors, and what each moves when it turns
+                [kg m^2], shape (7,).
+            q: joint positions [rad], shape (7,).
+            times: length of a substep, and how far into a cycle the Jacobians are
+                taken [s].
+        """
+        self._bodies = np.zeros(1, BODY)
+        self._record = record = self._bodies[0]
+        self._no_ground, self._given = np.zeros(1, GROUND), np.zeros(1, GROUND)
+        self._given["kind"] = GIVEN
+        take_links(record, parts)
+        take_drives(record, constants, *rubbing, times[0])
+        record["midway"] = times[1]
+        self.disturbance = record["disturbance"]
+        self._motion, self._hand_rates = record["motion"], record["hand_rates"]
+        self._hand_at, self._rotation = record["hand_at"], record["foot_rotation"]
+        self._sum, self._sent, self._tau = record["sum"], record["sent"], record["tau"]
+        self._push, self._grip = record["push"], record["grip"]
+        self._driving = record["driving"]
+        self._ipnm = np.array(constants.ipnm, dtype=float)
+        self._j2mp_T = constants.j2mp.T.copy()
+        turns = np.array(constants.cts) / (2.0 * np.pi)
+        self._to_counts = turns[:, None] * constants.j2mp
+        self._rows = np.stack((q, np.zeros(7), np.zeros(7)))
+        self.hold(is_held=True)
+        self.linearise()
+        record["wanted"] = record["R"][5] @ record["hand_turn"]
+        self.linearise()
+        record["is_bearing"] = record["is_fresh"] = 1
+        go_on(self._bodies, self._no_ground, self._rows)  # no substep is left yet
+        mark_ready()
+
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], shape (7,); as they are now, also later."""
+        return self._rows[0]
+
+    @property
+    def qd(self) -> Array:
+        """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        return self._rows[1]
+
+    @property
+    def rotation(self) -> Array:
+        """Frame 7 to terrain as it was when the cycle began, shape (3, 3)."""
+        return self._rotation.copy()
+
+    def move(self, q: Array) -> None:
+        """Be at `q` [rad] with the velocities of now."""
+        self._rows = np.stack((q, *self._rows[1:]))
+
+    def hold(self, *, is_held: bool) -> None:
+        """Let the brakes hold the joints, or let go of them."""
+        self._record["is_held"] = is_held
+        if is_held:
+            self._rows = np.stack((self._rows[0], np.zeros(7), np.zeros(7)))
+            self._motion[3:] = self._hand_rates[:] = 0.0
+            self._record["speeds"] = 0.0
+            self._unbend()
+
+    def _unbend(self) -> None:
+        """Let go of what bends the bristles."""
+        record = self._record
+        record["z"], record["keep"], record["springs"] = 0.0, 1.0, record["s0"]
+        record["damping"] = record["of_bent"] + record["viscous"]
+
+    def drive(self, units: Sequence[float]) -> None:
+        """Apply torques [puck units] to motors 1 to 7 from now on."""
+        np.divide(units, self._ipnm, out=self._sent)
+        self._j2mp_T.dot(self._sent, out=self._tau)
+        np.add(self._tau, self.disturbance, out=self._driving)
+        if self._record["is_near"]:
+            self._driving += self._record["stop_torques"]
+
+    def counts(self) -> list[float]:
+        """Return what the encoders of the motors count, seven."""
+        return self._to_counts.dot(self._rows[0]).tolist()
+
+    def motion(self) -> Sequence[float]:
+        """Return position, velocity and turning rate of the sole, nine numbers."""
+        return self._motion.tolist()
+
+    def hand_motion(self) -> tuple[Vector3, Vector3]:
+        """Return position [m] and velocity [m/s] of the hand point."""
+        x, y, z = self._hand_at.tolist()
+        vx, vy, vz, _, _, _ = self._hand_rates.tolist()
+        return (x, y, z), (vx, vy, vz)
+
+    def linearise(self) -> None:
+        """Take positions and Jacobians anew, once per cycle."""
+        begin_cycle(self._bodies, self._rows)
+
+    def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
+        """Take anew what stays as it is for 2 ms from `t_ns` on."""
+        record = self._record
+        self._push[:], self._grip[:] = load
+        record["is_bearing"] = t_ns % BEARING_NS == 0
+        record["is_fresh"] = 1
+
+    def go_on(self, steps: int, terrain: Terrain | None) -> None:
+        """Go on by `steps` substeps within a cycle."""
+        if terrain is not None and not isinstance(terrain, CompiledGround):
+            self._go_on_given(steps, terrain)
+            return
+        self._rows = rows = self._rows.copy()  # what was taken of the old ones stays
+        self._record["left"] = steps
+        if terrain is None:
+            go_on(self._bodies, self._no_ground, rows)
+            return
+        while (event := go_on(self._bodies, terrain.records, rows)) != DONE:
+            terrain.draw(event, float(self._motion[0]))
+
+    def _go_on_given(self, steps: int, terrain: Terrain) -> None:
+        """Go on over a ground that Python steps."""
+        dt = float(self._record["dt"])
+        for _ in range(steps):
+            x, y, z, vx, vy, vz, wx, wy, wz = self._motion.tolist()
+            motion = (x, y, z, vx, vy, vz, wx, wy, wz)
+            self._given["contact"] = terrain.step(dt, motion)
+            self._rows, self._record["left"] = self._rows.copy(), 1
+            go_on(self._bodies, self._given, self._rows)
+
+    def take_ground(self) -> list[float]:
+        """Return the sum of the ground's wrenches since it was taken last, six."""
+        taken = self._sum.tolist()
+        self._sum[:] = 0.0
+        return taken

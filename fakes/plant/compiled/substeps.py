@@ -1,0 +1,94 @@
+# pyright: basic
+"""Substeps of the arm on its ground: the functions that Python calls; compiled.
+
+`bodies` and `grounds` are records as arrays of one, `rows` q, qd and qd half a step on,
+shape (3, 7).
+"""
+
+import numpy as np
+
+from fakes.ground.compiled import DONE, ground_step
+from fakes.kernels import inline, kernel
+from fakes.plant.compiled.drives import (
+    DRIVES,
+    begin_drives,
+    follow,
+    friction_torque,
+    resist,
+)
+from fakes.plant.compiled.motion import LINKS, accelerate, linearise, take_rates
+
+BODY = np.dtype(
+    [
+        *LINKS,
+        *DRIVES,
+        ("is_held", np.int64),
+        ("push", float, (3,)),  # on the hand, with the weight that the person carries
+        ("grip", float, (2,)),  # N m/rad, N m s/rad
+        ("sum", float, (6,)),  # of the ground's wrench
+        ("left", np.int64),  # substeps
+    ],
+    align=True,
+)
+
+
+@kernel
+def begin_cycle(bodies, rows):
+    """Take positions, Jacobians and rates anew."""
+    linearise(bodies[0], rows)
+
+
+@kernel
+def go_on(bodies, grounds, rows):
+    """Go on by the substeps that are left; return what a ground's step waits for."""
+    b, g = bodies[0], grounds[0]
+    if b.is_fresh:
+        begin_drives(b, rows)
+    while b.left > 0:
+        event = ground_step(g, b.dt, b.motion)
+        if event != DONE:
+            return event
+        w = g.contact
+        for k in range(6):
+            b.sum[k] += -w[k] if k == 0 else w[k]
+        if not b.is_held:
+            _integrate(b, w, rows)
+        b.left -= 1
+    return DONE
+
+
+@inline
+def _integrate(b, contact, rows):
+    resist(b, rows)
+    _take_torques(b, contact)
+    accelerate(b, rows[0], rows[2])
+    dt = b.dt
+    for i in range(7):
+        q, qd, qdd = rows[0, i], rows[1, i], b.qdd[i]
+        rows[0, i] = q + dt * qd + dt * dt * qdd
+        rows[1, i] = qd + dt * qdd
+        rows[2, i] = qd + 1.5 * dt * qdd
+    take_rates(b, rows[1])
+    follow(b)
+    for k in range(3):
+        b.motion[k] += dt * b.motion[3 + k]
+        b.tilt[k] -= dt * b.hand_rates[3 + k]
+
+
+@inline
+def _take_torques(b, contact):
+    """Turn the wrenches on foot and hand and the friction into torques."""
+    stiffness, damping = b.grip[0], b.grip[1]
+    for j in range(7):
+        b.torques[j] = b.driving[j]
+    for k in range(6):
+        force = -contact[k] if k == 0 else contact[k]
+        on_hand = b.push[k % 3]
+        if k >= 3:
+            on_hand = stiffness * b.tilt[k - 3] - damping * b.hand_rates[k]
+        for j in range(7):
+            b.torques[j] += b.A[k, j] * force + b.A[6 + k, j] * on_hand
+    for i in range(7):
+        against = friction_torque(b, i)
+        for j in range(7):
+            b.torques[j] += b.j2mp[i, j] * against
