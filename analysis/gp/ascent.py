@@ -22,12 +22,16 @@ Objective = Callable[[Array], tuple[float, Array]]
 
 _HOPELESS = 1e25  # objective where no jitter helps
 _SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
-_REACH = 1.5  # of theta that an approximation is climbed over before it is made anew
-_NEARLY = 0.5  # a shorter way needs no other approximation
-_APPROACHES = 4  # approximations made on the way
+_REACH = 2.0  # of theta that an approximation is climbed over before it is made anew
+_NEARLY = 1.0  # a shorter way needs no other approximation
 _CORRECTIONS = 6  # steps by corrected slopes; two or three do
-_GAIN = 1e-6  # log likelihood below which a step is not worth an exact evaluation
-_FAIR, GOOD = 200.0, 0.15  # error that an approximation may have at most, about twice
+_GAIN = 3e-6  # log likelihood below which a step is not worth an exact evaluation
+# twice the error that approximations aim at, and that they may have at most: on the
+# way, one after the other, and at the top
+_FAIR, GOOD = ((0.1, 200.0), (0.1, 5.0), (0.1, 5.0)), (0.1, 0.15)
+_DIFFERENCE = 1e-4  # of theta, for second derivatives
+_FLAT = 1e-2  # smallest second derivative that counts
+_FURTHEST = 0.3  # that a parabola is believed
 _ROUGH, _FINE, _PRECISE = 1e-6, 1e-8, 2e-9  # relative changes that end a climb
 _KEPT = 0.3  # share of the promised gain below which an approximation is given up
 
@@ -68,12 +72,12 @@ class Approximated(NamedTuple):
 
     Attributes:
         exact: theta -> likelihood and its slope; may raise SettingsError.
-        near: theta, t -> the same of an approximation around theta whose error there is
-            about t / 2 at most; None where there is none.
+        near: theta, errors -> the same of an approximation around theta; None where its
+            error would be too large.
     """
 
     exact: Objective
-    near: Callable[[Array, float], Objective | None]
+    near: Callable[[Array, tuple[float, float]], Objective | None]
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
         """Return the exact likelihood and its slope."""
@@ -94,13 +98,16 @@ def climb(
     theta = np.clip(start, *box.bounds.T)
     if not isinstance(objective, Approximated):
         return _climb_exactly(objective, theta, box, known)
-    end, is_top = _corrected(
-        objective, _approached(objective, theta, box, known), box, known
-    )
+    theta = _approached(objective, theta, box, known)
+    end, is_top = _corrected(objective, theta, box, known)
     if is_top:
         return end
     rest = _climb_exactly(objective, np.array(end.theta), box, known)
-    return rest._replace(evaluations=end.evaluations + rest.evaluations)
+    # on a ridge that may stop short of the top
+    last, _ = _corrected(objective, np.array(rest.theta), box, known)
+    best = max(rest, last, key=lambda start: start.lml)
+    spent = end.evaluations + rest.evaluations + last.evaluations
+    return best._replace(evaluations=spent)
 
 
 def _climb_exactly(
@@ -123,8 +130,8 @@ def _approached(
     def is_enough(theta: Array, lml: float) -> bool:
         return _is_near(theta, lml, known)
 
-    for _ in range(_APPROACHES):
-        near = objective.near(theta, _FAIR)
+    for error in _FAIR:
+        near = objective.near(theta, error)
         if near is None:
             break
         before, region = theta, box.around(theta, _REACH)
@@ -139,6 +146,8 @@ def _corrected(
 ) -> tuple[Start, bool]:
     """Return where the approximation leads to when it has the exact slope.
 
+    Its parabola for short steps; for longer ones, and where that fails, itself.
+
     Returns:
         Where that ends, and whether it is a top or just below a known one; if not, the
         approximation is too poor.
@@ -147,22 +156,57 @@ def _corrected(
     if near is None:
         return Start(_plain(theta), -_HOPELESS, 0), False
     lml, slope = _tried(objective, theta)
-    here, spent = Start(_plain(theta), lml, 1), 1
-    while spent <= _CORRECTIONS:
-        if _is_below(theta, lml, known):
-            return here, True
-        found = _stepped(near, (theta, slope), box)
-        if found.value < 0.0:  # it cannot be evaluated at all
-            break
-        if found.value < _GAIN:
-            return here, True
+    if _is_below(theta, lml, known):
+        return Start(_plain(theta), lml, 1), True
+    bend, is_bent, spent = _curvature(near, theta, box), False, 1
+    while spent < _CORRECTIONS:
+        at = theta, slope
+        found = _vertex(bend, at, box)
+        if is_bent or np.abs(found.theta - theta).max() > _FURTHEST:
+            found, is_bent = _stepped(near, at, box), True
+        if 0.0 <= found.value < _GAIN:
+            return Start(_plain(theta), lml, spent), True
+        better, new_slope = _tried(objective, found.theta)
         spent += 1
-        new_lml, slope = _tried(objective, found.theta)
-        if new_lml < lml + _KEPT * found.value:
+        is_kept = better >= lml + _KEPT * found.value and found.value > 0.0
+        if better > lml:
+            theta, lml, slope = found.theta, better, new_slope
+        if not is_kept and is_bent:
             break
-        theta, lml = found.theta, new_lml
-        here = Start(_plain(theta), lml, spent)
-    return here._replace(evaluations=spent), False
+        is_bent = not is_kept
+    return Start(_plain(theta), lml, spent), False
+
+
+def _curvature(near: Objective, theta: Array, box: SearchBox) -> Array:
+    """Return minus the second derivatives of an approximation, shape (p, p)."""
+    inwards = np.where(theta < box.bounds.mean(axis=1), _DIFFERENCE, -_DIFFERENCE)
+    slope = _tried(near, theta)[1]
+    rows = [
+        (slope - _tried(near, theta + step)[1]) / step.sum()
+        for step in np.diag(inwards)
+    ]
+    return 0.5 * (np.array(rows) + np.array(rows).T)
+
+
+def _vertex(bend: Array, at: tuple[Array, Array], box: SearchBox) -> "_Found":
+    """Return the top of a parabola in the box, and what it promises.
+
+    Directions along which it is flat, or bends upwards, count as bent a little.
+
+    Args:
+        bend: minus its second derivatives, shape (p, p).
+        at: theta, and the slope there.
+        box: where the top is sought.
+    """
+    (theta, slope), (low, high) = at, box.bounds.T
+    is_held = ((theta <= low) & (slope < 0.0)) | ((theta >= high) & (slope > 0.0))
+    free = np.flatnonzero(~is_held)
+    bends, ways = np.linalg.eigh(bend[np.ix_(free, free)])
+    step = np.zeros(theta.size)
+    step[free] = ways @ ((ways.T @ slope[free]) / np.maximum(bends, _FLAT))
+    top = np.clip(theta + step, low, high)
+    step = top - theta
+    return _Found(top, float(slope @ step - 0.5 * step @ bend @ step), 0)
 
 
 def _stepped(near: Objective, at: tuple[Array, Array], box: SearchBox) -> "_Found":

@@ -29,8 +29,7 @@ from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
 _MOST = 90  # pivots beyond which an evaluation costs half of an exact one
-_TRACE = 0.1  # t that pivots are chosen for
-_LEAST = 1e-3  # t at which there is nothing left to choose pivots from
+_LEAST = 1e-6  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 
 Columns = Callable[[Array], ColumnsAt]
@@ -117,29 +116,24 @@ class LowRankLikelihood:
         return weight
 
 
-def choose_pivots(
-    model: tuple[Kernel, Noise], X: Array, theta: Array, trace: float
-) -> Indices | None:
-    """Return the rows that serve as pivots around theta; None where it takes too many.
+def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | None:
+    """Return the rows that serve as pivots; None where it takes too many.
 
     Args:
-        model: kernel and noise.
-        X: inputs, shape (n, d).
-        theta: hyperparameters.
-        trace: t that the pivots may leave.
+        K: covariances of all rows, shape (n, n); only the upper triangle is read.
+        S: variances of the noise, shape (n,).
+        trace: t that pivots are chosen for, and that they may leave where there are
+            never enough.
     """
-    kernel, noise = model
-    theta_kernel, theta_noise = split(kernel, theta)
-    root = 1.0 / np.sqrt(noise.evaluate(theta_noise, X)[0])
-    K = kernel.over(X)(theta_kernel)[0]
+    root = 1.0 / np.sqrt(S)
     # the upper triangle in C's order is the lower one in Fortran's
     scaled = (K * root * root[:, None]).T
     total, n = float(np.trace(scaled)), root.size
     L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
     tail = total - np.cumsum(np.einsum("nm,nm->m", *[np.tril(L[:, :rank])] * 2))
-    needed = 1 + int(np.count_nonzero(tail > _TRACE))
+    needed = 1 + int(np.count_nonzero(tail > trace[0]))
     count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
-    return order[:count] - 1 if tail[count - 1] < trace else None
+    return order[:count] - 1 if tail[count - 1] < trace[1] else None
 
 
 def _inverse_factor(A: Array) -> tuple[Array, float]:
@@ -156,7 +150,7 @@ def _inverse_factor(A: Array) -> tuple[Array, float]:
 
 
 # theta, t -> an approximation that is good around it; None where there is none
-Near = Callable[[Array, float], "LowRankLikelihood | None"]
+Near = Callable[[Array, tuple[float, float]], "LowRankLikelihood | None"]
 
 
 def near_over(
@@ -171,8 +165,13 @@ def near_over(
     if columns is None:
         return lambda theta, trace: None
 
-    def near(theta: Array, trace: float) -> LowRankLikelihood | None:
-        pivots = choose_pivots(model, X, theta, trace)
+    kernel, noise = model
+    covariance = kernel.over(X)
+
+    def near(theta: Array, trace: tuple[float, float]) -> LowRankLikelihood | None:
+        theta_kernel, theta_noise = split(kernel, theta)
+        S, _ = noise.evaluate(theta_noise, X)
+        pivots = choose_pivots(covariance(theta_kernel)[0], S, trace)
         if pivots is None:
             return None
         return LowRankLikelihood(model, X, r, pivots, columns)

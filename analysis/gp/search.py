@@ -212,8 +212,10 @@ def _finish(objective: Objective, box: SearchBox, reached: list[Start]) -> Start
     """
     k = int(np.argmax([start.lml for start in reached]))
     end, theta = reached[k], np.array(reached[k].theta)
-    if isinstance(objective, Approximated) and objective.near(theta, GOOD) is not None:
-        return end
+    if isinstance(objective, Approximated):
+        if objective.near(theta, GOOD) is not None:
+            return end
+        objective = objective.exact
     more = climb(objective, theta, box, [])
     best = max(end, more, key=lambda start: start.lml)
     reached[k] = best._replace(evaluations=end.evaluations + more.evaluations)
@@ -245,7 +247,7 @@ def objective_of(
         near: its approximations.
     """
 
-    def near_with_prior(theta: Array, trace: float) -> Objective | None:
+    def near_with_prior(theta: Array, trace: tuple[float, float]) -> Objective | None:
         found = near(theta, trace)
         return None if found is None else _with_prior(model, found)
 

@@ -105,8 +105,9 @@ def test_pivots_leave_no_more_than_they_may(model, trace):
     kernel, noise = model
     for seed in range(5):
         theta = drawn(model, np.random.default_rng(seed))
-        pivots = choose_pivots(model, X, theta, trace)
         S = noise.evaluate(theta[3:], X)[0]
+        K = kernel.matrix(theta[:3], X, X)
+        pivots = choose_pivots(K, S, (trace, trace))
         assert pivots is not None
         assert np.unique(pivots).size == pivots.size <= 40
         assert left(kernel, theta[:3], S, X, pivots) <= trace
@@ -116,13 +117,13 @@ def test_a_rough_function_has_no_approximation():
     X, r, _ = rows()
     near = near_over((SE, ConstantNoise()), X, r, None)
     # lengths of the distance between rows: every row tells something of its own
-    assert near(np.log([3.0, 0.05, 0.05, 0.3]), 0.1) is None
-    assert near(np.log([1.0, 2.0, 2.0, 0.3]), 0.1) is not None
+    assert near(np.log([3.0, 0.05, 0.05, 0.3]), (0.1, 0.1)) is None
+    assert near(np.log([1.0, 2.0, 2.0, 0.3]), (0.1, 0.1)) is not None
 
 
 def test_a_drift_along_the_trials_has_no_approximation():
     X, r, trials = rows()
     noise = TrialNoise(has_drift=True)
     theta = np.log([1.0, 2.0, 2.0, 0.3, 0.3, 0.5, 0.5])
-    assert near_over((SE, noise), X, r, trials)(theta, 1e3) is None
+    assert near_over((SE, noise), X, r, trials)(theta, (1.0, 1e3)) is None
     assert columns_over(noise, X, trials) is None
