@@ -119,7 +119,7 @@ def _climb_exactly(
         return _is_below(theta, lml, known)
 
     found = _maximised(objective, theta, box, (_PRECISE, is_enough))
-    return Start(_plain(found.theta), found.value, found.evaluations)
+    return Start(tuple(found.theta.tolist()), found.value, found.evaluations)
 
 
 def _approached(
@@ -128,7 +128,7 @@ def _approached(
     """Return where climbing approximations leads; theta itself where there is none."""
 
     def is_enough(theta: Array, lml: float) -> bool:
-        return _is_near(theta, lml, known)
+        return bool(_tops_at(theta, lml, known))
 
     for error in _FAIR:
         near = objective.near(theta, error)
@@ -154,10 +154,10 @@ def _corrected(
     """
     near = objective.near(theta, GOOD)
     if near is None:
-        return Start(_plain(theta), -_HOPELESS, 0), False
+        return Start(tuple(theta.tolist()), -_HOPELESS, 0), False
     lml, slope = _tried(objective, theta)
     if _is_below(theta, lml, known):
-        return Start(_plain(theta), lml, 1), True
+        return Start(tuple(theta.tolist()), lml, 1), True
     bend, is_bent, spent = _curvature(near, theta, box), False, 1
     while spent < _CORRECTIONS:
         at = theta, slope
@@ -165,7 +165,7 @@ def _corrected(
         if is_bent or np.abs(found.theta - theta).max() > _FURTHEST:
             found, is_bent = _stepped(near, at, box), True
         if 0.0 <= found.value < _GAIN:
-            return Start(_plain(theta), lml, spent), True
+            return Start(tuple(theta.tolist()), lml, spent), True
         better, new_slope = _tried(objective, found.theta)
         spent += 1
         is_kept = better >= lml + _KEPT * found.value and found.value > 0.0
@@ -174,7 +174,7 @@ def _corrected(
         if not is_kept and is_bent:
             break
         is_bent = not is_kept
-    return Start(_plain(theta), lml, spent), False
+    return Start(tuple(theta.tolist()), lml, spent), False
 
 
 def _curvature(near: Objective, theta: Array, box: SearchBox) -> Array:
@@ -284,21 +284,13 @@ def _tried(objective: Objective, theta: Array) -> tuple[float, Array]:
         return -_HOPELESS, np.zeros_like(theta)
 
 
-def _plain(theta: Array) -> tuple[float, ...]:
-    return tuple(theta.tolist())
-
-
 def _is_below(theta: Array, lml: float, known: Sequence[Start]) -> bool:
     """Return whether theta is just below a known top."""
     return any(lml <= top.lml for top in _tops_at(theta, lml, known))
 
 
-def _is_near(theta: Array, lml: float, known: Sequence[Start]) -> bool:
-    """Return whether theta is near a known top, by a likelihood that is not exact."""
-    return bool(_tops_at(theta, lml, known))
-
-
 def _tops_at(theta: Array, lml: float, known: Sequence[Start]) -> list[Start]:
+    """Return the known tops that are near, in theta and in likelihood."""
     near, low = _SAME_TOP
     return [
         top

@@ -130,6 +130,8 @@ def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | N
     scaled = (K * root * root[:, None]).T
     total, n = float(np.trace(scaled)), root.size
     L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
+    if not rank:  # no function at all
+        return None
     tail = total - np.cumsum(np.einsum("nm,nm->m", *[np.tril(L[:, :rank])] * 2))
     needed = 1 + int(np.count_nonzero(tail > trace[0]))
     count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
