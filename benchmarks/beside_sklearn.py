@@ -16,7 +16,7 @@ from sklearn.gaussian_process.kernels import (
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise
-from analysis.gp.regression import posterior_search
+from analysis.gp.search import posterior_search
 
 KERNELS = {"SE fit": SquaredExponential(), "NN fit": Arcsine()}
 

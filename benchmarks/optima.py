@@ -17,7 +17,7 @@ from analysis.data.series import Array
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
-from analysis.gp.regression import posterior_search
+from analysis.gp.search import posterior_search
 from analysis.study.crossval import FoldTask
 from analysis.study.jobs import run_tasks
 from analysis.study.models import FITTERS, TUSTIN

@@ -35,15 +35,15 @@ class Factor(NamedTuple):
 
     def solve(self, r: Array) -> Array:
         """Return C^-1 r, shape (n,)."""
-        return _lapack("potrs")(self.L, r, lower=1)[0]
+        return lapack("potrs")(self.L, r, lower=1)[0]
 
     def half(self, r: Array) -> Array:
         """Return L^-1 r, of the shape of r."""
-        return _lapack("trtrs")(self.L, r, lower=1)[0]
+        return lapack("trtrs")(self.L, r, lower=1)[0]
 
     def inverse(self) -> Array:
         """Return C^-1, shape (n, n)."""
-        lower, _ = _lapack("potri")(self.L, lower=1)
+        lower, _ = lapack("potri")(self.L, lower=1)
         return lower + np.tril(lower, -1).T
 
 
@@ -73,7 +73,7 @@ def factorise(
         C.T.flat[:: S.size + 1] += S + jitter
         for rows, block in blocks:
             C[rows, rows] += block
-        L, info = _lapack("potrf")(C, lower=1, clean=1, overwrite_a=1)
+        L, info = lapack("potrf")(C, lower=1, clean=1, overwrite_a=1)
         if info == 0:
             return Factor(L, jitter)
     raise SettingsError(
@@ -168,8 +168,8 @@ class Likelihood:
     def _minus_weight(self, L: Array, alpha: Array) -> Array:
         """Return the lower triangle of C^-1 - alpha alpha', zero above."""
         _invert(L, self._inverse, 0, alpha.size)
-        inverse, _ = _lapack("lauum")(self._inverse, lower=1, overwrite_c=1)
-        return _lapack("syr")(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)
+        inverse, _ = lapack("lauum")(self._inverse, lower=1, overwrite_c=1)
+        return lapack("syr")(-1.0, alpha, lower=1, a=inverse, overwrite_a=1)
 
 
 def split(kernel: Kernel, theta: Array) -> tuple[Array, Array]:
@@ -185,7 +185,7 @@ def _invert(L: Array, inverse: Array, low: int, high: int) -> None:
     """
     if high - low <= _SMALL:
         block = slice(low, high)
-        inverse[block, block] = _lapack("trtri")(L[block, block], lower=1)[0]
+        inverse[block, block] = lapack("trtri")(L[block, block], lower=1)[0]
         return
     middle = (low + high) // 2
     upper, lower = slice(low, middle), slice(middle, high)
@@ -197,7 +197,8 @@ def _invert(L: Array, inverse: Array, low: int, high: int) -> None:
 
 
 @lru_cache
-def _lapack(name: str) -> Callable[..., Any]:
+def lapack(name: str) -> Callable[..., Any]:
+    """Return a routine of LAPACK for double precision, by its name without a prefix."""
     from scipy.linalg import get_blas_funcs, get_lapack_funcs
 
     get: Any = get_blas_funcs if name == "syr" else get_lapack_funcs

@@ -11,23 +11,16 @@ from scipy.linalg import solve_triangular
 
 from acquisition import SettingsError
 from analysis.data import Array
+from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, Likelihood, factorise, split
+from analysis.gp.low_rank import near_over
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import (
-    Objective,
-    Optimum,
-    Start,
-    StartScores,
-    climb_from,
-    maximise,
-    spread,
-)
+from analysis.gp.search import climb_from, objective_of, posterior_search, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
 
-_ROUGH = 150  # rows by which the first starts are chosen
 _SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
 _LONG = 1.0  # logarithm of a length from which on an input may be idle
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
@@ -142,33 +135,6 @@ class GaussianProcess:
         return mean, variance
 
 
-def posterior_search(
-    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
-) -> Optimum:
-    """Return the hyperparameters of largest likelihood times the noise's prior."""
-    likelihood = Likelihood(model, X, r, trials)
-    thin = slice(None, None, -(-r.size // _ROUGH))
-    rough = Likelihood(
-        model, X[thin], r[thin], None if trials is None else trials.take(thin)
-    )
-    scores = StartScores(rough.value, likelihood.value)
-    objective = _with_prior(model, likelihood)
-    return maximise(model, objective, X, float(np.std(r)), scores)
-
-
-def _with_prior(model: tuple[Kernel, Noise], likelihood: Likelihood) -> Objective:
-    """Return the likelihood with the noise's prior, and its slope."""
-    kernel, noise = model
-
-    def objective(theta: Array) -> tuple[float, Array]:
-        lml, slope = likelihood(theta)
-        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
-        slope[-prior_slope.size :] += prior_slope
-        return lml + prior, slope
-
-    return objective
-
-
 def _factor(
     model: tuple[Kernel, Noise], theta: Array, X: Array, trials: TrialRows | None
 ) -> Factor:
@@ -265,8 +231,8 @@ def _climbed(process: GaussianProcess, y: Array, start: Array) -> GaussianProces
     """Return the process of outputs y that a climb from `start` leads to."""
     model = (process.kernel, process.noise)
     offset = float(y.mean()) if process.offset else 0.0
-    likelihood = Likelihood(model, process.X, y - offset, process.trials)
-    objective = _with_prior(model, likelihood)
+    rows = (process.X, y - offset, process.trials)
+    objective = objective_of(model, Likelihood(model, *rows), near_over(model, *rows))
     optimum = climb_from(model, objective, process.X, float(np.std(y - offset)), start)
     factor = _factor(model, optimum.theta, process.X, process.trials)
     return replace(

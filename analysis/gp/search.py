@@ -15,19 +15,21 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array
+from analysis.gp.ascent import GOOD, Approximated, Objective, SearchBox, Start, climb
 from analysis.gp.kernels import Kernel
+from analysis.gp.likelihood import Likelihood, split
+from analysis.gp.low_rank import Near, near_over
 from analysis.gp.noise import Noise
+from analysis.gp.trial_noise import TrialRows
 
-Objective = Callable[[Array], tuple[float, Array]]
 Score = Callable[[Array], float]
 
-_HOPELESS = 1e25  # objective where no jitter helps
 _AT_BOUND = 1e-3
 _NOISE_STEP = 0.1  # the likelihood bends most along the noise: its steps are shorter
 _APART = 1.5  # of starts in one of the shape: two steps of the lengths offered
 _ELSEWHERE = 1.0  # a start nearer to a known top leads back to it
+_ROUGH = 150  # rows by which the first starts are chosen
 _FLAT = 3.0  # logarithm from which on a length or bias makes no difference
-_SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
 
 
 class StartScores(NamedTuple):
@@ -40,20 +42,6 @@ class StartScores(NamedTuple):
 
     rough: Score
     exact: Score
-
-
-class Start(NamedTuple):
-    """One start of the search and what it reached.
-
-    Attributes:
-        theta: hyperparameters at its end: a top, or just below the top of another.
-        lml: log marginal likelihood there, priors included.
-        evaluations: how often the likelihood was evaluated.
-    """
-
-    theta: tuple[float, ...]
-    lml: float
-    evaluations: int
 
 
 class Optimum(NamedTuple):
@@ -91,7 +79,7 @@ def maximise(
         scores: what starts are chosen by.
     """
     kernel, noise = model
-    bounds, steps = _box(model, X, sd_y)
+    box = _box(model, X, sd_y)
     rough, exact = scores
     offered = [
         np.concatenate([point, noise.start(sd_y)])
@@ -100,10 +88,10 @@ def maximise(
     began = _first_starts(kernel, offered, rough)
     reached: list[Start] = []
     for start in began:
-        reached.append(climb(objective, start, (bounds, steps), reached))
-    began.append(_last_start(kernel, offered, exact, (began, reached), bounds))
-    reached.append(climb(objective, began[-1], (bounds, steps), reached))
-    return _optimum(model, objective, (bounds, steps), (began, reached))
+        reached.append(climb(objective, start, box, reached))
+    began.append(_last_start(kernel, offered, exact, (began, reached), box))
+    reached.append(climb(objective, began[-1], box, reached))
+    return _optimum(model, objective, box, (began, reached))
 
 
 def climb_from(
@@ -127,18 +115,18 @@ def climb_from(
     return _optimum(model, objective, box, ([start], reached))
 
 
-def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> tuple[Array, Array]:
-    """Return the bounds of theta, shape (p, 2), and the size of its steps, (p,)."""
+def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> SearchBox:
+    """Return where theta is sought."""
     kernel, noise = model
     bounds = np.vstack([kernel.bounds(sd_y, spread(X)), noise.bounds(sd_y)])
     steps = np.repeat([1.0, _NOISE_STEP], [len(kernel.names), len(noise.names)])
-    return bounds, steps
+    return SearchBox(bounds, steps)
 
 
 def _optimum(
     model: tuple[Kernel, Noise],
     objective: Objective,
-    box: tuple[Array, Array],
+    box: SearchBox,
     climbed: tuple[Sequence[Array], list[Start]],
 ) -> Optimum:
     """Return the best of what the starts reached, climbed on from."""
@@ -146,7 +134,7 @@ def _optimum(
     began, reached = climbed
     best = _finish(objective, box, reached)
     theta = np.array(best.theta)
-    is_edge = np.abs(box[0] - theta[:, None]).min(axis=1) < _AT_BOUND
+    is_edge = np.abs(box.bounds - theta[:, None]).min(axis=1) < _AT_BOUND
     edges = np.array([*kernel.names, *noise.names])[is_edge]
     return Optimum(
         theta, best.lml, tuple(reached), tuple(began), tuple(map(str, edges))
@@ -174,7 +162,7 @@ def _last_start(
     offered: Sequence[Array],
     exact: Score,
     known: tuple[Sequence[Array], Sequence[Start]],
-    bounds: Array,
+    box: SearchBox,
 ) -> Array:
     """Return the likeliest point that may belong to another top.
 
@@ -186,7 +174,7 @@ def _last_start(
         offered: points that a search may start with.
         exact: theta -> likelihood of all rows.
         known: where other starts began, and what they reached.
-        bounds: of theta, shape (p, 2).
+        box: where theta is sought.
     """
     began, reached = known
     count = len(kernel.names)
@@ -195,7 +183,7 @@ def _last_start(
     moved = kernel.moves(best[:count])
     unused = [t[:count] for t in offered if _gap(kernel, t, began) >= _APART]
     points = [
-        np.clip(np.concatenate([point, best[count:]]), *bounds.T)
+        np.clip(np.concatenate([point, best[count:]]), *box.bounds.T)
         for point in moved or unused
     ]
     far = [point for point in points if _gap(kernel, point, tops) >= _ELSEWHERE]
@@ -216,66 +204,64 @@ def _scored(score: Score, theta: Array) -> float:
         return -np.inf
 
 
-def climb(
-    objective: Objective,
-    start: Array,
-    box: tuple[Array, Array],
-    known: Sequence[Start],
-) -> Start:
-    """Return where a start ends: on a top, or just below one of those known.
-
-    Args:
-        objective: theta -> likelihood and its slope.
-        start: theta to begin with.
-        box: bounds of theta, shape (p, 2), and the size of its steps, shape (p,).
-        known: what other starts have reached.
-    """
-    from scipy.optimize import OptimizeResult, minimize
-
-    bounds, steps = box
-
-    def downhill(x: Array) -> tuple[float, Array]:
-        try:
-            lml, slope = objective(x * steps)
-        except SettingsError:
-            return _HOPELESS, np.zeros_like(x)
-        return -lml, -slope * steps
-
-    def look(intermediate_result: OptimizeResult) -> None:
-        if _is_below(intermediate_result.x * steps, -intermediate_result.fun, known):
-            raise StopIteration
-
-    optimum = minimize(
-        downhill,
-        np.clip(start, bounds[:, 0], bounds[:, 1]) / steps,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds / steps[:, None],
-        callback=look,
-        options={"maxiter": 200, "gtol": 1e-5, "ftol": 2e-9},
-    )
-    theta = tuple(float(value) for value in optimum.x * steps)
-    return Start(theta, -float(optimum.fun), int(optimum.nfev))
-
-
-def _finish(
-    objective: Objective, box: tuple[Array, Array], reached: list[Start]
-) -> Start:
+def _finish(objective: Objective, box: SearchBox, reached: list[Start]) -> Start:
     """Climb on from the best end, put what that reaches in its place and return it.
 
-    On a ridge a climb may stop short of the top; without its memory it goes on.
+    On a ridge a climb may stop short of the top; without its memory it goes on. Where
+    an approximation is good, it was climbed last and promises no more.
     """
     k = int(np.argmax([start.lml for start in reached]))
-    end, more = reached[k], climb(objective, np.array(reached[k].theta), box, [])
+    end, theta = reached[k], np.array(reached[k].theta)
+    if isinstance(objective, Approximated):
+        if objective.near(theta, GOOD) is not None:
+            return end
+        objective = objective.exact
+    more = climb(objective, theta, box, [])
     best = max(end, more, key=lambda start: start.lml)
     reached[k] = best._replace(evaluations=end.evaluations + more.evaluations)
     return reached[k]
 
 
-def _is_below(theta: Array, lml: float, known: Sequence[Start]) -> bool:
-    """Return whether theta is just below a known top."""
-    near, low = _SAME_TOP
-    return any(
-        top.lml - low < lml <= top.lml and np.abs(theta - top.theta).max() < near
-        for top in known
+def posterior_search(
+    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
+) -> Optimum:
+    """Return the hyperparameters of largest likelihood times the noise's prior."""
+    likelihood = Likelihood(model, X, r, trials)
+    thin = slice(None, None, -(-r.size // _ROUGH))
+    rough = Likelihood(
+        model, X[thin], r[thin], None if trials is None else trials.take(thin)
     )
+    scores = StartScores(rough.value, likelihood.value)
+    objective = objective_of(model, likelihood, near_over(model, X, r, trials))
+    return maximise(model, objective, X, float(np.std(r)), scores)
+
+
+def objective_of(
+    model: tuple[Kernel, Noise], likelihood: Objective, near: Near
+) -> Approximated:
+    """Return what is climbed: the likelihood times the noise's prior.
+
+    Args:
+        model: kernel and noise.
+        likelihood: the exact one.
+        near: its approximations.
+    """
+
+    def near_with_prior(theta: Array, trace: tuple[float, float]) -> Objective | None:
+        found = near(theta, trace)
+        return None if found is None else _with_prior(model, found)
+
+    return Approximated(_with_prior(model, likelihood), near_with_prior)
+
+
+def _with_prior(model: tuple[Kernel, Noise], likelihood: Objective) -> Objective:
+    """Return the likelihood with the noise's prior, and its slope."""
+    kernel, noise = model
+
+    def objective(theta: Array) -> tuple[float, Array]:
+        lml, slope = likelihood(theta)
+        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
+        slope[-prior_slope.size :] += prior_slope
+        return lml + prior, slope
+
+    return objective

@@ -11,13 +11,11 @@ import numpy as np
 from analysis.data import Array
 from analysis.tustin.identifiability import Interval
 from analysis.tustin.model import TustinBounds, TustinFit, TustinForm
-from analysis.tustin.moments import Moments, solve_moments
+from analysis.tustin.moments import Moments, solve_moments, zoom
 from analysis.tustin.varpro import Box, Problem
 
 DRAWS = 200
 _GRID = (12, 8)
-_ZOOMS = 8  # every one halves the step of the grid
-_STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
 
 Rows = tuple[Array, Array, Array]
 
@@ -74,12 +72,10 @@ def _coarse(sums: Array, v: Array, box: Box, warm: Array) -> Array:
 def _zoom(sums: Array, v: Array, q: Array, box: Box) -> Array:
     """Return the points after going to the best neighbour in ever smaller steps."""
     low, high = box.logarithmic.T
+
+    def sse(near: Array) -> Array:
+        points = near.swapaxes(0, 1)
+        return np.stack([solve_moments(sums, v, q, box)[1] for q in points], axis=1)
+
     step = (high - low) / (np.array(_GRID) - 1.0)
-    for _ in range(_ZOOMS):
-        near = np.clip(q[:, None, :] + step * _STAR, low, high)
-        sse = np.stack(
-            [solve_moments(sums, v, near[:, k], box)[1] for k in range(len(_STAR))], 1
-        )
-        q = near[np.arange(q.shape[0]), np.argmin(sse, axis=1)]
-        step = 0.5 * step
-    return q
+    return zoom(sse, q, step, box.logarithmic)

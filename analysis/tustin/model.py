@@ -14,8 +14,14 @@ import numpy as np
 from acquisition import SettingsError
 from analysis.data import Array
 from analysis.tustin.identifiability import Profiles, is_identifiable, is_straight
-from analysis.tustin.moments import Loss, Moments, profiles, search_robustly
-from analysis.tustin.varpro import Box, Point, Problem, search, stribeck_power
+from analysis.tustin.moments import (
+    Loss,
+    Moments,
+    profiles,
+    search,
+    search_robustly,
+)
+from analysis.tustin.varpro import Box, Point, Problem, stribeck_power
 
 MINIMUM_ROWS = 20  # four per parameter
 NEGATIVE_B = "b negative"  # nonphysical, like a negative mu or F_s

@@ -2,11 +2,12 @@
 
 Given (v_s, delta_s) the normal equations need the samples only through e(v) times
 products of F_n, v_t, F_t and 1. Sums of those over bins of 2 % of velocity, one set per
-trial, make a fit of any mixture of trials as cheap as a few hundred rows: profiles and
-hundreds of bootstrap draws at once. Single fits use the samples themselves.
+trial, make a fit of any mixture of trials as cheap as a few hundred rows: the scan of a
+search, profiles, and hundreds of bootstrap draws at once. What a search ends with comes
+from the samples themselves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -20,12 +21,17 @@ from analysis.tustin.varpro import (
     Point,
     Problem,
     polish,
-    search,
 )
 
 _BIN = 0.02  # width in log velocity
 _MOST_BINS = 300
 _CHI2_95 = 3.841458820694124  # of one degree of freedom
+_GRID = (16, 14)  # points over log v_s and log delta_s
+_POLISHED = 4  # starting cells, no two of them neighbours
+_BLOCK = 64  # points at a time: what belongs to them stays in the cache
+_ZOOMS = 8  # every one halves the step
+_STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
+_APART = 0.05  # of q, below which two points lead to the same optimum
 _POINTS, _ACROSS = 25, 24  # of a profile: along it, and minimised over
 
 
@@ -78,19 +84,51 @@ def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Arr
     Returns:
         (mu, F_s, b), shape (g, 3), and SSE [N^2], shape (g,).
     """
-    power = np.exp(q[:, 1:]) * (np.log(v) - q[:, :1])
-    e = np.exp(-np.exp(np.minimum(power, LARGEST_LOG_POWER)))
-    share = {0: 1.0 - e, 1: e, 2: np.ones_like(e), 3: np.ones_like(e)}
     gram = np.empty((q.shape[0], 4, 4))
-    for k, (a, b) in enumerate(_PAIRS):
-        weight = share[a] * share[b]
-        column = sums[..., k]
-        value = weight @ column if sums.ndim == 2 else np.sum(weight * column, axis=1)
-        gram[:, a, b] = gram[:, b, a] = value
+    for start in range(0, q.shape[0], _BLOCK):
+        part = slice(start, start + _BLOCK)
+        gram[part] = _gram(sums if sums.ndim == 2 else sums[part], v, q[part])
     G, c, yy = gram[:, :3, :3], gram[:, :3, 3], gram[:, 3, 3]
     p = solve_in_box(G, c, box.lower, box.upper)
     quadratic = np.einsum("gi,gij,gj->g", p, G, p)
     return p, yy - 2.0 * np.einsum("gi,gi->g", c, p) + quadratic
+
+
+def _gram(sums: Array, v: Array, q: Array) -> Array:
+    """Return the products of columns and output at every q, shape (g, 4, 4)."""
+    power = np.exp(q[:, 1:]) * (np.log(v) - q[:, :1])
+    e = np.exp(-np.exp(np.minimum(power, LARGEST_LOG_POWER)))
+    rest = 1.0 - e
+    weights = {(0, 0): rest * rest, (0, 1): rest * e, (1, 1): e * e}
+    weights |= {(0, 2): rest, (0, 3): rest, (1, 2): e, (1, 3): e}
+    gram = np.empty((q.shape[0], 4, 4))
+    for k, (a, b) in enumerate(_PAIRS):
+        column, weight = sums[..., k], weights.get((a, b))
+        if weight is None:
+            value = column.sum(axis=-1)
+        elif sums.ndim == 2:
+            value = weight @ column
+        else:
+            value = np.einsum("gk,gk->g", weight, column)
+        gram[:, a, b] = gram[:, b, a] = value
+    return gram
+
+
+def zoom(
+    sse: Callable[[Array], Array], q: Array, step: Array, logarithmic: Array
+) -> Array:
+    """Return points after going to the best neighbour in ever smaller steps.
+
+    Args:
+        sse: sums of squares at points of shape (g, 9, 2), shape (g, 9).
+        q: points (log v_s, log delta_s) to begin with, shape (g, 2).
+        step: first steps, shape (2,); every further one is half of the last.
+        logarithmic: bounds of q, shape (2, 2).
+    """
+    for size in 0.5 ** np.arange(_ZOOMS):
+        near = np.clip(q[:, None, :] + size * step * _STAR, *logarithmic.T)
+        q = near[np.arange(q.shape[0]), np.argmin(sse(near), axis=1)]
+    return q
 
 
 def profiles(moments: Moments, box: Box, point: Point, residual: Array) -> Profiles:
@@ -125,6 +163,42 @@ def _profile(
     kept = along[sse.reshape(_POINTS, _ACROSS).min(axis=1) < limit]
     inside = np.append(kept, point.q[held])  # the optimum itself always belongs to it
     return float(inside.min()), float(inside.max())
+
+
+def search(problem: Problem) -> list[Point]:
+    """Return the local optima that the best cells of a grid lead to, best first.
+
+    The grid is refined by the moments; the samples polish what is apart by then.
+    """
+    moments = Moments.of(problem, (problem.F_t.size,))
+    box, sums = problem.box, moments.sums[0]
+    low, high = box.logarithmic.T
+
+    def sse(q: Array) -> Array:
+        flat = solve_moments(sums, moments.v, q.reshape(-1, 2), box)[1]
+        return flat.reshape(q.shape[:-1])
+
+    axes = [np.linspace(*ends) for ends in zip(low, high, _GRID, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    step = (high - low) / (np.array(_GRID) - 1.0)
+    refined = zoom(sse, _promising(grid, sse(grid)), 0.5 * step, box.logarithmic)
+    optima: list[Point] = []
+    for q in refined:
+        if all(np.abs(q - known.q).max() > _APART for known in optima):
+            optima.append(polish(problem, q, optima))
+    return sorted(optima, key=lambda point: point.sse)
+
+
+def _promising(grid: Array, sse: Array) -> Array:
+    """Return the best cells of a grid that are not neighbours, shape (4, 2)."""
+    taken: list[tuple[int, int]] = []
+    for flat in np.argsort(sse, axis=None):
+        i, j = (int(k) for k in np.unravel_index(flat, sse.shape))
+        if all(max(abs(i - a), abs(j - b)) > 1 for a, b in taken):
+            taken.append((i, j))
+        if len(taken) == _POLISHED:
+            break
+    return np.array([grid[place] for place in taken])
 
 
 Loss = Literal["squares", "huber", "student"]

@@ -2,10 +2,11 @@
 
 For given q = (log v_s, log delta_s) the model is linear in p = (mu, F_s, b) with the
 columns F_n (1 - e), e and v_t, e = exp(-|v_t/v_s|^delta_s). Those three are solved
-exactly in their bounds; the two that are left are scanned on a grid, and the best cells
-are polished with the exact slope.
+exactly in their bounds; the two that are left are polished with the exact slope.
+`moments` scans them on a grid.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,7 @@ import numpy as np
 from analysis.data import Array
 from analysis.tustin.box_least_squares import solve_in_box
 
-_GRID = (16, 14)  # points over log v_s and log delta_s
-_POLISHED = 4  # starting cells, no two of them neighbours
+_SAME = (0.2, 1e-3)  # largest difference of q, and relative one of the SSE, of optima
 LARGEST_LOG_POWER = np.log(700.0)  # exp(-700) is about the smallest that is not zero
 
 
@@ -110,48 +110,15 @@ class Problem:
         return Point(q, p, float(r @ weighed_r)), slope
 
 
-def search(problem: Problem) -> list[Point]:
-    """Return the local optima reached from the best cells of the grid, best first."""
-    polished = [polish(problem, q) for q in _promising(problem)]
-    return sorted(polished, key=lambda point: point.sse)
+def polish(problem: Problem, start: Array, known: Sequence[Point] = ()) -> Point:
+    """Return the local optimum reached from `start` = (log v_s, log delta_s).
 
-
-def _promising(problem: Problem) -> list[Array]:
-    """Return the starts of the search: the best grid cells that are not neighbours."""
-    log_v_s, log_delta = (
-        np.linspace(low, high, count)
-        for (low, high), count in zip(problem.box.logarithmic, _GRID, strict=True)
-    )
-    sse = _scan(problem, log_v_s, log_delta)
-    taken: list[tuple[int, int]] = []
-    for flat in np.argsort(sse, axis=None):
-        i, j = (int(k) for k in np.unravel_index(flat, sse.shape))
-        if all(max(abs(i - a), abs(j - b)) > 1 for a, b in taken):
-            taken.append((i, j))
-        if len(taken) == _POLISHED:
-            break
-    return [np.array([log_v_s[i], log_delta[j]]) for i, j in taken]
-
-
-def _scan(problem: Problem, log_v_s: Array, log_delta: Array) -> Array:
-    """Return the SSE [N^2] on the grid, shape (len(log_v_s), len(log_delta))."""
-    shape = (log_v_s.size, log_delta.size)
-    gram = np.empty((*shape, 4, 4))
-    for j, delta in enumerate(np.exp(log_delta)):
-        exponent = delta * problem.log_v
-        for i, shift in enumerate(delta * log_v_s):
-            z = np.exp(np.minimum(exponent - shift, LARGEST_LOG_POWER))
-            M = np.column_stack([problem.columns(np.exp(-z)), problem.F_t])
-            gram[i, j] = (M.T * problem.weights) @ M
-    G, c, yy = gram[..., :3, :3], gram[..., :3, 3], gram[..., 3, 3]
-    p = solve_in_box(G, c, problem.box.lower, problem.box.upper)
-    quadratic = np.einsum("...i,...ij,...j->...", p, G, p)
-    return yy - 2.0 * np.einsum("...i,...i->...", c, p) + quadratic
-
-
-def polish(problem: Problem, start: Array) -> Point:
-    """Return the local optimum reached from `start` = (log v_s, log delta_s)."""
-    from scipy.optimize import minimize
+    Args:
+        problem: samples and box.
+        start: q to begin with.
+        known: optima; a start that comes to lie just above one is left there.
+    """
+    from scipy.optimize import OptimizeResult, minimize
 
     power = float(problem.weights @ problem.F_t**2)
     scale = max(power, np.finfo(float).tiny)
@@ -160,12 +127,26 @@ def polish(problem: Problem, start: Array) -> Point:
         point, slope = problem.project(q)
         return point.sse / scale, slope / scale
 
+    def look(intermediate_result: OptimizeResult) -> None:
+        if _is_known(intermediate_result.x, intermediate_result.fun * scale, known):
+            raise StopIteration
+
     optimum = minimize(
         objective,
         start,
         jac=True,
         method="L-BFGS-B",
         bounds=problem.box.logarithmic,
+        callback=look,
         options={"maxiter": 200, "ftol": 1e-13, "gtol": 1e-9},
     )
     return problem.project(np.asarray(optimum.x))[0]
+
+
+def _is_known(q: Array, sse: float, known: Sequence[Point]) -> bool:
+    """Return whether a point lies just above a known optimum."""
+    near, above = _SAME
+    return any(
+        np.abs(q - top.q).max() < near and top.sse <= sse <= (1.0 + above) * top.sse
+        for top in known
+    )

@@ -9,7 +9,8 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood, factorise
 from analysis.gp.noise import ConstantNoise
-from analysis.gp.regression import GaussianProcess, fit_gp, posterior_search
+from analysis.gp.regression import GaussianProcess, fit_gp
+from analysis.gp.search import posterior_search
 
 SE = SquaredExponential(2)
 KERNELS = {

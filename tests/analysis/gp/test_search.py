@@ -6,8 +6,7 @@ from analysis.gp import search as search_module
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
-from analysis.gp.regression import posterior_search
-from analysis.gp.search import StartScores, maximise
+from analysis.gp.search import StartScores, maximise, posterior_search
 
 SE = SquaredExponential(2)
 MODEL = (SE, ConstantNoise())

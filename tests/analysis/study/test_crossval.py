@@ -12,7 +12,7 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
-from analysis.gp.regression import posterior_search
+from analysis.gp.search import posterior_search
 from analysis.study.crossval import choose_rows, met_trials, plan_folds, run_fold
 from analysis.study.metrics import mean_absolute_error
 from analysis.study.models import GP_SE, TUSTIN, FitOptions

@@ -20,8 +20,8 @@ from analysis.tustin.model import (
     fit_tustin,
     predict,
 )
-from analysis.tustin.moments import Moments, solve_moments
-from analysis.tustin.varpro import Problem
+from analysis.tustin.moments import Moments, search, solve_moments, zoom
+from analysis.tustin.varpro import Problem, polish
 
 TENTHS = st.integers(-50, 50).map(lambda number: number / 10)
 PLAIN = TustinParameters(mu=0.6, F_s=9.0, v_s=0.04, delta_s=1.2, b=6.0)
@@ -231,6 +231,29 @@ def test_binned_sums_give_the_error_of_the_samples(stones):
     exact = [problem.project(point)[0].sse for point in q]
     # bins of 2 % of velocity
     np.testing.assert_allclose(sse, exact, rtol=1e-3)
+
+
+def test_ever_smaller_steps_lead_to_the_bottom_of_a_bowl():
+    bottoms = np.array([[-4.0, 0.7], [-5.1, 1.3]])
+    box = np.array([[-7.0, 0.0], [-2.0, 3.0]])
+
+    def sse(q):
+        return np.sum((q - bottoms[:, None]) ** 2, axis=-1)
+
+    found = zoom(sse, np.add(bottoms, [[0.3, -0.2], [-0.1, 0.25]]), np.full(2, 0.4), box)
+    # eight halvings of 0.4; half of the last step is left
+    np.testing.assert_allclose(found, bottoms, atol=0.4 / 2**7)
+    outside = zoom(lambda q: q[..., 0] ** 2, np.full((2, 2), -1.0), np.ones(2), box - 3)
+    assert outside[:, 0].max() <= -3.0
+
+
+def test_a_start_just_above_a_known_optimum_is_left_there(stones):
+    problem = Problem((stones.F_n, stones.v_t, stones.F_t), TustinBounds().box())
+    best = search(problem)[0]
+    start = np.add(best.q, 0.3)
+    alone, left = polish(problem, start), polish(problem, start, [best])
+    assert alone.sse == pytest.approx(best.sse, rel=1e-9)
+    assert best.sse * (1 + 1e-9) < left.sse <= best.sse * 1.001
 
 
 def test_bootstrap_draws_whole_trials_and_holds_the_truth():

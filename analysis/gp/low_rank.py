@@ -1,0 +1,181 @@
+"""The likelihood from a few pivots: what a search climbs until it is near a top.
+
+The kernel's part of the covariance is that of its values at m pivots among the rows
+(Nystroem), and what rows of a trial share is as many columns as there are trials:
+
+    C ~ S + V'V + Phi'Phi,   V = L^-1 k(P, X),   L L' = k(P, P)
+
+With U = [V; Phi] S^-1/2, B = I + U U' and b = B^-1 U S^-1/2 r, Woodbury's identity and
+the determinant lemma give likelihood and gradient in O(n m^2):
+
+    log det C = log det S + log det B,   U C^-1 U' = I - B^-1,   U C^-1 r = b
+
+The pivots are those of a Cholesky factorisation of S^-1/2 K S^-1/2 (Harbrecht, Peters
+and Schneider 2012). What it leaves, R = K - V'V, has no negative eigenvalue, so its
+scaled trace t = sum_i R_ii / S_ii bounds the error: log det C is too small by t at
+most, r'C^-1 r too large by at most t times itself.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from acquisition import SettingsError
+from analysis.data import Array, Indices
+from analysis.gp.kernels import Kernel
+from analysis.gp.likelihood import lapack, split
+from analysis.gp.noise import Noise
+from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
+
+_FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
+_MOST = 90  # pivots beyond which an evaluation costs half of an exact one
+_LEAST = 1e-6  # t at which there is nothing left to choose pivots from
+_JITTER = 1e-9  # of the pivots' variances
+
+Columns = Callable[[Array], ColumnsAt]
+
+
+class LowRankLikelihood:
+    """The likelihood of outputs by the kernel's values at pivots, for any theta.
+
+    Args:
+        model: kernel and noise; theta is the kernel's, then the noise's.
+        X: inputs, shape (n, d).
+        r: outputs with the mean function taken off, shape (n,).
+        pivots: places of m rows.
+        columns: what gives, for any theta, what rows of one trial share.
+    """
+
+    def __init__(
+        self,
+        model: tuple[Kernel, Noise],
+        X: Array,
+        r: Array,
+        pivots: Indices,
+        columns: Columns,
+    ) -> None:
+        self._kernel, self._noise = model
+        self._X, self._r, self._pivots = X, r, pivots
+        self._columns = columns
+        self._cross = self._kernel.over(X[pivots], X)
+        self._constant = -0.5 * r.size * np.log(2.0 * np.pi)
+
+    def __call__(self, theta: Array) -> tuple[float, Array]:
+        """Return the likelihood and its gradient in theta.
+
+        Raises:
+            SettingsError: the pivots' covariance cannot be factorised.
+        """
+        theta_kernel, theta_noise = split(self._kernel, theta)
+        F, contract = self._cross(theta_kernel)
+        S, contract_noise = self._noise.evaluate(theta_noise, self._X)
+        columns = self._columns(theta_noise)
+        root, m = 1.0 / np.sqrt(S), self._pivots.size
+        A = F[:, self._pivots]
+        A.flat[:: m + 1] *= 1.0 + _JITTER
+        L_inverse, _ = _inverse_factor(A)
+
+        scaled_r = self._r * root
+        # the last row is filled in when the weights are known
+        U = np.empty((m + len(columns.Phi) + 1, self._r.size))
+        np.matmul(L_inverse, F * root, out=U[:m])
+        np.multiply(columns.Phi, root, out=U[m:-1])
+        B = U[:-1] @ U[:-1].T
+        B.flat[:: len(B) + 1] += 1.0
+        B_factor, log_det = _inverse_factor(B)
+        half = B_factor @ (U[:-1] @ scaled_r)
+        lml = 0.5 * float(half @ half - scaled_r @ scaled_r)
+        lml += self._constant - log_det + float(np.log(root).sum())
+
+        b, B_inverse = half @ B_factor, B_factor.T @ B_factor
+        U[-1] = scaled_r - b @ U[:-1]
+        T = B_factor @ U[:-1]
+        weight = (U[-1] ** 2 - 1.0 + np.einsum("mn,mn->n", T, T)) * root**2
+        of_columns = b * b - 1.0 + np.diagonal(B_inverse)
+        slope_noise = contract_noise(weight) + columns.contract(of_columns[m:])
+        slope = contract(self._weight(U, root, L_inverse, (b, B_inverse)))
+        return lml, np.concatenate([slope, slope_noise])
+
+    def _weight(
+        self, U: Array, root: Array, L_inverse: Array, solved: tuple[Array, Array]
+    ) -> Array:
+        """Return what dF is contracted with, that of dA at the pivots' columns.
+
+        With M = A^-1 F and W = a a' - C^-1, 1/2 tr(W dC) = sum (M W) o dF
+        - 1/2 sum (M W M') o dA.
+        """
+        (b, B_inverse), m = solved, len(L_inverse)
+        left = np.column_stack([-B_inverse[:m], b[:m]])
+        weight = (L_inverse.T @ left) @ U
+        weight *= root
+        inner = np.outer(b[:m], b[:m]) + B_inverse[:m, :m]
+        inner.flat[:: m + 1] -= 1.0
+        of_pivots = L_inverse.T @ inner @ L_inverse
+        of_pivots.flat[:: m + 1] *= 1.0 + _JITTER
+        weight[:, self._pivots] -= 0.5 * of_pivots
+        return weight
+
+
+def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | None:
+    """Return the rows that serve as pivots; None where it takes too many.
+
+    Args:
+        K: covariances of all rows, shape (n, n); only the upper triangle is read.
+        S: variances of the noise, shape (n,).
+        trace: t that pivots are chosen for, and that they may leave where there are
+            never enough.
+    """
+    root = 1.0 / np.sqrt(S)
+    # the upper triangle in C's order is the lower one in Fortran's
+    scaled = (K * root * root[:, None]).T
+    total, n = float(np.trace(scaled)), root.size
+    L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
+    if not rank:  # no function at all
+        return None
+    tail = total - np.cumsum(np.einsum("nm,nm->m", *[np.tril(L[:, :rank])] * 2))
+    needed = 1 + int(np.count_nonzero(tail > trace[0]))
+    count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
+    return order[:count] - 1 if tail[count - 1] < trace[1] else None
+
+
+def _inverse_factor(A: Array) -> tuple[Array, float]:
+    """Return L^-1 of A = L L', lower, and log det L; A is overwritten.
+
+    Raises:
+        SettingsError: A is not positive definite.
+    """
+    L, info = lapack("potrf")(A.T, lower=1, clean=1, overwrite_a=1)
+    if info:
+        raise SettingsError("The covariance of the pivots is not positive definite.")
+    log_det = float(np.log(np.diagonal(L)).sum())
+    return lapack("trtri")(L, lower=1, overwrite_c=1)[0], log_det
+
+
+# theta, t -> an approximation that is good around it; None where there is none
+Near = Callable[[Array, tuple[float, float]], "LowRankLikelihood | None"]
+
+
+def near_over(
+    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None
+) -> Near:
+    """Return what gives the low-rank likelihood around any theta.
+
+    There is none where it would take too many pivots, or a residual drifts along the
+    trials: that has no few columns.
+    """
+    columns = columns_over(model[1], X, trials)
+    if columns is None:
+        return lambda theta, trace: None
+
+    kernel, noise = model
+    covariance = kernel.over(X)
+
+    def near(theta: Array, trace: tuple[float, float]) -> LowRankLikelihood | None:
+        theta_kernel, theta_noise = split(kernel, theta)
+        S, _ = noise.evaluate(theta_noise, X)
+        pivots = choose_pivots(covariance(theta_kernel)[0], S, trace)
+        if pivots is None:
+            return None
+        return LowRankLikelihood(model, X, r, pivots, columns)
+
+    return near
