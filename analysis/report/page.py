@@ -155,13 +155,13 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    results = compute_results(study, context.rig)
+    results = compute_results(study, context.rig, context.break_away)
     fits = json.dumps(all_numbers(results, context), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
     if context.foresight is not None:
-        text = _database(study, results, context.generated_utc, context.foresight)
+        text = _database(study, results, context, context.foresight)
         write_atomic(out_dir / "terrains.json", text.encode())
     drawn = report_figures(results, _processes(study), with_pdf=context.with_pdf)
     shown = [*drawn, *context.figures]
@@ -185,7 +185,10 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
 
 
 def _database(
-    study: Study, results: StudyResults, made_utc: str, foresight: ForesightModel
+    study: Study,
+    results: StudyResults,
+    context: ReportContext,
+    foresight: ForesightModel,
 ) -> str:
     """Return the terrain database of a study, with foresight."""
     models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in study.options.fit.models)
@@ -193,9 +196,10 @@ def _database(
     return database_of(
         replace(study, options=replace(study.options, fit=fit)),
         results.identification,
-        made_utc,
+        context.generated_utc,
         study.options.n_jobs,
-        foresight=foresight,
+        context.store,
+        foresight,
     )
 
 
