@@ -55,20 +55,15 @@ VERSION = 4  # of the numbers: higher whenever the same task gives another resul
 TYPES = {
     kind.__name__: kind
     for kind in (
-        Arcsine,
-        ComponentsTask,
+        *(Arcsine, ComponentsTask),
         *(FamilyChoice, FitOptions),
         *(FoldResult, FoldTask),
-        GaussianProcess,
-        GpModel,
-        Interval,
-        ModelFold,
-        NewTrialModel,
-        NoiseChoice,
+        *(GaussianProcess, GpModel),
+        *(Interval, ModelFold),
+        *(NewTrialModel, NoiseChoice),
         Profiles,
         *(SampleTable, Score),
-        ShapeMap,
-        Start,
+        *(ShapeMap, Start),
         TailedNoise,
         *(TimedRows, TrialComponents),
         *(PooledTustinFit, TerrainTask),
@@ -194,6 +189,8 @@ def encode(value: Any) -> Any:  # noqa: ANN401, PLR0911
         return encode(value.item())
     if value is None or isinstance(value, bool | int | str):
         return value
+    if isinstance(value, bytes):
+        return {"bytes": base64.b64encode(value).decode("ascii")}
     if isinstance(value, float):
         return value if math.isfinite(value) else {"number": repr(value)}
     if isinstance(value, Enum):
@@ -233,6 +230,8 @@ def _decode_tagged(plain: dict[str, Any], types: Types) -> Any:  # noqa: ANN401
     match plain:
         case {"array": data, "dtype": kind, "shape": shape}:
             return _decode_array(data, kind, shape)
+        case {"bytes": data}:
+            return base64.b64decode(data, validate=True)
         case {"number": "inf" | "-inf" | "nan" as text}:
             return float(text)
         case {"items": items}:

@@ -12,6 +12,7 @@ from acquisition.trial_file import TrialReader
 from analysis.breakaway import BreakAwayModel
 from analysis.data import RecordedTrial, load_trial
 from analysis.foresight import (
+    ForesightCurves,
     ForesightModel,
     JudgedForesight,
     JudgedTask,
@@ -21,7 +22,12 @@ from analysis.foresight import (
     plan_judged,
     watch_all,
 )
-from analysis.report import ReportFigure, ReportTable, foresight_figure
+from analysis.report import (
+    ReportFigure,
+    ReportTable,
+    drawn_once,
+    foresight_figure,
+)
 from analysis.study import Store, Study
 from experiments.report.tables import foresight_tables
 from experiments.rig import ForesightSource, state_record, states_of
@@ -74,11 +80,23 @@ def study_foresight(
         "terrain_after_sliding": judged.grounds,
     }
     tables = foresight_tables(judged.slips, judged.grounds, surface)
-    figure = foresight_figure(
-        judged.curves, is_simulated=study.simulated, with_pdf=with_pdf
-    )
-    figures = () if figure is None else (figure,)
+    figures = _figures(judged.curves, store, study.simulated, with_pdf=with_pdf)
     return StudyForesight(judged.model, tables, numbers, figures)
+
+
+def _figures(
+    curves: ForesightCurves, store: Store | None, is_simulated: bool, *, with_pdf: bool
+) -> tuple[ReportFigure, ...]:
+    """Return the figure of foresight, none without numbers for it."""
+
+    def draw() -> list[ReportFigure]:
+        figure = foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
+        return [] if figure is None else [figure]
+
+    drawn = drawn_once(
+        curves, draw, store, is_simulated=is_simulated, with_pdf=with_pdf
+    )
+    return tuple(drawn)
 
 
 def judged_foresight(

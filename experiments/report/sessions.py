@@ -9,6 +9,7 @@ from analysis.data import RecordedTrial, doubts_of_record, load_trial, summed_up
 from analysis.findings import summarise_rig
 from analysis.foresight import JUDGED_TYPES, fit_foresight, watch_all
 from analysis.report import (
+    DRAWN_TYPES,
     BedPhoto,
     ReportContext,
     StudyVariant,
@@ -118,7 +119,7 @@ class StudySession:
 
 def results_below(data: Path) -> ResultStore:
     """Return the store of results below a folder of data."""
-    return ResultStore(data / FOLDS, types={**TYPES, **JUDGED_TYPES})
+    return ResultStore(data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES})
 
 
 def study_sessions(

@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+import analysis.report.drawing
 import analysis.study.study
 import analysis.terrains.export
 import experiments.report.foresight
@@ -15,6 +16,7 @@ COMPUTED = (  # two trials have no components, and nothing is nothing to keep
     (analysis.study.study, "fit_terrain"),
     (analysis.study.study, "run_relatives"),
     (analysis.terrains.export, "fit_planned"),
+    (analysis.report.drawing, "report_figures"),
     (experiments.report.foresight, "judge"),
 )
 
@@ -40,9 +42,9 @@ def computed(monkeypatch):
     for module, name in COMPUTED:
         function = getattr(module, name)
 
-        def seen(*arguments, name=name, function=function):
+        def seen(*arguments, name=name, function=function, **named):
             names.append(name)
-            return function(*arguments)
+            return function(*arguments, **named)
 
         monkeypatch.setattr(module, name, seen)
     return names
