@@ -8,62 +8,29 @@ in slow motion. A terrain of fewer than three trials has no answer.
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from analysis.breakaway.censored import CensoredLikelihood, Family
 from analysis.breakaway.model import BREAK_AWAY, SLIDING, BreakAwayModel, PushLaw
-from analysis.breakaway.pushes import V_SLIP, FootPush, PushTable, find_pushes
+from analysis.breakaway.pushes import FootPush, PushTable
+from analysis.breakaway.recorded import (
+    BreakAwayOptions,
+    BreakAwayTask,
+    TerrainPushes,
+    plan_break_away,
+)
 from analysis.breakaway.survival import pit_distance
 from analysis.data import Array, PreparedTrial, groups_of
 
 ROCKY = "rocky"
 LEAST_TRIALS = 3
 LEAST_SLIPS, LEAST_OF_STONES = 15, 5  # alone, and of each that shares its spread
-_SLOW, _FAST = 0.005, 0.02  # m/s of sliding
 _SEEN = 1.4  # gain in log likelihood of a trial effect: 5 % on the boundary
 _LEAST_VARIANCE = 1e-9  # N^2
 _RANGE = (0.02, 0.98)  # quantiles between which nothing is extrapolated
 _STREAM = 3_000_000  # apart from other draws of the same seed
-
-
-@dataclass(frozen=True, slots=True)
-class BreakAwayOptions:
-    """How break-away models are fitted.
-
-    Attributes:
-        v_slip: velocity that makes a slip [m/s].
-        draws: number of times that the trials are resampled for intervals.
-        seed: of the resampling.
-    """
-
-    v_slip: float = V_SLIP
-    draws: int = 200
-    seed: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class _Recorded:
-    """A terrain's trials and their pushes.
-
-    Attributes:
-        name: of the terrain.
-        trials: those with kept samples.
-        pushes: of every one of them.
-    """
-
-    name: str
-    trials: tuple[PreparedTrial, ...]
-    pushes: tuple[tuple[FootPush, ...], ...]
-
-    @property
-    def every(self) -> list[FootPush]:
-        return [push for trial in self.pushes for push in trial]
-
-    @property
-    def slips(self) -> int:
-        return sum(not push.is_held for push in self.every)
 
 
 def fit_break_away(
@@ -80,24 +47,7 @@ def fit_break_away(
         kinds: kind by terrain: "small" and "big" are stones.
         options: what a slip is, and how many times trials are resampled.
     """
-    options = options or BreakAwayOptions()
-    recorded = {name: _recorded(name, of, options) for name, of in trials.items()}
-    known = [r for r in recorded.values() if len(r.trials) >= LEAST_TRIALS]
-    surface = groups_of(kinds)["surface"]
-    stones = [r for r in known if surface[r.name] == ROCKY]
-    stones = [r for r in stones if r.slips >= LEAST_OF_STONES]
-    others = [r for r in known if surface[r.name] != ROCKY]
-    groups = [stones] if stones else []
-    groups += [[r] for r in others if r.slips >= LEAST_SLIPS]
-    fitted = {
-        name: model
-        for group in groups
-        for name, model in _fit_group(group, options).items()
-    }
-    for r in known:
-        if r.name not in fitted and (model := _fit_sliding(r, options)) is not None:
-            fitted[r.name] = model
-    return {name: fitted[name] for name in trials if name in fitted}
+    return fit_planned(plan_break_away(trials, kinds, options or BreakAwayOptions()))
 
 
 def fit_pushes(
@@ -109,23 +59,30 @@ def fit_pushes(
 
     As `fit_break_away`, but a terrain off stones of fewer than 15 slips has none.
     """
-    options = options or BreakAwayOptions()
-    every = [_Recorded(name, (), tuple(map(tuple, of))) for name, of in pushes.items()]
-    surface = groups_of(kinds)["surface"]
-    known = [r for r in every if len(r.pushes) >= LEAST_TRIALS]
-    stones = [r for r in known if surface[r.name] == ROCKY]
-    groups = [[r for r in stones if r.slips >= LEAST_OF_STONES]]
-    groups += [[r] for r in known if r not in stones and r.slips >= LEAST_SLIPS]
-    fits = [_fit_group(group, options) for group in groups if group]
-    return {name: model for fit in fits for name, model in fit.items()}
+    every = [TerrainPushes(name, tuple(map(tuple, of))) for name, of in pushes.items()]
+    return fit_planned(
+        BreakAwayTask(tuple(every), kinds, options or BreakAwayOptions())
+    )
 
 
-def _recorded(
-    name: str, trials: Sequence[PreparedTrial], options: BreakAwayOptions
-) -> _Recorded:
-    usable = tuple(trial for trial in trials if trial.kept)
-    pushes = tuple(find_pushes(trial, options.v_slip) for trial in usable)
-    return _Recorded(name, usable, pushes)
+def fit_planned(task: BreakAwayTask) -> dict[str, BreakAwayModel]:
+    """Return the models of a task, in the order of its terrains; a pure function."""
+    options, surface = task.options, groups_of(task.kinds)["surface"]
+    known = [of for of in task.terrains if len(of.pushes) >= LEAST_TRIALS]
+    stones = [of for of in known if surface[of.name] == ROCKY]
+    stones = [of for of in stones if of.slips >= LEAST_OF_STONES]
+    others = [of for of in known if surface[of.name] != ROCKY]
+    groups = [stones] if stones else []
+    groups += [[of] for of in others if of.slips >= LEAST_SLIPS]
+    fitted = {
+        name: model
+        for group in groups
+        for name, model in _fit_group(group, options).items()
+    }
+    for of in known:
+        if of.name not in fitted and (model := _fit_sliding(of, options)) is not None:
+            fitted[of.name] = model
+    return {of.name: fitted[of.name] for of in task.terrains if of.name in fitted}
 
 
 def _random(names: Sequence[str], options: BreakAwayOptions) -> np.random.Generator:
@@ -134,7 +91,7 @@ def _random(names: Sequence[str], options: BreakAwayOptions) -> np.random.Genera
 
 
 def _fit_group(
-    group: Sequence[_Recorded], options: BreakAwayOptions
+    group: Sequence[TerrainPushes], options: BreakAwayOptions
 ) -> dict[str, BreakAwayModel]:
     """Return the models of terrains that share slope and spread."""
     table = PushTable.of([(k, p) for k, r in enumerate(group) for p in r.pushes])
@@ -155,7 +112,7 @@ def _fit_group(
     }
 
 
-def _resampled(group: Sequence[_Recorded], rng: np.random.Generator) -> Array:
+def _resampled(group: Sequence[TerrainPushes], rng: np.random.Generator) -> Array:
     """Return how often every trial is drawn; each terrain keeps its number of them."""
     return np.concatenate(
         [
@@ -165,7 +122,7 @@ def _resampled(group: Sequence[_Recorded], rng: np.random.Generator) -> Array:
     )
 
 
-def _family(group: Sequence[_Recorded], table: PushTable) -> Family:
+def _family(group: Sequence[TerrainPushes], table: PushTable) -> Family:
     """Return the family that scores better on trials that its fit has not seen.
 
     A fold leaves out the trial of one number of every terrain.
@@ -201,7 +158,7 @@ def _trial_gain(likelihood: CensoredLikelihood, best: Array) -> float:
 
 
 def _model(
-    recorded: _Recorded,
+    recorded: TerrainPushes,
     number: int,
     fit: tuple[Family, Array, Array],
     options: BreakAwayOptions,
@@ -238,10 +195,10 @@ def _spanned(values: Array) -> tuple[float, float]:
 
 
 def _fit_sliding(
-    recorded: _Recorded, options: BreakAwayOptions
+    recorded: TerrainPushes, options: BreakAwayOptions
 ) -> BreakAwayModel | None:
     """Return the law of F_t in slow motion; None with fewer than three such trials."""
-    slow = [_slow_rows(trial) for trial in recorded.trials]
+    slow = recorded.slow
     sums = np.array([_sums(F_n, F_t) for F_n, F_t in slow if F_n.size])
     if len(sums) < LEAST_TRIALS:
         return None
@@ -262,12 +219,6 @@ def _fit_sliding(
         forces=_spanned(np.concatenate([F_t for _, F_t in slow])),
         is_trial_seen=law.trial_sd > 0.0,
     )
-
-
-def _slow_rows(trial: PreparedTrial) -> tuple[Array, Array]:
-    """Return F_n and F_t [N] of the kept samples in slow motion."""
-    is_slow = (trial.v_t >= _SLOW) & (trial.v_t <= _FAST)
-    return trial.F_n[is_slow], trial.F_t[is_slow]
 
 
 def _sums(x: Array, y: Array) -> Array:

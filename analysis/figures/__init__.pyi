@@ -10,6 +10,7 @@ from . import (
     trials,
     uncertainty,
 )
+from .pictures import Picture
 from .sections import ReportSection
 from .spec import PAGE_ORDER, FigureSpec
 from .style import (
@@ -18,7 +19,6 @@ from .style import (
     SPEED_LABEL,
     Axes,
     Figure,
-    Picture,
     name_ticks,
     new_figure,
     plain,

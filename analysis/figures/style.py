@@ -11,7 +11,6 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -22,9 +21,9 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from PIL import Image
 
 from analysis.data import BIG, FLAT, SMALL
+from analysis.figures.pictures import Picture, png_of_few_colours
 
 __all__ = [
     "ONE_COLUMN",
@@ -32,7 +31,6 @@ __all__ = [
     "Axes",
     "Figure",
     "LogNorm",
-    "Picture",
     "new_figure",
     "panel_grid",
     "render",
@@ -65,7 +63,6 @@ MODEL_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 _DPI = 320
 _SHOWN = 160  # pixels of a page per inch
-_COLOURS = 256  # of a PNG
 _MOST_TICKS = 5  # below a small panel
 _MARK = 6.0  # points of the watermark per inch of the figure's width
 _KIND_COLOURS = {
@@ -88,26 +85,6 @@ _STYLE: dict[Any, Any] = {
     "pdf.fonttype": 42,  # letters stay letters
     "svg.fonttype": "none",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Picture:
-    """A drawn figure.
-
-    Attributes:
-        key: name of its files, e.g. "fig4_excerpts".
-        png: the figure as PNG.
-        pdf: the figure as vector PDF; empty = it was not asked for.
-        width: at which a page shows it [pixels of CSS].
-        svg: the figure as an element of a page, which says where its axes are; empty =
-            it is shown as PNG.
-    """
-
-    key: str
-    png: bytes
-    pdf: bytes = b""
-    width: int = 0
-    svg: str = ""
 
 
 @contextmanager
@@ -209,21 +186,12 @@ def render(
         figure.set_dpi(_DPI)
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
-        png = _few_colours(np.asarray(canvas.buffer_rgba()))
+        png = png_of_few_colours(np.asarray(canvas.buffer_rgba()), _DPI)
         figure.set_layout_engine("none")  # the layout is found; do not search again
         if with_pdf:
             FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
         svg = _svg(key, figure) if is_vector else ""
     return Picture(key, png, pdf.getvalue(), round(_SHOWN * figure.get_figwidth()), svg)
-
-
-def _few_colours(pixels: "np.ndarray[Any, np.dtype[np.uint8]]") -> bytes:
-    """Return a picture as PNG of few colours: a third of the bytes, looks the same."""
-    png = io.BytesIO()
-    opaque = Image.fromarray(pixels).convert("RGB")
-    few = opaque.quantize(_COLOURS, dither=Image.Dither.NONE)
-    few.save(png, "PNG", optimize=True, dpi=(_DPI, _DPI))
-    return png.getvalue()
 
 
 def _svg(key: str, figure: Figure) -> str:

@@ -129,9 +129,16 @@ class TerrainBreakAway:
         }
 
 
-def break_away_findings(study: Study) -> Mapping[str, TerrainBreakAway]:
-    """Return what every terrain gives before it slips, where that is known."""
-    models = break_away_of(study)
+def break_away_findings(
+    study: Study, models: Mapping[str, BreakAwayModel] | None = None
+) -> Mapping[str, TerrainBreakAway]:
+    """Return what every terrain gives before it slips, where that is known.
+
+    Args:
+        study: the trials.
+        models: fitted to them by terrain; None = they are fitted here.
+    """
+    models = break_away_of(study) if models is None else models
     return {
         name: _of_terrain(study.terrains[name], model, study.options.prepare.slowest)
         for name, model in models.items()

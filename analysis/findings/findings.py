@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from analysis.breakaway import BreakAwayModel
 from analysis.data import LEVELS
 from analysis.findings.break_away import (
     BREAK_AWAY_UNITS,
@@ -79,21 +80,35 @@ class StudyResults:
     claims: Sequence[PaperClaim]
 
 
-def compute_results(study: Study, rig: Sequence[RigTrial] = ()) -> StudyResults:
-    """Return what follows from a study; of models only those of break-away are fit."""
+def compute_results(
+    study: Study,
+    rig: Sequence[RigTrial] = (),
+    break_away: Mapping[str, BreakAwayModel] | None = None,
+) -> StudyResults:
+    """Return what follows from a study; of models only those of break-away are fit.
+
+    Args:
+        study: the study.
+        rig: health of the rig by trial.
+        break_away: models of break-away by terrain; None = they are fitted here.
+    """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):  # small matrices: more threads lose time
-        return _compute(study, rig)
+        return _compute(study, rig, break_away)
 
 
-def _compute(study: Study, rig: Sequence[RigTrial]) -> StudyResults:
+def _compute(
+    study: Study,
+    rig: Sequence[RigTrial],
+    break_away: Mapping[str, BreakAwayModel] | None,
+) -> StudyResults:
     results, axes, edges = study.terrains, surface_axes(study), cell_edges(study)
     identification, noise = identify_study(study), noise_summaries(study)
     return StudyResults(
         study=study,
         identification=identification,
-        break_away=break_away_findings(study),
+        break_away=break_away_findings(study, break_away),
         noise=noise,
         shares=held_out_shares(study),
         trends={name: trends_of(result) for name, result in results.items()},

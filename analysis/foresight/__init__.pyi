@@ -8,7 +8,16 @@ from .engine import (
     RiskTable,
 )
 from .ground import GroundLaw, GroundModel, GroundRecogniser
-from .held_out import folds_of, foresee, hold_out
+from .held_out import folds_of, foresee, hold_out, hold_out_models
+from .judged import (
+    JUDGED_TYPES,
+    SLID,
+    JudgedForesight,
+    JudgedTask,
+    WatchedSource,
+    judge,
+    plan_judged,
+)
 from .logistic import RidgeLogistic, all_pairs, fit_logistic
 from .model import ForesightModel, Provenance, RigIdentity, SlipModel
 from .scores import (
@@ -37,8 +46,10 @@ __all__ = [
     "FEATURES",
     "FLAT_SURFACE",
     "HORIZON",
+    "JUDGED_TYPES",
     "LAGS",
     "ROCKY_SURFACE",
+    "SLID",
     "FootSample",
     "Foresight",
     "ForesightCurves",
@@ -51,6 +62,8 @@ __all__ = [
     "GroundModel",
     "GroundRecogniser",
     "GroundScore",
+    "JudgedForesight",
+    "JudgedTask",
     "Provenance",
     "RidgeLogistic",
     "RigIdentity",
@@ -58,6 +71,7 @@ __all__ = [
     "Signals",
     "SlipModel",
     "SlipScore",
+    "WatchedSource",
     "WatchedTrial",
     "all_pairs",
     "fit_foresight",
@@ -68,6 +82,9 @@ __all__ = [
     "foresee",
     "foresight_curves",
     "hold_out",
+    "hold_out_models",
+    "judge",
+    "plan_judged",
     "score_ground",
     "score_slips",
     "watch",

@@ -19,13 +19,27 @@ def hold_out(
 
     Trials of one fold are every fifth of their terrain.
     """
-    runs: list[ForesightRun] = []
+    folds = hold_out_models(trials, progress)
+    return [
+        run for model, tested in folds for run in foresee(model, tested, break_away)
+    ]
+
+
+def hold_out_models(
+    trials: Sequence[WatchedTrial], progress: Callable[[], object] = lambda: None
+) -> list[tuple[ForesightModel, list[WatchedTrial]]]:
+    """Return the model of every fold with the trials that it has not seen.
+
+    Folds whose other trials teach nothing are left out. `progress` is called after
+    every fold.
+    """
+    folds: list[tuple[ForesightModel, list[WatchedTrial]]] = []
     for tested, rest in folds_of(trials):
         model = fit_foresight(rest)
         progress()
         if model is not None:
-            runs += foresee(model, tested, break_away)
-    return runs
+            folds.append((model, tested))
+    return folds
 
 
 def folds_of(

@@ -1,3 +1,4 @@
+from .drawing import DRAWN_TYPES, drawn_once
 from .foresight_page import foresight_figure
 from .friction_page import (
     FRICTION_HEADER,
@@ -12,6 +13,7 @@ from .what_if import StudyVariant, parse_choice, parse_window
 from .what_if_tables import plain_choice, side_by_side
 
 __all__ = [
+    "DRAWN_TYPES",
     "FRICTION_HEADER",
     "BedPhoto",
     "FrictionPage",
@@ -21,6 +23,7 @@ __all__ = [
     "StanceGroup",
     "StudyVariant",
     "draw_stances",
+    "drawn_once",
     "foresight_figure",
     "friction_html",
     "friction_rows",

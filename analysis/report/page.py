@@ -6,28 +6,13 @@ The one door to jinja2.
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from analysis.figures import (
-    PAGE_ORDER,
-    FigureSpec,
-    ReportSection,
-    break_away,
-    confusion,
-    curves,
-    errors,
-    excerpts,
-    render,
-    rig,
-    styled,
-    surfaces,
-    trials,
-    uncertainty,
-)
+from analysis.figures import ReportSection
 from analysis.findings import (
     StudyResults,
     compute_results,
@@ -35,6 +20,7 @@ from analysis.findings import (
     plain_findings,
 )
 from analysis.foresight import ForesightModel
+from analysis.report.drawing import FIGURES, kept_figures
 from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import (
@@ -58,8 +44,6 @@ from analysis.study import (
     GP_SE,
     GP_SE_TRIAL,
     Study,
-    available_cores,
-    run_tasks,
     to_csv,
     to_fits,
     to_plain,
@@ -67,81 +51,8 @@ from analysis.study import (
 )
 from analysis.terrains import database_of
 
-_FAMILIES = (
-    *(excerpts, curves, surfaces, errors, uncertainty),
-    *(break_away, confusion, trials, rig),
-)
-FIGURES: tuple[FigureSpec, ...] = tuple(
-    sorted(
-        (spec for family in _FAMILIES for spec in family.FIGURES),
-        key=lambda spec: PAGE_ORDER.index(spec.key),
-    )
-)
-
-
-def report_figures(
-    results: StudyResults, n_jobs: int = 1, *, with_pdf: bool = False
-) -> list[ReportFigure]:
-    """Return every figure that there are numbers for, in the order of the page.
-
-    Args:
-        results: what is shown.
-        n_jobs: processes that draw; they share no figure, so pictures are the same.
-        with_pdf: figures are wanted as PDF, too.
-    """
-    batches = [FigureBatch(results, k, n_jobs, with_pdf) for k in range(n_jobs)]
-    drawn: dict[str, ReportFigure] = {}
-    for batch in run_tasks(draw_batch, batches, n_jobs):
-        drawn |= {figure.picture.key: figure for figure in batch}
-    return [drawn[spec.key] for spec in FIGURES if spec.key in drawn]
-
-
-@dataclass(frozen=True, slots=True)
-class FigureBatch:
-    """The figures that one process draws.
-
-    Attributes:
-        results: what is shown.
-        first: number of its first figure.
-        step: from one of its figures to the next.
-        with_pdf: figures are wanted as PDF, too.
-    """
-
-    results: StudyResults
-    first: int
-    step: int
-    with_pdf: bool = False
-
-
-def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
-    """Return the figures of a batch that there are numbers for."""
-    with styled():
-        figures = [_draw(spec, batch) for spec in FIGURES[batch.first :: batch.step]]
-    return [figure for figure in figures if figure is not None]
-
-
-def _draw(spec: FigureSpec, batch: FigureBatch) -> ReportFigure | None:
-    results = batch.results
-    figure = spec.draw(results)
-    if figure is None:
-        return None
-    is_simulated = results.study.simulated
-    picture = render(
-        spec.key,
-        figure,
-        is_simulated,
-        is_vector=spec.is_vector,
-        with_pdf=batch.with_pdf,
-    )
-    return ReportFigure(
-        spec.section, spec.title, spec.alt, spec.caption(results), picture
-    )
-
-
 __all__ = ["ReportContext", "ReportTable", "write_report"]
 
-_MOST_DRAWING = 4  # processes
-_MANY_TERRAINS = 4  # from which on they pay
 _NO_RIG = "External data have no record of the rig: health and limits are unknown."
 
 
@@ -155,15 +66,15 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    results = compute_results(study, context.rig)
+    results = compute_results(study, context.rig, context.break_away)
     fits = json.dumps(all_numbers(results, context), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(results))
     write_atomic(out_dir / "fits.csv", table.encode())
     if context.foresight is not None:
-        text = _database(study, results, context.generated_utc, context.foresight)
+        text = _database(study, results, context, context.foresight)
         write_atomic(out_dir / "terrains.json", text.encode())
-    drawn = report_figures(results, _processes(study), with_pdf=context.with_pdf)
+    drawn = kept_figures(results, context.store, with_pdf=context.with_pdf)
     shown = [*drawn, *context.figures]
     _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
@@ -185,7 +96,10 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
 
 
 def _database(
-    study: Study, results: StudyResults, made_utc: str, foresight: ForesightModel
+    study: Study,
+    results: StudyResults,
+    context: ReportContext,
+    foresight: ForesightModel,
 ) -> str:
     """Return the terrain database of a study, with foresight."""
     models = tuple(m for m in (GP_SE, GP_SE_TRIAL) if m in study.options.fit.models)
@@ -193,17 +107,11 @@ def _database(
     return database_of(
         replace(study, options=replace(study.options, fit=fit)),
         results.identification,
-        made_utc,
+        context.generated_utc,
         study.options.n_jobs,
-        foresight=foresight,
+        context.store,
+        foresight,
     )
-
-
-def _processes(study: Study) -> int:
-    """Return how many processes draw; few panels cost less than starting one."""
-    if len(study.terrains) < _MANY_TERRAINS:
-        return 1
-    return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)
 
 
 def all_numbers(results: StudyResults, context: ReportContext) -> dict[str, Any]:

@@ -5,9 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from analysis.breakaway import BreakAwayModel
 from analysis.figures import Picture, ReportSection
 from analysis.findings import RigTrial
 from analysis.foresight import ForesightModel
+from analysis.study import Store
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +122,8 @@ class ReportContext:
         foresight: for a terrain database beside the report; None = none is written.
         photos: of the bed after the trials.
         with_pdf: figures are filed as PDF, too.
+        break_away: models of break-away by terrain; None = the report fits them.
+        store: results of earlier reports; None = everything is computed.
     """
 
     title: str
@@ -135,6 +139,8 @@ class ReportContext:
     foresight: ForesightModel | None = None
     photos: Sequence[BedPhoto] = field(default=())
     with_pdf: bool = False
+    break_away: Mapping[str, BreakAwayModel] | None = None
+    store: Store | None = None
 
     @property
     def kind(self) -> str:

@@ -4,9 +4,9 @@ An interrupted study resumes where it stopped, and a study repeated with one cho
 changed repeats only what that choice touches. A file that is damaged, foreign or of
 another version counts as not there. Files are written whole or not at all.
 
-Values become JSON and come back exactly: dataclasses, named tuples, arrays, numbers.
-Nothing is ever unpickled: a type is found by name in a table of the types that may
-appear, and its fields must be exactly its own.
+Values become JSON and come back exactly: dataclasses, named tuples, enumerations,
+arrays, numbers. Nothing is ever unpickled: a type is found by name in a table of the
+types that may appear, and its fields must be exactly its own.
 
 The folder has a size: beyond `MOST_BYTES` the results that were used longest ago go,
 down to nine tenths of it. A result that is read counts as used.
@@ -22,12 +22,14 @@ import stat
 import tempfile
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquisition import SettingsError
+from analysis.breakaway import BreakAwayModel, Family, PushLaw
 from analysis.data import SampleTable
 from analysis.gp import Arcsine, GaussianProcess, Start, kernels, noise, trial_noise
 from analysis.study.crossval import FoldResult, FoldTask, ModelFold
@@ -53,41 +55,26 @@ VERSION = 5  # of the numbers: higher whenever the same task gives another resul
 TYPES = {
     kind.__name__: kind
     for kind in (
-        Arcsine,
-        ComponentsTask,
-        FamilyChoice,
-        FitOptions,
-        FoldResult,
-        FoldTask,
-        GaussianProcess,
-        GpModel,
-        Interval,
-        ModelFold,
-        NewTrialModel,
-        NoiseChoice,
+        *(Arcsine, ComponentsTask),
+        *(FamilyChoice, FitOptions),
+        *(FoldResult, FoldTask),
+        *(GaussianProcess, GpModel),
+        *(Interval, ModelFold),
+        *(NewTrialModel, NoiseChoice),
         Profiles,
-        SampleTable,
-        Score,
-        ShapeMap,
-        Start,
+        *(SampleTable, Score),
+        *(ShapeMap, Start),
         TailedNoise,
-        TimedRows,
-        TrialComponents,
-        PooledTustinFit,
-        TerrainTask,
+        *(TimedRows, TrialComponents),
+        *(PooledTustinFit, TerrainTask),
         TustinModel,
-        kernels.Product,
-        kernels.SquaredExponential,
-        kernels.Sum,
-        noise.ConstantNoise,
-        noise.LogLinearNoise,
-        trial_noise.TrialNoise,
-        trial_noise.TrialRows,
+        *(kernels.Product, kernels.SquaredExponential, kernels.Sum),
+        *(noise.ConstantNoise, noise.LogLinearNoise),
+        *(trial_noise.TrialNoise, trial_noise.TrialRows),
         *STORED,
-        tustin.TustinBounds,
-        tustin.TustinFit,
-        tustin.TustinForm,
-        tustin.TustinParameters,
+        *(BreakAwayModel, Family, PushLaw),
+        *(tustin.TustinBounds, tustin.TustinFit),
+        *(tustin.TustinForm, tustin.TustinParameters),
     )
 }
 
@@ -98,11 +85,15 @@ class ResultStore:
     Args:
         folder: made when the first result is kept; may be deleted at any time.
         most: bytes that its results may have together.
+        types: every type that may appear in a result, by name.
     """
 
-    def __init__(self, folder: Path, most: int = MOST_BYTES) -> None:
+    def __init__(
+        self, folder: Path, most: int = MOST_BYTES, types: Types = TYPES
+    ) -> None:
         self._folder = folder
         self._most = most
+        self._types = types
         self._bytes: int | None = None  # of the folder, as far as it is known
 
     def get(self, task: Any) -> Any | None:  # noqa: ANN401
@@ -111,7 +102,7 @@ class ResultStore:
         try:
             content = json.loads(_read(path))
             is_whole = content["digest"] == _digest(content["result"])
-            result = decode(content["result"], TYPES) if is_whole else None
+            result = decode(content["result"], self._types) if is_whole else None
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
         with contextlib.suppress(OSError):  # a folder that is only read from
@@ -198,8 +189,12 @@ def encode(value: Any) -> Any:  # noqa: ANN401, PLR0911
         return encode(value.item())
     if value is None or isinstance(value, bool | int | str):
         return value
+    if isinstance(value, bytes):
+        return {"bytes": base64.b64encode(value).decode("ascii")}
     if isinstance(value, float):
         return value if math.isfinite(value) else {"number": repr(value)}
+    if isinstance(value, Enum):
+        return {"type": type(value).__name__, "value": encode(value.value)}
     names = _field_names(type(value))
     if names is not None:
         inside = {name: encode(getattr(value, name)) for name in names}
@@ -235,10 +230,14 @@ def _decode_tagged(plain: dict[str, Any], types: Types) -> Any:  # noqa: ANN401
     match plain:
         case {"array": data, "dtype": kind, "shape": shape}:
             return _decode_array(data, kind, shape)
+        case {"bytes": data}:
+            return base64.b64decode(data, validate=True)
         case {"number": "inf" | "-inf" | "nan" as text}:
             return float(text)
         case {"items": items}:
             return {decode(k, types): decode(v, types) for k, v in items}
+        case {"type": name, "value": inside} if issubclass(types[name], Enum):
+            return types[name](decode(inside, types))
         case {"type": name, "fields": inside}:
             kind = types[name]
             if set(inside) != set(_field_names(kind) or ()):

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 
 from acquisition import SettingsError, TractionError
-from analysis.breakaway import BreakAwayModel, BreakAwayOptions, fit_break_away
+from analysis.breakaway import (
+    BreakAwayModel,
+    BreakAwayOptions,
+    fit_planned,
+    plan_break_away,
+)
 from analysis.data import Array, PreparedTrial, PrepareOptions, SampleTable, TrainingSet
 from analysis.foresight import ForesightModel
 from analysis.study import (
@@ -112,7 +117,7 @@ def database_of(
     """
     axes, tasks = _tasks(study)
     tables = run_tasks(tabulate, tasks, workers, store=store)
-    models, from_rest = study.options.fit.models, break_away_of(study)
+    models, from_rest = study.options.fit.models, break_away_of(study, store)
     default = next((m for m in (GP_SE_TRIAL, GP_SE) if m in models), models[0])
     recogniser = GP_SE if GP_SE in models else default
     known = {
@@ -144,11 +149,20 @@ def _table(forces: Array, axes: tuple[Array, Array]) -> Table:
     return Table(F_n, v_t, SHARES, tuple(map(rows_of, forces)))
 
 
-def break_away_of(study: Study) -> dict[str, BreakAwayModel]:
-    """Return the break-away model of every terrain of a study that has one."""
+def break_away_of(
+    study: Study, store: Store | None = None
+) -> dict[str, BreakAwayModel]:
+    """Return the break-away model of every terrain of a study that has one.
+
+    Args:
+        study: the trials.
+        store: results of earlier runs.
+    """
     trials = {name: result.trials for name, result in study.terrains.items()}
     options = BreakAwayOptions(seed=study.options.fit.seed)
-    return fit_break_away(trials, study.kinds, options)
+    task = plan_break_away(trials, study.kinds, options)
+    (models,) = run_tasks(fit_planned, [task], store=store)
+    return models
 
 
 def _parts(

@@ -1,4 +1,10 @@
-from .choices import AnalysisChoices, analysis_choices, repeat_study
+from .choices import (
+    AnalysisChoices,
+    analysis_choices,
+    choose_sessions,
+    repeat_study,
+    tell_missing,
+)
 from .credits import LICENCES, parse_author
 from .export import export_sessions
 from .foresight import (
@@ -15,11 +21,9 @@ from .rebuilding import TOLERANCE, check_publication, is_publication, rebuild
 from .sessions import (
     REPORTED,
     ReportRequest,
-    choose_sessions,
     export_terrains,
     report_sessions,
     require_samples,
-    tell_missing,
 )
 from .table_columns import Quantity, TableColumn, columns_of
 from .truth_errors import compare_with_truth, z_scores

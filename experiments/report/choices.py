@@ -1,17 +1,26 @@
-"""Choices of an analysis, from the command line."""
+"""Choices of a report, from the command line: its sessions, and its analysis."""
 
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
+from pathlib import Path
 
-from acquisition import SettingsError
+from acquisition import SessionError, SettingsError
 from analysis.data import PrepareOptions, RecordedTrial, TractionSeries
 from analysis.report import StudyVariant, parse_choice, parse_window
 from analysis.study import ResultStore, Study, run_study
 from analysis.tustin import TustinBounds
-from experiments.operator import Console
+from experiments.messages import CATALOGUE
+from experiments.operator import WARNING, Console
 from experiments.report.progress import fitting
+from experiments.session import (
+    SessionFolder,
+    check_kept,
+    find_session,
+    list_sessions,
+    replay,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,3 +98,53 @@ def repeat_study(
             other = run_study(series, options, study.simulated, progress, store)
         others.append((choice.remarked(chain(*trials.values())), other))
     return others
+
+
+def choose_sessions(
+    data: Path, names: Sequence[str], *, every: bool
+) -> list[SessionFolder]:
+    """Return the sessions to report, of one kind only.
+
+    Raises:
+        SessionError: none are named or found, or live and simulated ones are mixed.
+    """
+    if bool(names) == every:
+        hint = "For example: traction report S012"
+        raise SessionError("Name the sessions to report, or use --all.", hint=hint)
+    if every:
+        pushed = [s for s in list_sessions(data) if not s.is_of_stances]
+        sessions = [s for s in pushed if s.kept_trials() or _keeps(s)]
+    else:
+        sessions = [find_session(data, name) for name in dict.fromkeys(names)]
+    if standing := [s.id for s in sessions if s.is_of_stances]:
+        what = f"{' '.join(standing)}: sessions of stances have no pushes to report."
+        raise SessionError(what, hint="Leave it out.")
+    if not sessions:
+        hint = "Record some: traction run S0 --fake --fast"
+        raise SessionError(f"There are no kept trials in {data}.", hint=hint)
+    simulated = [s for s in sessions if s.is_simulated]
+    if simulated and len(simulated) < len(sessions):
+        message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
+        what, hint = (t.format_map(values) for t in (message.what, message.do))
+        raise SessionError(what, hint=hint)
+    return sessions
+
+
+def _keeps(session: SessionFolder) -> bool:
+    """Return whether the journal keeps a trial, whatever became of its files."""
+    return bool(replay(session.events()).kept)
+
+
+def tell_missing(
+    sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
+) -> list[str]:
+    """Name the kept trials that are missing or changed, and return the messages.
+
+    Raises:
+        KeptDataError: there are some, and `allow_missing` is false.
+    """
+    deviations = check_kept(sessions, allow_missing=allow_missing)
+    texts = [f"Not as in the journal: {deviation.text()}." for deviation in deviations]
+    for text in texts:
+        console.problem(f"{WARNING} {text}")
+    return texts

@@ -9,29 +9,29 @@ import numpy as np
 
 from acquisition import FORESIGHT, Record, SettingsError
 from acquisition.trial_file import TrialReader
+from analysis.breakaway import BreakAwayModel
 from analysis.data import RecordedTrial, load_trial
 from analysis.foresight import (
-    ForesightFlag,
+    ForesightCurves,
     ForesightModel,
-    ForesightRun,
+    JudgedForesight,
+    JudgedTask,
     RigIdentity,
-    SlipScore,
-    fit_foresight,
-    fit_ground,
-    folds_of,
-    foresight_curves,
-    hold_out,
-    score_ground,
-    score_slips,
+    WatchedTrial,
+    judge,
+    plan_judged,
     watch_all,
 )
-from analysis.report import ReportFigure, ReportTable, foresight_figure
-from analysis.study import Study
-from analysis.terrains import break_away_of
-from experiments.report.tables import SLID, foresight_tables
+from analysis.report import (
+    ReportFigure,
+    ReportTable,
+    drawn_once,
+    foresight_figure,
+)
+from analysis.study import Store, Study
+from experiments.report.tables import foresight_tables
 from experiments.rig import ForesightSource, state_record, states_of
 
-LEAST_TRIALS = 5  # of a study: as many as there are folds
 OPEN_END = 25  # last states that a process may not have come to at the end
 
 
@@ -55,85 +55,67 @@ class StudyForesight:
 def study_foresight(
     study: Study,
     trials: Mapping[str, Sequence[RecordedTrial]],
-    progress: Callable[[], object] = lambda: None,
+    break_away: Mapping[str, BreakAwayModel],
+    store: Store | None = None,
     *,
     with_pdf: bool = False,
 ) -> StudyForesight:
     """Return what the trials of a study teach, and what that is worth on others.
 
     Args:
-        study: gives kinds and break-away models.
+        study: gives kinds.
         trials: recorded trials by terrain.
-        progress: called after every fold.
+        break_away: models by terrain.
+        store: outcomes of earlier reports.
         with_pdf: figures are wanted as PDF, too.
     """
-    watched = watch_all(trials, study.kinds)
-    model = fit_foresight(watched)
-    if model is None or len(watched) < LEAST_TRIALS:
-        return StudyForesight(model, (), {})
-    runs = hold_out(watched, break_away_of(study), progress)
-    scores = _slip_scores(runs) if model.slip is not None else {}
-    ground = score_ground(
-        [(fit_ground(rest), tested) for tested, rest in folds_of(watched)]
-    )
-    grounds = _ground_rows(runs)
+    task = plan_judged(trials, study.kinds, break_away)
+    judged = judged_foresight(task, lambda: watch_all(trials, study.kinds), store)
+    if judged.curves is None:
+        return StudyForesight(judged.model, (), {})
+    surface = judged.surface
     numbers = {
-        "slips": {name: asdict(score) for name, score in scores.items()},
-        "surface": None if ground is None else asdict(ground),
-        "terrain_after_sliding": grounds,
+        "slips": {name: asdict(score) for name, score in judged.slips.items()},
+        "surface": None if surface is None else asdict(surface),
+        "terrain_after_sliding": judged.grounds,
     }
-    tables = foresight_tables(scores, grounds, ground)
-    figure = foresight_figure(
-        foresight_curves(runs), is_simulated=study.simulated, with_pdf=with_pdf
+    tables = foresight_tables(judged.slips, judged.grounds, surface)
+    figures = _figures(judged.curves, store, study.simulated, with_pdf=with_pdf)
+    return StudyForesight(judged.model, tables, numbers, figures)
+
+
+def _figures(
+    curves: ForesightCurves, store: Store | None, is_simulated: bool, *, with_pdf: bool
+) -> tuple[ReportFigure, ...]:
+    """Return the figure of foresight, none without numbers for it."""
+
+    def draw() -> list[ReportFigure]:
+        figure = foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
+        return [] if figure is None else [figure]
+
+    drawn = drawn_once(
+        curves, draw, store, is_simulated=is_simulated, with_pdf=with_pdf
     )
-    figures = () if figure is None else (figure,)
-    return StudyForesight(model, tables, numbers, figures)
+    return tuple(drawn)
 
 
-def _slip_scores(runs: Sequence[ForesightRun]) -> dict[str, SlipScore]:
-    """Return scores by terrain, and of all that slip together."""
-    scores: dict[str, SlipScore] = {}
-    for name in dict.fromkeys(run.trial.terrain for run in runs):
-        scores[name] = score_slips([r for r in runs if r.trial.terrain == name])
-    slipping = {name for name, score in scores.items() if score.onsets}
-    together = [run for run in runs if run.trial.terrain in slipping]
-    if len(slipping) > 1:
-        scores["all that slip"] = score_slips(together)
-    return scores
+def judged_foresight(
+    task: JudgedTask, watched: Callable[[], Sequence[WatchedTrial]], store: Store | None
+) -> JudgedForesight:
+    """Return what trials teach and what that is worth; from the store where it is kept.
 
-
-def _ground_rows(runs: Sequence[ForesightRun]) -> dict[str, dict[str, list[float]]]:
-    """Return mean probability of the own terrain and surface by time slid."""
-    rows: dict[str, dict[str, list[float]]] = {}
-    for name in dict.fromkeys(run.trial.terrain for run in runs):
-        own = [shares for r in runs if r.trial.terrain == name if (shares := _own(r))]
-        if own:
-            means = np.nanmean(np.array(own), axis=0)
-            names = ("terrain", "surface", "none")
-            rows[name] = dict(zip(names, means.tolist(), strict=True))
-    return rows
-
-
-def _own(run: ForesightRun) -> list[list[float]]:
-    """Return probabilities of the own terrain, its surface and none after `SLID`."""
-    if run.trial.terrain not in run.terrains:
-        return []
-    place = run.terrains.index(run.trial.terrain)
-    own = run.trial.surface
-    alike = [k for k, surface in enumerate(run.surfaces) if surface == own]
-    wanted = int(ForesightFlag.SLIDING)
-    sliding = [state for state in run.states if state.flags & wanted]
-    states = [sliding[n - 1] if n <= len(sliding) else None for n in SLID]
-    terrain = [np.nan if s is None else s.terrains[place] for s in states]
-    none = [np.nan if s is None else s.none for s in states]
-    known = [np.nan if s is None else _part(s.terrains, alike) for s in states]
-    return [terrain, known, none]
-
-
-def _part(shares: Sequence[float], chosen: Sequence[int]) -> float:
-    """Return the part that the chosen terrains have of all known ones."""
-    total = sum(shares)
-    return sum(shares[k] for k in chosen) / total if total > 0.0 else float("nan")
+    Args:
+        task: what it follows from.
+        watched: gives its trials, watched; called only where nothing is kept.
+        store: outcomes of earlier reports.
+    """
+    kept = None if store is None else store.get(task)
+    if isinstance(kept, JudgedForesight):
+        return kept
+    outcome = judge(watched(), task.break_away)
+    if store is not None:
+        store.put(task, outcome)
+    return outcome
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,12 @@ from pathlib import Path
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from analysis.data import RecordedTrial, doubts_of_record, load_trial, summed_up
 from analysis.findings import summarise_rig
-from analysis.foresight import fit_foresight, watch_all
+from analysis.foresight import JUDGED_TYPES, fit_foresight, watch_all
 from analysis.report import (
+    DRAWN_TYPES,
     BedPhoto,
     ReportContext,
+    StudyVariant,
     plain_choice,
     side_by_side,
     write_report,
@@ -20,28 +22,24 @@ from analysis.study import (
     GP_SE,
     GP_SE_NOISE,
     GP_SE_TRIAL,
+    TYPES,
     FitOptions,
     ResultStore,
     Study,
     StudyOptions,
     run_study,
 )
-from analysis.terrains import database_of, identify_study
-from experiments.messages import CATALOGUE
-from experiments.operator import WARNING, Console
+from analysis.terrains import break_away_of, database_of, identify_study
+from experiments.operator import Console
 from experiments.report.choices import AnalysisChoices, repeat_study
-from experiments.report.foresight import study_foresight
+from experiments.report.foresight import StudyForesight, study_foresight
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
 from experiments.report.truth_errors import truth_tables
 from experiments.session import (
     SessionFolder,
-    check_kept,
-    find_session,
     iso_utc,
-    list_sessions,
     photos_of,
-    replay,
     write_new_text,
 )
 
@@ -76,56 +74,6 @@ class ReportRequest:
         """Return `names` in the matrix's order, others last by name."""
         place = {name: i for i, name in enumerate(self.terrains)}
         return sorted(names, key=lambda name: (place.get(name, len(place)), name))
-
-
-def choose_sessions(
-    data: Path, names: Sequence[str], *, every: bool
-) -> list[SessionFolder]:
-    """Return the sessions to report, of one kind only.
-
-    Raises:
-        SessionError: none are named or found, or live and simulated ones are mixed.
-    """
-    if bool(names) == every:
-        hint = "For example: traction report S012"
-        raise SessionError("Name the sessions to report, or use --all.", hint=hint)
-    if every:
-        pushed = [s for s in list_sessions(data) if not s.is_of_stances]
-        sessions = [s for s in pushed if s.kept_trials() or _keeps(s)]
-    else:
-        sessions = [find_session(data, name) for name in dict.fromkeys(names)]
-    if standing := [s.id for s in sessions if s.is_of_stances]:
-        what = f"{' '.join(standing)}: sessions of stances have no pushes to report."
-        raise SessionError(what, hint="Leave it out.")
-    if not sessions:
-        hint = "Record some: traction run S0 --fake --fast"
-        raise SessionError(f"There are no kept trials in {data}.", hint=hint)
-    simulated = [s for s in sessions if s.is_simulated]
-    if simulated and len(simulated) < len(sessions):
-        message, values = CATALOGUE["mixed"], {"session": simulated[0].id}
-        what, hint = (t.format_map(values) for t in (message.what, message.do))
-        raise SessionError(what, hint=hint)
-    return sessions
-
-
-def _keeps(session: SessionFolder) -> bool:
-    """Return whether the journal keeps a trial, whatever became of its files."""
-    return bool(replay(session.events()).kept)
-
-
-def tell_missing(
-    sessions: Sequence[SessionFolder], console: Console, *, allow_missing: bool
-) -> list[str]:
-    """Name the kept trials that are missing or changed, and return the messages.
-
-    Raises:
-        KeptDataError: there are some, and `allow_missing` is false.
-    """
-    deviations = check_kept(sessions, allow_missing=allow_missing)
-    texts = [f"Not as in the journal: {deviation.text()}." for deviation in deviations]
-    for text in texts:
-        console.problem(f"{WARNING} {text}")
-    return texts
 
 
 def _load_trials(
@@ -169,6 +117,11 @@ class StudySession:
     problems: list[str]
 
 
+def results_below(data: Path) -> ResultStore:
+    """Return the store of results below a folder of data."""
+    return ResultStore(data / FOLDS, types={**TYPES, **JUDGED_TYPES, **DRAWN_TYPES})
+
+
 def study_sessions(
     sessions: Sequence[SessionFolder],
     data: Path,
@@ -197,9 +150,7 @@ def study_sessions(
     )
     series = {name: [t.series() for t in group] for name, group in trials.items()}
     with fitting(console) as progress:
-        study = run_study(
-            series, options, is_simulated, progress, ResultStore(data / FOLDS)
-        )
+        study = run_study(series, options, is_simulated, progress, results_below(data))
     return StudySession(study, trials, problems)
 
 
@@ -242,7 +193,7 @@ def export_terrains(
         replace(study, options=options),
         identify_study(study),
         iso_utc(SystemClock().utc_ns()),
-        store=ResultStore(data / FOLDS),
+        store=results_below(data),
         foresight=fit_foresight(watch_all(analysed.trials, study.kinds)),
     )
     write_new_text(out, text)
@@ -266,13 +217,32 @@ def report_sessions(
     fit = FitOptions(order.choices.bounds, seed=order.seed, models=REPORTED)
     analysed = study_sessions(sessions, data, order, console, fit)
     study, trials = analysed.study, analysed.trials
-    store = ResultStore(data / FOLDS)
+    store = results_below(data)
+    break_away = break_away_of(study, store)
     others = repeat_study(study, trials, order.choices.variants, console, store)
-    foresight = study_foresight(study, trials, with_pdf=order.with_pdf)
+    foresight = study_foresight(
+        study, trials, break_away, store, with_pdf=order.with_pdf
+    )
+    own = sessions[0].path if len(sessions) == 1 else data / "study"
+    context = _context(sessions, order, analysed, foresight, others)
+    context = replace(context, break_away=break_away, store=store)
+    page = write_report(study, order.out or own, context)
+    console.table(*summary_table(study))
+    return page
+
+
+def _context(
+    sessions: Sequence[SessionFolder],
+    order: ReportRequest,
+    analysed: StudySession,
+    foresight: StudyForesight,
+    others: Sequence[tuple[StudyVariant, Study]],
+) -> ReportContext:
+    """Return what the report shows beyond the study."""
+    study, trials = analysed.study, analysed.trials
     photos, unsound = photos_of(sessions)
     count = sum(len(group) for group in trials.values())
-    own = sessions[0].path if len(sessions) == 1 else data / "study"
-    context = ReportContext(
+    return ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
         subtitle=f"{count} trials on {', '.join(trials)}",
         is_simulated=study.simulated,
@@ -295,6 +265,3 @@ def report_sessions(
         foresight=foresight.model if len(sessions) > 1 else None,
         with_pdf=order.with_pdf,
     )
-    page = write_report(study, order.out or own, context)
-    console.table(*summary_table(study))
-    return page

@@ -10,12 +10,11 @@ from acquisition.trial_file import list_folder
 from analysis.data import RecordedTrial
 from analysis.figures import ReportSection
 from analysis.findings import traction_ratio
-from analysis.foresight import GroundScore, SlipScore
+from analysis.foresight import SLID, GroundScore, SlipScore
 from analysis.report import ReportTable
 from analysis.study import GP_SE, TUSTIN, Study
 from experiments.session import SessionFolder, read_json
 
-SLID = (25, 50, 100, 200)  # ticks of sliding after which the ground is asked
 _SLIP_HEADER = (
     *("terrain", "slips", "recall", "lead [ms]", "0.1 s ahead", "needless time"),
     *("false alarms/min", "false-alarm share", "recall by chance", "calibration error"),

@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 
 from analysis.data.series import TractionSeries
+from analysis.foresight.judged import JudgedTask, WatchedSource
 from analysis.foresight.model import RigIdentity
 from analysis.foresight.training import fit_foresight
 from analysis.foresight.watching import watch_series
@@ -77,3 +78,12 @@ def trials(first, count):
 def model():
     """Return what five pushes on each ground teach."""
     return fit_foresight(trials(0, 5))
+
+
+def judged_task(watched):
+    """Return the task of watched pushes, their samples taken to have one digest."""
+    sources = [
+        WatchedSource(t.terrain, t.name, t.surface, t.rig, t.seed, "0" * 64)
+        for t in watched
+    ]
+    return JudgedTask(tuple(sources), {})

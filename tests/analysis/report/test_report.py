@@ -8,9 +8,10 @@ from acquisition.errors import SettingsError
 from analysis.figures.curves import caption_gp, draw_tustin_model
 from analysis.figures.errors import draw_cross_bars, draw_cross_map, draw_errors
 from analysis.figures.excerpts import draw_excerpts
+from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
 from analysis.figures.selection import busiest_window, panels
-from analysis.figures.style import Picture, render, styled
+from analysis.figures.style import render, styled
 from analysis.figures.surfaces import near_samples
 from analysis.findings.findings import compute_results
 from analysis.report.page import ReportContext, ReportTable, render_page, write_report
@@ -157,7 +158,7 @@ def test_a_report_without_pdfs_leaves_none_of_an_earlier_one(
     def drawn(key, *_, with_pdf, **__):
         return Picture(key, b"png", b"pdf" if with_pdf else b"")
 
-    monkeypatch.setattr("analysis.report.page.render", drawn)
+    monkeypatch.setattr("analysis.report.drawing.render", drawn)
     write_report(small_study, tmp_path, context(with_pdf=True))
     figures = tmp_path / "figures"
     assert {file.suffix for file in figures.iterdir()} == {".pdf", ".png"}
@@ -177,7 +178,7 @@ def test_a_further_figure_stands_on_the_page_until_a_report_has_none(
     small_study, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(
-        "analysis.report.page.render", lambda key, *_, **__: Picture(key, b"png")
+        "analysis.report.drawing.render", lambda key, *_, **__: Picture(key, b"png")
     )
     further = ReportFigure(
         ReportSection.BEYOND, "Foresight", "Four panels.", "Seen.", FORESIGHT

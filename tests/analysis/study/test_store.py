@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.breakaway.censored import Family
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.study.crossval import plan_folds, run_fold
 from analysis.study.jobs import run_tasks
@@ -21,7 +22,7 @@ from analysis.study.store import (
 )
 
 ANY = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary(),
     lambda inner: st.lists(inner).map(tuple) | st.dictionaries(st.text(), inner),
     max_leaves=10,
 )
@@ -67,13 +68,21 @@ def test_arrays_come_back_bit_by_bit():
         {"array": "AAAA", "dtype": "object", "shape": [1]},
         {"array": "!", "dtype": "float64", "shape": []},
         {"number": "1"},
+        {"bytes": "AAA"},
+        {"bytes": "!AAA"},
+        {"type": "FitOptions", "value": "weibull"},
+        {"type": "Family", "value": "normal"},
         {"items": 5},
         {},
     ],
 )
 def test_what_is_no_plain_form_is_refused(plain):
     with pytest.raises(ValueError, match=r".+"):
-        decode(plain, {"FitOptions": FitOptions})
+        decode(plain, {"FitOptions": FitOptions, "Family": Family})
+
+
+def test_a_member_of_an_enumeration_comes_back_as_itself():
+    assert decode(encode(Family.LOGNORMAL), {"Family": Family}) is Family.LOGNORMAL
 
 
 def test_what_has_no_plain_form_is_not_written():

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from analysis.figures.style import Picture
+from analysis.figures.pictures import Picture
 from tests.experiments.program import traction
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -65,11 +65,11 @@ def odd(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         # what is said is tested here; pictures cost seconds, see the long test
         patch.setattr(
-            "analysis.report.page.render",
+            "analysis.report.drawing.render",
             lambda key, *_, **__: Picture(key, b"png", b"pdf"),
         )
         patch.setattr("analysis.study.jobs.available_cores", lambda: 1)
-        patch.setattr("analysis.report.page.available_cores", lambda: 1)
+        patch.setattr("analysis.report.drawing.available_cores", lambda: 1)
         yield fitted(tmp_path_factory.mktemp("odd"))
 
 

@@ -1,0 +1,195 @@
+"""The figures of a report, drawn once for the same numbers and the same code.
+
+Drawing takes longer than all else of a report whose fits are kept, so its figures may
+be kept, too. They are known by a digest of all that they show and of the code that
+draws them: whatever is changed in the analysis, they are drawn anew.
+"""
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from analysis.figures import (
+    PAGE_ORDER,
+    FigureSpec,
+    Picture,
+    ReportSection,
+    break_away,
+    confusion,
+    curves,
+    errors,
+    excerpts,
+    render,
+    rig,
+    styled,
+    surfaces,
+    trials,
+    uncertainty,
+)
+from analysis.findings import StudyResults
+from analysis.report.page_model import ReportFigure
+from analysis.study import Store, Study, available_cores, run_tasks, task_key
+
+_MOST_DRAWING = 4  # processes
+_MANY_TERRAINS = 4  # from which on they pay
+_DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
+DRAWN_TYPES: Mapping[str, type] = {
+    kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
+}
+_FAMILIES = (
+    *(excerpts, curves, surfaces, errors, uncertainty),
+    *(break_away, confusion, trials, rig),
+)
+FIGURES: tuple[FigureSpec, ...] = tuple(
+    sorted(
+        (spec for family in _FAMILIES for spec in family.FIGURES),
+        key=lambda spec: PAGE_ORDER.index(spec.key),
+    )
+)
+
+
+def report_figures(
+    results: StudyResults, n_jobs: int = 1, *, with_pdf: bool = False
+) -> list[ReportFigure]:
+    """Return every figure that there are numbers for, in the order of the page.
+
+    Args:
+        results: what is shown.
+        n_jobs: processes that draw; they share no figure, so pictures are the same.
+        with_pdf: figures are wanted as PDF, too.
+    """
+    batches = [FigureBatch(results, k, n_jobs, with_pdf) for k in range(n_jobs)]
+    drawn: dict[str, ReportFigure] = {}
+    for batch in run_tasks(draw_batch, batches, n_jobs):
+        drawn |= {figure.picture.key: figure for figure in batch}
+    return [drawn[spec.key] for spec in FIGURES if spec.key in drawn]
+
+
+@dataclass(frozen=True, slots=True)
+class FigureBatch:
+    """The figures that one process draws.
+
+    Attributes:
+        results: what is shown.
+        first: number of its first figure.
+        step: from one of its figures to the next.
+        with_pdf: figures are wanted as PDF, too.
+    """
+
+    results: StudyResults
+    first: int
+    step: int
+    with_pdf: bool = False
+
+
+def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
+    """Return the figures of a batch that there are numbers for."""
+    with styled():
+        figures = [_draw(spec, batch) for spec in FIGURES[batch.first :: batch.step]]
+    return [figure for figure in figures if figure is not None]
+
+
+def _draw(spec: FigureSpec, batch: FigureBatch) -> ReportFigure | None:
+    results = batch.results
+    figure = spec.draw(results)
+    if figure is None:
+        return None
+    is_simulated = results.study.simulated
+    picture = render(
+        spec.key,
+        figure,
+        is_simulated,
+        is_vector=spec.is_vector,
+        with_pdf=batch.with_pdf,
+    )
+    return ReportFigure(
+        spec.section, spec.title, spec.alt, spec.caption(results), picture
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingTask:
+    """What figures follow from.
+
+    Attributes:
+        shown: digest of the numbers.
+        code: digest of the code that draws.
+        is_simulated: the numbers were.
+        with_pdf: figures are wanted as PDF, too.
+    """
+
+    shown: str
+    code: str
+    is_simulated: bool
+    with_pdf: bool
+
+
+def kept_figures(
+    results: StudyResults, store: Store | None = None, *, with_pdf: bool = False
+) -> list[ReportFigure]:
+    """Return every figure that there are numbers for, in the order of the page.
+
+    Args:
+        results: what is shown.
+        store: figures of earlier reports.
+        with_pdf: figures are wanted as PDF, too.
+    """
+    study = results.study
+
+    def draw() -> list[ReportFigure]:
+        return report_figures(results, _processes(study), with_pdf=with_pdf)
+
+    return drawn_once(
+        results, draw, store, is_simulated=study.simulated, with_pdf=with_pdf
+    )
+
+
+def drawn_once(
+    shown: Any,  # noqa: ANN401
+    draw: Callable[[], Sequence[ReportFigure]],
+    store: Store | None,
+    *,
+    is_simulated: bool,
+    with_pdf: bool,
+) -> list[ReportFigure]:
+    """Return figures from the store, or draw and keep them.
+
+    Args:
+        shown: all that they show, as a value that a store can keep.
+        draw: draws them.
+        store: figures of earlier reports.
+        is_simulated: the numbers were.
+        with_pdf: figures are wanted as PDF, too.
+    """
+    if store is None:
+        return list(draw())
+    task = DrawingTask(task_key(shown), code_digest(), is_simulated, with_pdf)
+    kept = store.get(task)
+    if isinstance(kept, tuple) and all(isinstance(k, ReportFigure) for k in kept):
+        return list(kept)
+    drawn = list(draw())
+    store.put(task, drawn)
+    return drawn
+
+
+@lru_cache
+def code_digest() -> str:
+    """Return the SHA-256 of the analysis and of the libraries' versions."""
+    folder = Path(__file__).parents[1]
+    digest = hashlib.sha256(" ".join(map(version, _DRAWN_BY)).encode())
+    for path in sorted(folder.rglob("*.py")):
+        content = path.read_bytes()
+        digest.update(f"{path.relative_to(folder)} {len(content)} ".encode())
+        digest.update(content)
+    return digest.hexdigest()
+
+
+def _processes(study: Study) -> int:
+    """Return how many processes draw; few panels cost less than starting one."""
+    if len(study.terrains) < _MANY_TERRAINS:
+        return 1
+    return min(study.options.n_jobs or available_cores(), _MOST_DRAWING)

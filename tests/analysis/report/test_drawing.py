@@ -1,0 +1,94 @@
+import pytest
+
+from analysis.figures.pictures import Picture
+from analysis.figures.sections import ReportSection
+from analysis.report import drawing
+from analysis.report.drawing import DRAWN_TYPES, code_digest, drawn_once
+from analysis.report.page_model import ReportFigure
+from analysis.study.store import TYPES, ResultStore
+
+PICTURE = Picture("rig", b"\x89PNG\x00\xff", b"%PDF", 1146, "<svg></svg>")
+FIGURE = ReportFigure(ReportSection.HEALTH, "Rig", "bars", "It is well.", PICTURE)
+
+
+@pytest.fixture
+def store(tmp_path):
+    return ResultStore(tmp_path, types={**TYPES, **DRAWN_TYPES})
+
+
+class Pen:
+    """Draws, and counts how many times."""
+
+    drawings = 0
+
+    def __call__(self):
+        self.drawings += 1
+        return [FIGURE]
+
+
+def drawn(pen, store, shown=(1.0, 2.0), *, is_simulated=True, with_pdf=False):
+    return drawn_once(shown, pen, store, is_simulated=is_simulated, with_pdf=with_pdf)
+
+
+def test_the_same_numbers_are_drawn_once_and_come_back_byte_by_byte(store):
+    pen = Pen()
+    assert drawn(pen, store) == drawn(pen, store) == [FIGURE]
+    assert pen.drawings == 1
+
+
+def test_without_a_store_figures_are_drawn_every_time():
+    pen = Pen()
+    assert drawn(pen, None) == drawn(pen, None) == [FIGURE]
+    assert pen.drawings == 2
+
+
+@pytest.mark.parametrize(
+    "change", [{"shown": (1.0, 2.5)}, {"is_simulated": False}, {"with_pdf": True}]
+)
+def test_other_numbers_or_wishes_are_drawn_anew(store, change):
+    pen = Pen()
+    drawn(pen, store)
+    drawn(pen, store, **change)
+    assert pen.drawings == 2
+
+
+def test_changed_code_draws_anew(store, monkeypatch):
+    pen = Pen()
+    drawn(pen, store)
+    monkeypatch.setattr(drawing, "code_digest", lambda: "other")
+    drawn(pen, store)
+    assert pen.drawings == 2
+
+
+def test_any_byte_of_the_analysis_is_in_its_digest(tmp_path, monkeypatch):
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report" / "drawing.py").write_text("")
+    (tmp_path / "model.py").write_text("a = 1")
+    monkeypatch.setattr(drawing, "__file__", str(tmp_path / "report" / "drawing.py"))
+    digests = set()
+    for text in ("a = 1", "a = 2", "a = 1\n"):
+        (tmp_path / "model.py").write_text(text)
+        code_digest.cache_clear()
+        digests.add(code_digest())
+    code_digest.cache_clear()
+    assert len(digests) == 3
+
+
+@pytest.mark.parametrize("kept", [b"", b"{}"], ids=len)
+def test_damaged_figures_are_drawn_anew(tmp_path, store, kept):
+    pen = Pen()
+    drawn(pen, store)
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(kept)
+    assert drawn(pen, store) == [FIGURE]
+    assert pen.drawings == 2
+
+
+def test_what_is_no_figure_is_drawn_anew(store):
+    pen = Pen()
+    task = drawing.DrawingTask(
+        drawing.task_key((1.0, 2.0)), code_digest(), is_simulated=True, with_pdf=False
+    )
+    store.put(task, ["figure"])
+    assert drawn(pen, store) == [FIGURE]
+    assert pen.drawings == 1
