@@ -3,7 +3,8 @@
 
 A trial on level ground is simulated once to note what every part was given, once again
 to time whole cycles, and then each part by itself is given the same. Medians are over
-cycles in contact; integration is what the other parts leave of the whole.
+cycles in contact; integration is what the other parts leave of the whole. All of it is
+of the dynamics in Pinocchio; the compiled ones, which have no parts, come last.
 """
 
 import argparse
@@ -21,6 +22,8 @@ import pinocchio as pin
 from acquisition.clock import PERIOD_NS
 from fakes.ground.contact import Contact, Motion
 from fakes.ground.terrain import Terrain, make_terrain
+from fakes.kernels import COMPILED, PINOCCHIO, chosen_dynamics
+from fakes.plant.model import PlantOptions
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import HandView, Pace, Push, Vector3
 from fakes.randomness import TrialGenerators, trial_generators
@@ -116,6 +119,8 @@ def measure(cycles: int) -> list[PageSection]:
     timed["integration"] = [
         whole - sum(rest) for whole, *rest in zip(*timed.values(), strict=True)
     ]
+    if chosen_dynamics() == COMPILED:
+        timed["whole, compiled"] = list(_run(cycles, None, COMPILED))
     kept = {
         name: [
             us for us, touches in zip(row, notes.is_touching, strict=True) if touches
@@ -126,11 +131,17 @@ def measure(cycles: int) -> list[PageSection]:
     return [_part(name, row, whole) for name, row in kept.items()]
 
 
-def _run(cycles: int, notes: Notes | None) -> Iterator[float]:
+def _run(
+    cycles: int, notes: Notes | None, dynamics: str = PINOCCHIO
+) -> Iterator[float]:
     """Simulate a push; yield what each cycle took [us]."""
     model = ArmModel(load_constants(), _tool())
-    plant = _plant(model)
+    plant = _plant(model, dynamics)
     plant.terrain = _ground() if notes is None else _NotedGround(notes)
+    if plant.is_compiled:
+        from fakes.ground.compiled import compiled_ground
+
+        plant.terrain = compiled_ground(plant.terrain)
     plant.set_braking(is_braked=False, is_powered=True)
     plant.hand.put_down(plant.terrain.surface(0.0))
     for _ in range(_SETTLING):
@@ -237,9 +248,10 @@ def _tool() -> Tool:
     return Tool(sensor_body(), foot, np.array([0.01, 0.0, 0.112]))
 
 
-def _plant(model: ArmModel) -> ArmPlant:
+def _plant(model: ArmModel, dynamics: str) -> ArmPlant:
     q = solve_start(model, _FRAME, _START, 0.02)
-    return ArmPlant(model.constants, _tool(), _FRAME, q)
+    options = PlantOptions(dynamics=dynamics)
+    return ArmPlant(model.constants, _tool(), _FRAME, q, options)
 
 
 def _random() -> TrialGenerators:
@@ -257,10 +269,10 @@ def _part(name: str, took: list[float], whole: float) -> PageSection:
 
 
 def _print_table(parts: list[PageSection], cycles: int) -> None:
-    print(f"{'part':14}{'p50 us':>10}{'p99 us':>10}{'share':>8}")
+    print(f"{'part':17}{'p50 us':>10}{'p99 us':>10}{'share':>8}")
     for part in parts:
         print(
-            f"{part.name:14}{part.median_us:10.1f}{part.p99_us:10.1f}{part.share:8.2f}"
+            f"{part.name:17}{part.median_us:10.1f}{part.p99_us:10.1f}{part.share:8.2f}"
         )
     verdict = "met" if parts[0].median_us <= GOAL_US else "missed"
     print(f"{cycles} cycles; goal {GOAL_US:.0f} us per cycle: {verdict}")

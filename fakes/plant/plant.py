@@ -78,7 +78,7 @@ class ArmPlant:
         self._push = (0.0, 0.0, 0.0)  # force of the hand
         self._body: ArmBody = _build_body(parts, constants, self.friction, q, options)
         self.disturbance = self._body.disturbance
-        self._wrist = WristGauges(tool, up, PERIOD_NS * 1e-9)
+        self._wrist = self._build_gauges(tool, up)
         self._wrist.end_cycle(self._body.rotation, self._ground, [0.0] * 6)
 
     @property
@@ -90,6 +90,13 @@ class ArmPlant:
     def is_compiled(self) -> bool:
         """Whether a ground with compiled steps is stepped fastest."""
         return self._body.dynamics == COMPILED
+
+    def _build_gauges(self, tool: Tool, up: Array) -> WristGauges:
+        if not self.is_compiled:
+            return WristGauges(tool, up, PERIOD_NS * 1e-9)
+        from fakes.plant.compiled import CompiledGauges
+
+        return CompiledGauges(tool, up, PERIOD_NS * 1e-9)
 
     @property
     def q(self) -> Array:

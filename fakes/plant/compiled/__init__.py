@@ -1,7 +1,7 @@
 """The simulated arm as a record of plain numbers, moved by compiled functions.
 
 `motion` is links and dynamics, `drives` friction and stops, `substeps` puts them
-together, `body` is what the plant sees. Begin with `body`.
+together, `body` and `gauges` are what the plant sees. Begin with `body`.
 """
 
 import lazy_loader

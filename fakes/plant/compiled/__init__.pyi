@@ -1,3 +1,4 @@
 from .body import CompiledBody
+from .gauges import CompiledGauges
 
-__all__ = ["CompiledBody"]
+__all__ = ["CompiledBody", "CompiledGauges"]

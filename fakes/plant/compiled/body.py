@@ -2,6 +2,7 @@
 """The arm's dynamics in machine code: the same model, one call for many substeps."""
 
 from collections.abc import Sequence
+from struct import Struct
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from fakes.plant.joints import BEARING_NS
 from fakes.plant.model import ArmAndHand
 from fakes.plant.push import Vector3
 from wam.model import ArmConstants, Array, MotorFriction
+
+_OFFSETS = {name: place[1] for name, place in (BODY.fields or {}).items()}
+# Packed in half the time in which numpy looks through a list.
+_UNITS, _HAND_LOAD, _FLAGS = Struct("7d"), Struct("5d"), Struct("2q")
 
 
 class CompiledBody:
@@ -47,7 +52,8 @@ class CompiledBody:
             times: length of a substep, and how far into a cycle the Jacobians are
                 taken [s].
         """
-        self._bodies = np.zeros(1, BODY)
+        self._bytes = bytearray(BODY.itemsize)
+        self._bodies = np.frombuffer(self._bytes, BODY)
         self._record = record = self._bodies[0]
         self._no_ground, self._given = np.zeros(1, GROUND), np.zeros(1, GROUND)
         self._given["kind"] = GIVEN
@@ -57,11 +63,9 @@ class CompiledBody:
         self.disturbance = record["disturbance"]
         self._motion, self._hand_rates = record["motion"], record["hand_rates"]
         self._hand_at, self._rotation = record["hand_at"], record["foot_rotation"]
-        self._sum, self._sent, self._tau = record["sum"], record["sent"], record["tau"]
-        self._push, self._grip = record["push"], record["grip"]
-        self._driving = record["driving"]
-        self._ipnm = np.array(constants.ipnm, dtype=float)
-        self._j2mp_T = constants.j2mp.T.copy()
+        self._sum = record["sum"]
+        self._disturbed = record["disturbed"]
+        self._left, self._is_driven = self._bodies["left"], self._bodies["is_driven"]
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
         self._rows = np.stack((q, np.zeros(7), np.zeros(7)))
@@ -109,11 +113,9 @@ class CompiledBody:
 
     def drive(self, units: Sequence[float]) -> None:
         """Apply torques [puck units] to motors 1 to 7 from now on."""
-        np.divide(units, self._ipnm, out=self._sent)
-        self._j2mp_T.dot(self._sent, out=self._tau)
-        np.add(self._tau, self.disturbance, out=self._driving)
-        if self._record["is_near"]:
-            self._driving += self._record["stop_torques"]
+        _UNITS.pack_into(self._bytes, _OFFSETS["units"], *units)
+        self._is_driven[0] = 1
+        self._disturbed[:] = self.disturbance
 
     def counts(self) -> list[float]:
         """Return what the encoders of the motors count, seven."""
@@ -135,10 +137,9 @@ class CompiledBody:
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
         """Take anew what stays as it is for 2 ms from `t_ns` on."""
-        record = self._record
-        self._push[:], self._grip[:] = load
-        record["is_bearing"] = t_ns % BEARING_NS == 0
-        record["is_fresh"] = 1
+        is_bearing = t_ns % BEARING_NS == 0
+        _HAND_LOAD.pack_into(self._bytes, _OFFSETS["hand_load"], *load[0], *load[1])
+        _FLAGS.pack_into(self._bytes, _OFFSETS["is_bearing"], is_bearing, 1)
 
     def go_on(self, steps: int, terrain: Terrain | None) -> None:
         """Go on by `steps` substeps within a cycle."""
@@ -146,7 +147,7 @@ class CompiledBody:
             self._go_on_given(steps, terrain)
             return
         self._rows = rows = self._rows.copy()  # what was taken of the old ones stays
-        self._record["left"] = steps
+        self._left[0] = steps
         if terrain is None:
             go_on(self._bodies, self._no_ground, rows)
             return
@@ -160,7 +161,7 @@ class CompiledBody:
             x, y, z, vx, vy, vz, wx, wy, wz = self._motion.tolist()
             motion = (x, y, z, vx, vy, vz, wx, wy, wz)
             self._given["contact"] = terrain.step(dt, motion)
-            self._rows, self._record["left"] = self._rows.copy(), 1
+            self._rows, self._left[0] = self._rows.copy(), 1
             go_on(self._bodies, self._given, self._rows)
 
     def take_ground(self) -> list[float]:

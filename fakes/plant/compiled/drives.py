@@ -20,6 +20,8 @@ _FIXED = [
     ("dt", float),
     ("drive_inertia", float, (7,)),
     ("j2mp", float, (7, 7)),
+    ("ipnm", float, (7,)),
+    ("units", float, (7,)),  # that were sent
     ("lower", float, (7,)),
     ("upper", float, (7,)),
     ("coulomb", float, (7,)),  # at no load
@@ -37,14 +39,16 @@ _FIXED = [
     ("lively", float, (7,)),  # speed from which a bristle is taken anew sooner
 ]
 _OF_A_CYCLE = [
-    ("is_fresh", np.int64),  # the drives are to be taken anew
-    ("is_bearing", np.int64),  # and with them load and ripple of the friction
+    ("is_bearing", np.int64),  # load and ripple of the friction are to be taken anew
+    ("is_fresh", np.int64),  # so are the drives
+    ("is_driven", np.int64),  # so are the torques that were sent
     ("is_near", np.int64),  # to a stop
     ("is_lively", np.int64),
     ("ways", float, (7, 2)),  # dry friction forward and backward
     ("sent", float, (7,)),  # torques of the motors
     ("tau", float, (7,)),  # the same at the joints
     ("disturbance", float, (7,)),
+    ("disturbed", float, (7,)),  # the disturbance when torques were sent last
 ]
 _OF_A_SUBSTEP = [
     ("speeds", float, (7,)),  # of the motors
@@ -72,7 +76,7 @@ def take_drives(
     """Take friction, transmission and stops."""
     record["dt"] = dt
     record["drive_inertia"] = np.diag(drive_inertia_matrix(constants))
-    record["j2mp"] = constants.j2mp
+    record["j2mp"], record["ipnm"] = constants.j2mp, constants.ipnm
     record["lower"], record["upper"] = constants.q_lower, constants.q_upper
     record["coulomb"] = friction.coulomb - friction.load * friction.load_at
     for name in ("load", "asymmetry", "ripple_sin", "ripple_cos"):
@@ -95,6 +99,20 @@ def begin_drives(b, rows):
             b.is_lively = 1
     _resist(b)
     b.is_fresh = 0
+
+
+@inline
+def take_sent(b):
+    """Let the torques that were sent drive the joints."""
+    for i in range(7):
+        b.sent[i] = b.units[i] / b.ipnm[i]
+    for j in range(7):
+        total = 0.0
+        for i in range(7):
+            total += b.j2mp[i, j] * b.sent[i]
+        b.tau[j] = total
+    _add_up(b, b.disturbed)
+    b.is_driven = 0
 
 
 @inline
@@ -121,10 +139,10 @@ def follow(b):
 
 
 @inline
-def _add_up(b):
+def _add_up(b, disturbance):
     """Add up what drives the joints."""
     for i in range(7):
-        b.driving[i] = b.tau[i] + b.disturbance[i]
+        b.driving[i] = b.tau[i] + disturbance[i]
         if b.is_near:
             b.driving[i] += b.stop_torques[i]
 
@@ -143,7 +161,7 @@ def _stop(b, rows):
             if beyond != 0.0:
                 b.stop_damping[i] = STOP_B
                 b.stop_torques[i] = -STOP_K * beyond - STOP_B * rows[1, i]
-    _add_up(b)
+    _add_up(b, b.disturbance)
 
 
 @inline

@@ -15,6 +15,7 @@ from fakes.plant.compiled.drives import (
     follow,
     friction_torque,
     resist,
+    take_sent,
 )
 from fakes.plant.compiled.motion import LINKS, accelerate, linearise, take_rates
 
@@ -23,8 +24,9 @@ BODY = np.dtype(
         *LINKS,
         *DRIVES,
         ("is_held", np.int64),
-        ("push", float, (3,)),  # on the hand, with the weight that the person carries
-        ("grip", float, (2,)),  # N m/rad, N m s/rad
+        # Force on the hand with the weight that the person carries, stiffness and
+        # damping of the grip [N m/rad, N m s/rad].
+        ("hand_load", float, (5,)),
         ("sum", float, (6,)),  # of the ground's wrench
         ("left", np.int64),  # substeps
     ],
@@ -42,6 +44,8 @@ def begin_cycle(bodies, rows):
 def go_on(bodies, grounds, rows):
     """Go on by the substeps that are left; return what a ground's step waits for."""
     b, g = bodies[0], grounds[0]
+    if b.is_driven:
+        take_sent(b)
     if b.is_fresh:
         begin_drives(b, rows)
     while b.left > 0:
@@ -78,12 +82,12 @@ def _integrate(b, contact, rows):
 @inline
 def _take_torques(b, contact):
     """Turn the wrenches on foot and hand and the friction into torques."""
-    stiffness, damping = b.grip[0], b.grip[1]
+    stiffness, damping = b.hand_load[3], b.hand_load[4]
     for j in range(7):
         b.torques[j] = b.driving[j]
     for k in range(6):
         force = -contact[k] if k == 0 else contact[k]
-        on_hand = b.push[k % 3]
+        on_hand = b.hand_load[k % 3]
         if k >= 3:
             on_hand = stiffness * b.tilt[k - 3] - damping * b.hand_rates[k]
         for j in range(7):

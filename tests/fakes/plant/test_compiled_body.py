@@ -14,6 +14,7 @@ import pytest
 
 from fakes.ground.terrain import Container, make_terrain
 from fakes.kernels import COMPILED, PINOCCHIO, chosen_dynamics
+from fakes.plant.gauges import WristGauges
 from fakes.plant.model import PlantOptions, arm_and_hand
 from fakes.plant.plant import ArmPlant
 from fakes.plant.push import PACES
@@ -34,10 +35,12 @@ from wam.model.gravity import compensation
 if chosen_dynamics() != COMPILED:
     pytest.skip("nothing is compiled here", allow_module_level=True)
 from fakes.ground.compiled import compiled_ground
+from fakes.plant.compiled.gauges import CompiledGauges
 from fakes.plant.compiled.motion import accelerate, take_links
 from fakes.plant.compiled.substeps import BODY
 
 GROUNDS = [None, ("small", "tread"), ("big", "tread"), ("none", "tread")]
+GAUGES = (WristGauges, CompiledGauges)
 WINDOW = 50  # cycles
 
 
@@ -180,6 +183,19 @@ def test_a_disturbance_and_a_finger_act_alike():
     advance(plants, 20)
     assert abs(plants[0].qd[6]) > 0.01
     assert_alike(plants)
+
+
+def test_gauges_feel_alike_whatever_foot_and_ground_do():
+    rng = np.random.default_rng(4)
+    tool = replace(TOOL, sole=np.array([0.02, -0.01, 0.1]))
+    gauges = [kind(tool, FRAME.axes()[:, 2], 0.002) for kind in GAUGES]
+    for _ in range(50):
+        rotation = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        ground, rates = rng.uniform(-20, 20, 6), rng.uniform(-1, 1, 6)
+        for one in gauges:
+            one.end_cycle(rotation, ground.tolist(), rates.tolist())
+        loads = [one.load() for one in gauges]
+        assert loads[1] == pytest.approx(loads[0], abs=1e-9)
 
 
 def test_a_ground_that_only_python_knows_pushes_alike():
