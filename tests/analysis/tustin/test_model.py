@@ -240,7 +240,8 @@ def test_ever_smaller_steps_lead_to_the_bottom_of_a_bowl():
     def sse(q):
         return np.sum((q - bottoms[:, None]) ** 2, axis=-1)
 
-    found = zoom(sse, np.add(bottoms, [[0.3, -0.2], [-0.1, 0.25]]), np.full(2, 0.4), box)
+    start = np.add(bottoms, [[0.3, -0.2], [-0.1, 0.25]])
+    found = zoom(sse, start, np.full(2, 0.4), box)
     # eight halvings of 0.4; half of the last step is left
     np.testing.assert_allclose(found, bottoms, atol=0.4 / 2**7)
     outside = zoom(lambda q: q[..., 0] ** 2, np.full((2, 2), -1.0), np.ones(2), box - 3)
