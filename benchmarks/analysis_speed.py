@@ -2,18 +2,20 @@
 
     python -m benchmarks.analysis_speed
 
-Processor time, the best of a few repeats.
+Processor time, the best of a few repeats; memory is what Python and numpy allocate.
 """
 
 import tempfile
 import time
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from analysis.data import load_trial
+from analysis.data import PreparedTrial, PrepareOptions, load_trial, prepare_trial
+from analysis.findings import HeldTrial
 from analysis.study import run_fold
 from analysis.terrains.table import Table
 from benchmarks.rows import BenchRow
@@ -22,6 +24,7 @@ from experiments.__main__ import main as traction
 from experiments.report import REPORTED
 
 _SECONDS = 30.0  # of a trial
+_HELD = 8  # trials that are held at once
 
 
 def best(function: Callable[[], object], repeats: int, calls: int = 1) -> float:
@@ -35,8 +38,8 @@ def best(function: Callable[[], object], repeats: int, calls: int = 1) -> float:
     return min(times)
 
 
-def trial_row() -> BenchRow:
-    """Return what loading a simulated trial costs, scaled to 30 s of recording."""
+def trial_rows() -> list[BenchRow]:
+    """Return what a simulated trial costs, scaled to 30 s of recording."""
     with tempfile.TemporaryDirectory() as folder:
         options = "run S0 --fake --fast --operator-script auto --trials 1"
         if traction([*options.split(), "--data", folder]):
@@ -44,8 +47,27 @@ def trial_row() -> BenchRow:
         (path,) = Path(folder).glob("sessions/*/trials/T01.mcap")
         seconds = float(np.ptp(load_trial(path).t))
         spent = best(lambda: load_trial(path).series(), 7) * _SECONDS / seconds
+        held = held_bytes(path) * _SECONDS / seconds
     what = "one trial of 30 s loaded, all derived arrays"
-    return BenchRow(what, 1e3 * spent, "ms", 12)
+    return [
+        BenchRow(what, 1e3 * spent, "ms", 12),
+        BenchRow("report's memory per trial of 30 s held", held / 1e6, "MB", 1),
+    ]
+
+
+def held_bytes(path: Path) -> float:
+    """Return what a report holds of a trial, its samples prepared for fits [bytes]."""
+    _held(path)  # what is loaded once stays loaded
+    tracemalloc.start()
+    held = [_held(path) for _ in range(_HELD)]
+    used = tracemalloc.get_traced_memory()[0] / len(held)
+    tracemalloc.stop()
+    return used
+
+
+def _held(path: Path) -> tuple[HeldTrial, PreparedTrial]:
+    trial = HeldTrial.of(load_trial(path))
+    return trial, prepare_trial(trial.series, PrepareOptions())
 
 
 def fold_row() -> BenchRow:
@@ -76,7 +98,7 @@ def table_rows() -> list[BenchRow]:
 
 def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
-    return [trial_row(), fold_row(), *table_rows()]
+    return [*trial_rows(), fold_row(), *table_rows()]
 
 
 if __name__ == "__main__":

@@ -6,10 +6,22 @@ from .findings import (
     findings_rows,
     plain_findings,
 )
-from .force_uncertainty import ForceUncertainty, uncertainties_of, uncertainty_of
+from .force_uncertainty import (
+    ForceUncertainty,
+    TaredTrial,
+    uncertainties_of,
+    uncertainty_of,
+)
+from .held_trial import HeldTrial, TrialFiles
 from .new_trial_bands import BINS, ORACLE, HeldOutShares
 from .paper_claims import PaperClaim
-from .rig_health import PERIOD_EDGES, SKEW_EDGES, RigTrial, summarise_rig
+from .rig_health import (
+    PERIOD_EDGES,
+    SKEW_EDGES,
+    RigTrial,
+    summarise_rig,
+    with_tares,
+)
 from .surfaces import Surface, common_range
 from .trends import MEAN_FORCE, MEAN_LOAD, TRACTION_RATIO, Trend, traction_ratio
 
@@ -25,12 +37,15 @@ __all__ = [
     "TRACTION_RATIO",
     "ForceUncertainty",
     "HeldOutShares",
+    "HeldTrial",
     "PaperClaim",
     "RigTrial",
     "StudyResults",
     "Surface",
+    "TaredTrial",
     "TerrainBreakAway",
     "Trend",
+    "TrialFiles",
     "common_range",
     "compute_results",
     "findings_rows",
@@ -39,4 +54,5 @@ __all__ = [
     "traction_ratio",
     "uncertainties_of",
     "uncertainty_of",
+    "with_tares",
 ]

@@ -18,10 +18,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi, sqrt
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from analysis.data import Array, RecordedTrial, TareBracket
+from analysis.data import Array, TareBracket
+from ft_sensor import Payload
 
 _MEAN_KEEPS = 1.0 / 3.0  # of the variance of a sample, in the mean of a trial
 _LINE_SAMPLE, _LINE_MEAN = 2.0 / 3.0, 1.0 / 2.0  # of a tare's variance, between two
@@ -69,7 +72,31 @@ class ForceUncertainty:
         return _MEAN_ABSOLUTE * sqrt(self.sample**2 + noise**2)
 
 
-def tare_changes(trials: Sequence[RecordedTrial]) -> list[Array | None]:
+class TaredTrial(Protocol):
+    """What the tares of a trial are known by; a recorded trial has it."""
+
+    @property
+    def path(self) -> Path:
+        """The file, in the folder of its session."""
+        ...
+
+    @property
+    def metadata(self) -> dict[str, dict[str, str]]:
+        """Metadata by name."""
+        ...
+
+    @property
+    def payload(self) -> Payload:
+        """Calibration and tare that were applied."""
+        ...
+
+    @property
+    def bracket(self) -> TareBracket | None:
+        """The tares before and after it; None where one is not known."""
+        ...
+
+
+def tare_changes(trials: Sequence[TaredTrial]) -> list[Array | None]:
     """Return how far the force's zero moved from the tare of each trial to the next.
 
     Of trials without a bracket, as older recordings are, the tare of the session's next
@@ -90,7 +117,7 @@ def _of_force(bracket: TareBracket) -> Array:
 
 
 def uncertainties_of(
-    trials: Sequence[RecordedTrial],
+    trials: Sequence[TaredTrial],
 ) -> Mapping[str, ForceUncertainty]:
     """Return the uncertainty of every session that has two tares, by its name."""
     changes: dict[str, list[Array]] = {}
@@ -104,13 +131,13 @@ def uncertainties_of(
 
 
 def uncertainty_of(
-    trial: RecordedTrial, known: Mapping[str, ForceUncertainty]
+    trial: TaredTrial, known: Mapping[str, ForceUncertainty]
 ) -> ForceUncertainty | None:
     """Return the uncertainty of the trial's session, None where it is not known."""
     return known.get(_session(trial))
 
 
-def _session(trial: RecordedTrial) -> str:
+def _session(trial: TaredTrial) -> str:
     """Return the session and its folder: numbers of sessions repeat between data."""
     folder = trial.path.parent.parent.name
     return f"{folder}/{trial.metadata['trial'].get('session', '')}"

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from acquisition import Flag, SettingsError
 from analysis.data import Array, RecordedTrial, moving_average
 from analysis.findings.force_uncertainty import (
     ForceUncertainty,
+    TaredTrial,
     tare_changes,
     uncertainties_of,
     uncertainty_of,
@@ -126,28 +127,39 @@ class RigTrial:
 
 def summarise_rig(trials: Sequence[RecordedTrial]) -> list[RigTrial]:
     """Return the health of every trial, sessions in the order they are given."""
-    known = uncertainties_of(trials)
-    return [
-        health_of(trial, change, uncertainty_of(trial, known))
-        for trial, change in zip(trials, tare_changes(trials), strict=True)
-    ]
+    return with_tares([health_of(trial) for trial in trials], trials)
 
 
-def health_of(
-    trial: RecordedTrial, change: Array | None, uncertainty: ForceUncertainty | None
-) -> RigTrial:
-    """Return the health of one trial.
+def with_tares(
+    found: Sequence[RigTrial], trials: Sequence[TaredTrial]
+) -> list[RigTrial]:
+    """Return the health of trials with what the tares of their sessions tell.
 
     Args:
-        trial: as loaded.
-        change: of the force's zero until the next tare [N], shape (3,); None without.
-        uncertainty: of the forces of its session; None where it is not known.
+        found: of each trial by itself.
+        trials: the same trials, sessions in the order they are given.
     """
+    known = uncertainties_of(trials)
+    completed: list[RigTrial] = []
+    for one, trial, change in zip(found, trials, tare_changes(trials), strict=True):
+        uncertainty = uncertainty_of(trial, known)
+        completed.append(
+            replace(
+                one,
+                tare_bracket=None if change is None else float(np.linalg.norm(change)),
+                force_uncertainty=None if uncertainty is None else uncertainty.mean,
+                floor=_floor(one.noise, uncertainty),
+            )
+        )
+    return completed
+
+
+def health_of(trial: RecordedTrial) -> RigTrial:
+    """Return the health of one trial, without what the tares of its session tell."""
     gaps = np.diff(trial.t) * 1e3
     age = _ages(trial)
     q7 = trial.cycles["position"][:, 6]
     tare = trial.payload.bias[:3]
-    noise = _noise(trial)
     is_moving = np.abs(np.nan_to_num(trial.traction[:, 0])) > _MOVING
     is_saturated = (trial.cycles["flags"] & int(Flag.FT_SATURATED)) != 0
     provenance = trial.metadata["provenance"]
@@ -163,16 +175,16 @@ def health_of(
         skews=np.histogram(age, SKEW_EDGES)[0].astype(np.float64),
         skew=_three(np.quantile(age, (0.05, 0.5, 0.95)) if age.size else np.zeros(3)),
         tare=_three(tare),
-        tare_bracket=None if change is None else float(np.linalg.norm(change)),
+        tare_bracket=None,
         joint7=float(np.abs(q7 - q7[0]).max() * 1e3),
         puck_degc=_row(provenance.get("pucks:temperature_degc", "")),
         motor_degc=_row(provenance.get("pucks:motor_temperature_degc", "")),
         largest_F_t=float(np.abs(trial.traction[:, 1]).max()),
         measurable_F_t=_measurable(provenance.get("ft_sensor:ranges", ""), trial),
         saturated=float(np.mean(is_saturated)),
-        noise=noise,
-        force_uncertainty=None if uncertainty is None else uncertainty.mean,
-        floor=_floor(noise, uncertainty),
+        noise=_noise(trial),
+        force_uncertainty=None,
+        floor=None,
         load_bias=_load_bias(trial, is_moving),
         drag=_drag(trial, is_moving, torques),
         rest_open=None if torques is None else _rest_open(trial, torques),

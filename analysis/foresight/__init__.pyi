@@ -15,6 +15,7 @@ from .judged import (
     JudgedForesight,
     JudgedTask,
     WatchedSource,
+    digest_of,
     judge,
     plan_judged,
 )
@@ -74,6 +75,7 @@ __all__ = [
     "WatchedSource",
     "WatchedTrial",
     "all_pairs",
+    "digest_of",
     "fit_foresight",
     "fit_ground",
     "fit_logistic",

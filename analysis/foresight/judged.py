@@ -7,6 +7,7 @@ is known by digests of all that was read of the trials, never by their names alo
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -115,29 +116,56 @@ class JudgedTask:
     version: int = JUDGED_VERSION
 
 
-def source_of(trial: RecordedTrial, surface: str) -> WatchedSource:
-    """Return what `watch` reads of a trial, by its digest."""
-    metadata = trial.metadata["trial"]
+class DigestedTrial(Protocol):
+    """What a trial that was watched is known by."""
+
+    @property
+    def terrain(self) -> str:
+        """Name of the terrain."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Session and trial."""
+        ...
+
+    @property
+    def metadata(self) -> dict[str, dict[str, str]]:
+        """Metadata by name."""
+        ...
+
+    @property
+    def digest(self) -> str:
+        """As of `digest_of`."""
+        ...
+
+
+def digest_of(trial: RecordedTrial) -> str:
+    """Return the SHA-256 of all arrays that `watch` reads of a trial."""
     read = [trial.cycles[k] for k in ("cycle", "host_ns", "foot_position", "traction")]
     digest = hashlib.sha256()
     for array in (*read, trial.frame.axes(), trial.t, trial.traction):
         digest.update(f"{array.dtype.str}{array.shape}".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def source_of(trial: DigestedTrial, surface: str) -> WatchedSource:
+    """Return what a watched trial is made from."""
+    metadata = trial.metadata["trial"]
     rig, seed = RigIdentity.of(metadata), metadata.get("seed", "")
-    return WatchedSource(
-        *(trial.terrain, trial.name, surface, rig, seed), digest.hexdigest()
-    )
+    return WatchedSource(trial.terrain, trial.name, surface, rig, seed, trial.digest)
 
 
 def plan_judged(
-    trials: Mapping[str, Sequence[RecordedTrial]],
+    trials: Mapping[str, Sequence[DigestedTrial]],
     kinds: Mapping[str, str],
     break_away: Mapping[str, BreakAwayModel],
 ) -> JudgedTask:
     """Return the task of a study's trials.
 
     Args:
-        trials: recorded trials by terrain.
+        trials: of the study, by terrain.
         kinds: kind by terrain, as of `terrain_kind`.
         break_away: models by terrain.
     """

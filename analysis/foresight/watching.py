@@ -5,7 +5,7 @@ may look ahead while no feature does. At risk is a tick in contact and in no sli
 positive if a slip begins within the next 0.2 s.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from typing import NamedTuple
@@ -190,7 +190,7 @@ def _watched(
 
 
 def watch_all(
-    trials: Mapping[str, Sequence[RecordedTrial]], kinds: Mapping[str, str]
+    trials: Mapping[str, Iterable[RecordedTrial]], kinds: Mapping[str, str]
 ) -> list[WatchedTrial]:
     """Return all trials of a study, watched.
 

@@ -6,12 +6,15 @@ draws them: whatever is changed in the analysis, they are drawn anew.
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from enum import Enum
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from analysis.figures import (
     PAGE_ORDER,
@@ -32,10 +35,11 @@ from analysis.figures import (
 )
 from analysis.findings import StudyResults
 from analysis.report.page_model import ReportFigure
-from analysis.study import Store, Study, available_cores, run_tasks, task_key
+from analysis.study import Store, Study, available_cores, run_tasks
 
 _MOST_DRAWING = 4  # processes
 _MANY_TERRAINS = 4  # from which on they pay
+_PLAIN = (type(None), bool, int, float, str, bytes, Enum, np.generic)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
@@ -159,7 +163,7 @@ def drawn_once(
     """Return figures from the store, or draw and keep them.
 
     Args:
-        shown: all that they show, as a value that a store can keep.
+        shown: all that they show: dataclasses, arrays, mappings, plain values.
         draw: draws them.
         store: figures of earlier reports.
         is_simulated: the numbers were.
@@ -167,13 +171,52 @@ def drawn_once(
     """
     if store is None:
         return list(draw())
-    task = DrawingTask(task_key(shown), code_digest(), is_simulated, with_pdf)
+    task = DrawingTask(shown_digest(shown), code_digest(), is_simulated, with_pdf)
     kept = store.get(task)
     if isinstance(kept, tuple) and all(isinstance(k, ReportFigure) for k in kept):
         return list(kept)
     drawn = list(draw())
     store.put(task, drawn)
     return drawn
+
+
+def shown_digest(shown: Any) -> str:  # noqa: ANN401
+    """Return the SHA-256 of a value; arrays are not copied for it.
+
+    Raises:
+        TypeError: a value of a kind whose content is not known.
+    """
+    digest = hashlib.sha256()
+    for part in _parts(shown):
+        digest.update(len(part).to_bytes(8, "little"))
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _parts(value: Any) -> Iterator[bytes | memoryview]:  # noqa: ANN401
+    """Give the bytes of a value, each with its kind and the count of what is inside."""
+    kind = type(value).__name__
+    if isinstance(value, np.ndarray):
+        yield f"{kind} {value.dtype.str} {value.shape}".encode()
+        yield memoryview(np.ascontiguousarray(value)).cast("B") if value.size else b""
+    elif isinstance(value, _PLAIN):
+        yield f"{kind} {value!r}".encode()
+    elif isinstance(value, Mapping) or is_dataclass(value):
+        inside = value if isinstance(value, Mapping) else _fields_of(value)
+        yield f"{kind} {len(inside)}".encode()
+        for key, item in inside.items():
+            yield from _parts(key)
+            yield from _parts(item)
+    elif isinstance(value, list | tuple):
+        yield f"{kind} {len(value)}".encode()
+        for item in value:
+            yield from _parts(item)
+    else:
+        raise TypeError(f"{kind} has no digest")
+
+
+def _fields_of(value: Any) -> dict[str, Any]:  # noqa: ANN401
+    return {item.name: getattr(value, item.name) for item in fields(value)}
 
 
 @lru_cache

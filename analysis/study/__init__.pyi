@@ -40,7 +40,7 @@ from .relatives import (
     run_relatives,
 )
 from .skew import ShapeMap
-from .store import TYPES, ResultStore, task_key, write_atomic
+from .store import TYPES, ResultStore, write_atomic
 from .study import Study, StudyOptions, run_study
 from .terrain_fit import PooledTustinFit, TerrainResult, mean_of
 from .trial_components import TOLD_APART, TrialComponents
@@ -105,7 +105,6 @@ __all__ = [
     "run_tasks",
     "smallest_adjusted",
     "standard_error",
-    "task_key",
     "to_csv",
     "to_fits",
     "to_plain",

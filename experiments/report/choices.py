@@ -1,7 +1,7 @@
 """Choices of a report, from the command line: its sessions, and its analysis."""
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -83,7 +83,7 @@ def _parse_bounds(text: str) -> Mapping[str, tuple[float, float]]:
 
 def repeat_study(
     study: Study,
-    trials: Mapping[str, Sequence[RecordedTrial | TractionSeries]],
+    trials: Mapping[str, Iterable[RecordedTrial | TractionSeries]],
     choices: Sequence[StudyVariant],
     console: Console,
     store: ResultStore | None = None,

@@ -10,7 +10,8 @@ import numpy as np
 from acquisition import FORESIGHT, Record, SettingsError
 from acquisition.trial_file import TrialReader
 from analysis.breakaway import BreakAwayModel
-from analysis.data import RecordedTrial, load_trial
+from analysis.data import load_trial
+from analysis.findings import HeldTrial, TrialFiles
 from analysis.foresight import (
     ForesightCurves,
     ForesightModel,
@@ -54,7 +55,7 @@ class StudyForesight:
 
 def study_foresight(
     study: Study,
-    trials: Mapping[str, Sequence[RecordedTrial]],
+    trials: Mapping[str, Sequence[HeldTrial]],
     break_away: Mapping[str, BreakAwayModel],
     store: Store | None = None,
     *,
@@ -64,13 +65,14 @@ def study_foresight(
 
     Args:
         study: gives kinds.
-        trials: recorded trials by terrain.
+        trials: of the study, by terrain; read anew where nothing is kept.
         break_away: models by terrain.
         store: outcomes of earlier reports.
         with_pdf: figures are wanted as PDF, too.
     """
     task = plan_judged(trials, study.kinds, break_away)
-    judged = judged_foresight(task, lambda: watch_all(trials, study.kinds), store)
+    files = {name: TrialFiles(of) for name, of in trials.items()}
+    judged = judged_foresight(task, lambda: watch_all(files, study.kinds), store)
     if judged.curves is None:
         return StudyForesight(judged.model, (), {})
     surface = judged.surface

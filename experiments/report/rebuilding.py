@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import cast
 
 from acquisition import SettingsError, TrialFileError
-from analysis.findings import compute_results, findings_rows, summarise_rig
+from analysis.findings import compute_results, findings_rows, with_tares
 from analysis.study import FitOptions, to_csv
 from experiments.operator import Console
 from experiments.report.checksums import SUMS, ChangedFile, changed_files
@@ -78,7 +78,9 @@ def rebuild(folder: Path, console: Console) -> TableComparison:
         sessions, data = list_sessions(folder), Path(empty)
         analysed = study_sessions(sessions, data, order, console, fit)
     trials = [trial for group in analysed.trials.values() for trial in group]
-    results = compute_results(analysed.study, summarise_rig(trials))
+    results = compute_results(
+        analysed.study, with_tares([t.health for t in trials], trials)
+    )
     again = to_csv(analysed.study, findings_rows(results))
     return compare_tables(_text(folder / TABLE), again)
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
-from analysis.data import RecordedTrial, doubts_of_record, load_trial, summed_up
-from analysis.findings import summarise_rig
+from analysis.data import load_trial, summed_up
+from analysis.findings import HeldTrial, TrialFiles, with_tares
 from analysis.foresight import JUDGED_TYPES, fit_foresight, watch_all
 from analysis.report import (
     DRAWN_TYPES,
@@ -35,7 +35,11 @@ from experiments.report.choices import AnalysisChoices, repeat_study
 from experiments.report.foresight import StudyForesight, study_foresight
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
-from experiments.report.truth_errors import truth_tables
+from experiments.report.truth_errors import (
+    TruthErrors,
+    compare_with_truth,
+    truth_tables,
+)
 from experiments.session import (
     SessionFolder,
     iso_utc,
@@ -78,9 +82,10 @@ class ReportRequest:
 
 def _load_trials(
     sessions: Sequence[SessionFolder], console: Console
-) -> tuple[dict[str, list[RecordedTrial]], list[str]]:
-    """Return (kept trials by terrain, oldest session first; what was left out)."""
-    trials: dict[str, list[RecordedTrial]] = {}
+) -> tuple[dict[str, list[HeldTrial]], dict[Path, TruthErrors], list[str]]:
+    """Return kept trials by terrain, oldest session first; truths; what is left out."""
+    trials: dict[str, list[HeldTrial]] = {}
+    truths: dict[Path, TruthErrors] = {}
     problems: list[str] = []
     for session in sorted(sessions, key=lambda s: (s.path.name[:10], int(s.id[1:]))):
         for path in session.kept_trials():
@@ -97,9 +102,11 @@ def _load_trials(
                     "otherwise. A report cannot mix the two.",
                     hint="Put the file back where it came from.",
                 )
-            trials.setdefault(trial.terrain, []).append(trial)
-    judged = ((t.name, doubts_of_record(t)) for ts in trials.values() for t in ts)
-    return trials, problems + summed_up(judged)
+            trials.setdefault(trial.terrain, []).append(HeldTrial.of(trial))
+            if (truth := compare_with_truth(trial)) is not None:
+                truths[path] = truth
+    judged = ((t.name, t.doubts) for ts in trials.values() for t in ts)
+    return trials, truths, problems + summed_up(judged)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +117,18 @@ class StudySession:
         study: the result.
         trials: the kept trials by terrain, in the matrix's order.
         problems: what was left out, and why.
+        truths: how far trials are from their truth files, by path of the trial.
     """
 
     study: Study
-    trials: dict[str, list[RecordedTrial]]
+    trials: dict[str, list[HeldTrial]]
     problems: list[str]
+    truths: dict[Path, TruthErrors]
+
+    @property
+    def files(self) -> dict[str, TrialFiles]:
+        """The trials on disk, by terrain."""
+        return {name: TrialFiles(of) for name, of in self.trials.items()}
 
 
 def results_below(data: Path) -> ResultStore:
@@ -134,7 +148,7 @@ def study_sessions(
     Raises:
         SessionError: no session has a kept trial.
     """
-    trials, problems = _load_trials(sessions, console)
+    trials, truths, problems = _load_trials(sessions, console)
     count = sum(len(group) for group in trials.values())
     if not count:
         ids = ", ".join(s.id for s in sessions)
@@ -148,10 +162,10 @@ def study_sessions(
         fit=fit,
         scheduler=order.scheduler,
     )
-    series = {name: [t.series() for t in group] for name, group in trials.items()}
+    series = {name: [t.series for t in group] for name, group in trials.items()}
     with fitting(console) as progress:
         study = run_study(series, options, is_simulated, progress, results_below(data))
-    return StudySession(study, trials, problems)
+    return StudySession(study, trials, problems, truths)
 
 
 def require_samples(study: Study) -> None:
@@ -194,7 +208,7 @@ def export_terrains(
         identify_study(study),
         iso_utc(SystemClock().utc_ns()),
         store=results_below(data),
-        foresight=fit_foresight(watch_all(analysed.trials, study.kinds)),
+        foresight=fit_foresight(watch_all(analysed.files, study.kinds)),
     )
     write_new_text(out, text)
     console.say(f"{len(study.terrains)} terrains: {out}")
@@ -219,7 +233,8 @@ def report_sessions(
     study, trials = analysed.study, analysed.trials
     store = results_below(data)
     break_away = break_away_of(study, store)
-    others = repeat_study(study, trials, order.choices.variants, console, store)
+    variants = order.choices.variants
+    others = repeat_study(study, analysed.files, variants, console, store)
     foresight = study_foresight(
         study, trials, break_away, store, with_pdf=order.with_pdf
     )
@@ -241,16 +256,16 @@ def _context(
     """Return what the report shows beyond the study."""
     study, trials = analysed.study, analysed.trials
     photos, unsound = photos_of(sessions)
-    count = sum(len(group) for group in trials.values())
+    every = [trial for group in trials.values() for trial in group]
     return ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
-        subtitle=f"{count} trials on {', '.join(trials)}",
+        subtitle=f"{len(every)} trials on {', '.join(trials)}",
         is_simulated=study.simulated,
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
         tables=[
             *(side_by_side(choice, study, other) for choice, other in others),
-            *truth_tables(study, trials),
+            *truth_tables(study, trials, analysed.truths),
             *foresight.tables,
             *report_tables(sessions, trials),
         ],
@@ -261,7 +276,7 @@ def _context(
         },
         warnings=[*order.missing, *analysed.problems, *unsound],
         photos=[BedPhoto(*photo) for photo in photos],
-        rig=summarise_rig([trial for group in trials.values() for trial in group]),
+        rig=with_tares([trial.health for trial in every], every),
         foresight=foresight.model if len(sessions) > 1 else None,
         with_pdf=order.with_pdf,
     )

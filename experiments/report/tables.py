@@ -7,9 +7,8 @@ from typing import Any, cast
 import numpy as np
 
 from acquisition.trial_file import list_folder
-from analysis.data import RecordedTrial
 from analysis.figures import ReportSection
-from analysis.findings import traction_ratio
+from analysis.findings import HeldTrial, traction_ratio
 from analysis.foresight import SLID, GroundScore, SlipScore
 from analysis.report import ReportTable
 from analysis.study import GP_SE, TUSTIN, Study
@@ -63,7 +62,7 @@ def summary_table(study: Study) -> tuple[list[str], list[list[str]]]:
 
 
 def report_tables(
-    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[RecordedTrial]]
+    sessions: Sequence[SessionFolder], trials: Mapping[str, Sequence[HeldTrial]]
 ) -> list[ReportTable]:
     """Return sessions, rejected trials, preflight, settings, provenance and files."""
     every = [trial for group in trials.values() for trial in group]
@@ -136,7 +135,7 @@ def _preflight_table(sessions: Sequence[SessionFolder]) -> ReportTable:
     )
 
 
-def _matrix_table(trials: Mapping[str, Sequence[RecordedTrial]]) -> ReportTable:
+def _matrix_table(trials: Mapping[str, Sequence[HeldTrial]]) -> ReportTable:
     rows = [
         (
             name,
@@ -157,7 +156,7 @@ def _matrix_table(trials: Mapping[str, Sequence[RecordedTrial]]) -> ReportTable:
     )
 
 
-def _provenance(trials: Sequence[RecordedTrial]) -> ReportTable:
+def _provenance(trials: Sequence[HeldTrial]) -> ReportTable:
     values: dict[str, set[str]] = {}
     for trial in trials:
         for key, value in trial.metadata["provenance"].items():

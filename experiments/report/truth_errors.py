@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,12 @@ from acquisition import TrialFileError
 from acquisition.trial_file import TrialReader
 from analysis.data import RecordedTrial, moving_average
 from analysis.figures import ReportSection
-from analysis.findings import uncertainties_of, uncertainty_of
+from analysis.findings import (
+    HeldTrial,
+    TaredTrial,
+    uncertainties_of,
+    uncertainty_of,
+)
 from analysis.report import ReportTable
 from analysis.study import Study, TerrainResult
 
@@ -92,20 +98,24 @@ _RECOVERED = {"mu_k": "mu", "mu_s": "F_s", "v_S": "v_s", "b": "b"}
 
 
 def truth_tables(
-    study: Study, trials: Mapping[str, Sequence[RecordedTrial]]
+    study: Study,
+    trials: Mapping[str, Sequence[HeldTrial]],
+    truths: Mapping[Path, TruthErrors],
 ) -> list[ReportTable]:
-    """Return measured and recovered beside the truth; none without truth files."""
+    """Return measured and recovered beside the truth; none without truth files.
+
+    Args:
+        study: what was recovered.
+        trials: by terrain.
+        truths: how far trials are from their truth files, by path of the trial.
+    """
     errors = {
-        name: [
-            (trial.name, error)
-            for trial in group
-            if (error := compare_with_truth(trial)) is not None
-        ]
+        name: [(t.name, truths[t.path]) for t in group if t.path in truths]
         for name, group in trials.items()
     }
     if not any(errors.values()):
         return []
-    scores = z_scores([trial for group in trials.values() for trial in group])
+    scores = _scores([t for group in trials.values() for t in group], truths)
     predicted = [_predicted(scores)] if len(scores) else []
     return [_measured(errors), *predicted, _recovered(study, errors)]
 
@@ -115,8 +125,15 @@ def z_scores(trials: Sequence[RecordedTrial]) -> NDArray[np.float64]:
 
     One row per trial that has a truth file and a session with two tares, shape (n, 2).
     """
+    found = {trial.path: compare_with_truth(trial) for trial in trials}
+    return _scores(trials, {path: of for path, of in found.items() if of is not None})
+
+
+def _scores(
+    trials: Sequence[TaredTrial], truths: Mapping[Path, TruthErrors]
+) -> NDArray[np.float64]:
     known = uncertainties_of(trials)
-    pairs = [(uncertainty_of(t, known), compare_with_truth(t)) for t in trials]
+    pairs = [(uncertainty_of(t, known), truths.get(t.path)) for t in trials]
     rows = [
         [mean / uncertainty.mean for mean in error.means]
         for uncertainty, error in pairs

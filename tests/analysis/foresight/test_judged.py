@@ -6,6 +6,7 @@ import pytest
 
 from analysis.foresight.judged import (
     JudgedForesight,
+    digest_of,
     judge,
     source_of,
 )
@@ -67,7 +68,7 @@ def recorded(live=None, **changes):
     )
     for name, value in (live or {}).items():
         cycles[name][-1] = value
-    return SimpleNamespace(
+    trial = SimpleNamespace(
         **{
             "terrain": STONES,
             "name": "S001/T01",
@@ -79,6 +80,8 @@ def recorded(live=None, **changes):
         }
         | changes
     )
+    trial.digest = digest_of(trial)
+    return trial
 
 
 @pytest.mark.parametrize(

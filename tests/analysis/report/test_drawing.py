@@ -1,9 +1,17 @@
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
 from analysis.report import drawing
-from analysis.report.drawing import DRAWN_TYPES, code_digest, drawn_once
+from analysis.report.drawing import (
+    DRAWN_TYPES,
+    code_digest,
+    drawn_once,
+    shown_digest,
+)
 from analysis.report.page_model import ReportFigure
 from analysis.study.store import TYPES, ResultStore
 
@@ -52,6 +60,43 @@ def test_other_numbers_or_wishes_are_drawn_anew(store, change):
     assert pen.drawings == 2
 
 
+DIFFERENT = (
+    None,
+    0,
+    0.0,
+    -0.0,
+    False,
+    "0",
+    b"0",
+    (),
+    [],
+    (0.0, 1.0),
+    ((0.0,), 1.0),
+    {},
+    {"a": 1},
+    {"b": 1},
+    np.zeros(0),
+    np.zeros(2),
+    np.zeros((1, 2)),
+    np.zeros(2, dtype=np.int64),
+    np.array([0.0, 5e-324]),
+    PICTURE,
+    replace(PICTURE, png=b""),
+    ReportSection.HEALTH,
+    ReportSection.REACH,
+)
+
+
+def test_different_values_have_different_digests():
+    assert len({shown_digest(value) for value in DIFFERENT}) == len(DIFFERENT)
+    assert shown_digest(np.arange(6.0)[::2]) == shown_digest(np.array([0.0, 2.0, 4.0]))
+
+
+def test_what_has_no_known_content_has_no_digest():
+    with pytest.raises(TypeError, match="object has no digest"):
+        shown_digest([object()])
+
+
 def test_changed_code_draws_anew(store, monkeypatch):
     pen = Pen()
     drawn(pen, store)
@@ -87,7 +132,7 @@ def test_damaged_figures_are_drawn_anew(tmp_path, store, kept):
 def test_what_is_no_figure_is_drawn_anew(store):
     pen = Pen()
     task = drawing.DrawingTask(
-        drawing.task_key((1.0, 2.0)), code_digest(), is_simulated=True, with_pdf=False
+        shown_digest((1.0, 2.0)), code_digest(), is_simulated=True, with_pdf=False
     )
     store.put(task, ["figure"])
     assert drawn(pen, store) == [FIGURE]

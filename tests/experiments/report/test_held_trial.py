@@ -1,0 +1,46 @@
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.data.load import load_trial
+from analysis.findings.held_trial import HeldTrial, TrialFiles
+from analysis.findings.rig_health import summarise_rig, with_tares
+from analysis.foresight.judged import digest_of
+
+MOST_BYTES = 40  # of a cycle: time, velocity, two forces, and what is small
+
+
+def test_what_is_held_says_the_same_as_the_trial(first_trial):
+    trial = load_trial(first_trial)
+    held = HeldTrial.of(trial)
+    assert (held.name, held.terrain) == (trial.name, trial.terrain)
+    np.testing.assert_array_equal(held.series.F_t, trial.series().F_t)
+    (health,), (whole,) = with_tares([held.health], [held]), summarise_rig([trial])
+    assert health.numbers() == whole.numbers()
+
+
+def test_the_arrays_of_a_held_trial_are_let_go(first_trial):
+    cycles = load_trial(first_trial).t.size  # what is loaded once stays loaded
+    tracemalloc.start()
+    held = [HeldTrial.of(load_trial(first_trial)) for _ in range(4)]
+    bytes_each = tracemalloc.get_traced_memory()[0] / len(held)
+    tracemalloc.stop()
+    assert bytes_each < MOST_BYTES * cycles + 100_000
+
+
+def test_trials_on_disk_are_read_every_time(first_trial):
+    files = TrialFiles([HeldTrial.of(load_trial(first_trial))] * 2)
+    for _ in range(2):
+        assert [trial.path for trial in files] == [first_trial] * 2
+
+
+def test_the_digest_changes_with_what_foresight_reads_and_with_nothing_else(
+    first_trial,
+):
+    trial = load_trial(first_trial)
+    cycles = trial.cycles.copy()
+    cycles["torque_command"][3] += 1.0
+    assert digest_of(replace(trial, cycles=cycles)) == digest_of(trial)
+    cycles["foot_position"][3] += 1e-12
+    assert digest_of(replace(trial, cycles=cycles)) != digest_of(trial)
