@@ -1,9 +1,10 @@
 """Which dynamics the simulation runs on, and where their machine code is kept."""
 
 import hashlib
+import json
 import os
 from functools import cache
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 
 from acquisition import SettingsError
@@ -30,7 +31,7 @@ def chosen_dynamics() -> str:
         )
     if wanted == PINOCCHIO:
         return PINOCCHIO
-    if find_spec("numba") is not None and kernel_folder() is not None:
+    if _has_numba() and kernel_folder() is not None:
         return COMPILED
     if wanted == COMPILED:
         raise SettingsError(
@@ -40,6 +41,16 @@ def chosen_dynamics() -> str:
             f"written, or unset {ENVIRONMENT}. Nothing was started.",
         )
     return PINOCCHIO
+
+
+@cache
+def _has_numba() -> bool:
+    """Return whether numba can be imported; it refuses some versions of numpy."""
+    try:
+        import_module("numba")
+    except ImportError:
+        return False
+    return True
 
 
 @cache
@@ -59,6 +70,7 @@ def kernel_folder() -> Path | None:
         except OSError:
             continue
         if is_own and os.access(folder, os.W_OK | os.X_OK):
+            _clear_damaged(folder)
             return folder
     return None
 
@@ -77,10 +89,43 @@ def is_compiled_first() -> bool:
 
 
 def mark_ready() -> None:
-    """Note that the machine code is there."""
+    """Note the files of the machine code by their digests, once it is there."""
     folder = kernel_folder()
-    if folder is not None and not (folder / _READY).exists():
-        (folder / _READY).touch()
+    if folder is None or (folder / _READY).exists():
+        return
+    files = {str(p.relative_to(folder)): _digest(p) for p in _kept(folder)}
+    part = folder / f"{_READY}.{os.getpid()}"
+    part.write_text(json.dumps(files))
+    part.replace(folder / _READY)
+
+
+def _clear_damaged(folder: Path) -> None:
+    """Remove all machine code if a file is not what was noted, as after a power cut.
+
+    Numba would fail on it at every start. Where nothing is noted yet, another process
+    may be compiling, and only files without content go.
+    """
+    try:
+        noted: dict[str, str] = json.loads((folder / _READY).read_text())
+        is_whole = all(_digest(folder / name) == noted[name] for name in noted)
+    except FileNotFoundError:
+        is_whole = not (folder / _READY).exists()
+    except (OSError, ValueError, AttributeError):
+        is_whole = False
+    for path in _kept(folder):
+        if not is_whole or path.stat().st_size == 0:
+            path.unlink(missing_ok=True)
+    if not is_whole:
+        (folder / _READY).unlink(missing_ok=True)
+
+
+def _kept(folder: Path) -> list[Path]:
+    """Return the files that numba keeps: indices and machine code."""
+    return sorted((*folder.rglob("*.nbi"), *folder.rglob("*.nbc")))
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _places() -> list[Path]:

@@ -37,7 +37,7 @@ def place_in(folder, monkeypatch):
 
 @pytest.fixture
 def without_numba(monkeypatch):
-    monkeypatch.setattr(choice, "find_spec", lambda _: None)
+    monkeypatch.setattr(choice, "_has_numba", lambda: False)
 
 
 @pytest.mark.parametrize("dynamics", [COMPILED, PINOCCHIO])
@@ -111,6 +111,41 @@ def test_the_first_start_says_that_it_compiles_and_the_next_does_not(
     assert "once" in compiling_words()
     mark_ready()
     assert compiling_words() == ""
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("is_noted", [True, False])
+def test_machine_code_that_a_power_cut_has_emptied_is_compiled_anew(
+    tmp_path, monkeypatch, kind, is_noted
+):
+    place_in(tmp_path, monkeypatch)
+    folder = kernel_folder()
+    assert folder is not None
+    kept = [folder / "steps.nbi", folder / "steps.1.nbc"]
+    for path in kept:
+        path.write_bytes(b"code")
+    if is_noted:
+        mark_ready()
+    (hurt,) = (path for path in kept if path.name.endswith(kind))
+    hurt.write_bytes(b"")
+    kernel_folder.cache_clear()
+    assert kernel_folder() == folder
+    assert not hurt.exists()
+    assert [path.exists() for path in kept if path != hurt] == [not is_noted]
+    assert is_compiled_first() == (chosen_dynamics() == COMPILED)
+
+
+def test_machine_code_that_was_changed_is_compiled_anew(tmp_path, monkeypatch):
+    place_in(tmp_path, monkeypatch)
+    folder = kernel_folder()
+    assert folder is not None
+    (folder / "steps.1.nbc").write_bytes(b"code")
+    mark_ready()
+    kernel_folder.cache_clear()
+    assert (kernel_folder() or folder).joinpath("steps.1.nbc").exists()
+    (folder / "steps.1.nbc").write_bytes(b"edoc")
+    kernel_folder.cache_clear()
+    assert not (kernel_folder() or folder).joinpath("steps.1.nbc").exists()
 
 
 def test_a_real_run_imports_neither_numba_nor_the_fakes():
