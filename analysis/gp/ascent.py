@@ -95,31 +95,23 @@ def climb(
         box: where theta is sought.
         known: what other starts have reached.
     """
+
+    def is_enough(theta: Array, lml: float) -> bool:
+        return _is_below(theta, lml, known)
+
     theta = np.clip(start, *box.bounds.T)
     if not isinstance(objective, Approximated):
-        return _climb_exactly(objective, theta, box, known)
+        return _maximised(objective, theta, box, (_PRECISE, is_enough))
     theta = _approached(objective, theta, box, known)
     end, is_top = _corrected(objective, theta, box, known)
     if is_top:
         return end
-    rest = _climb_exactly(objective, np.array(end.theta), box, known)
+    rest = _maximised(objective, np.array(end.theta), box, (_ROUGH, is_enough))
     # on a ridge that may stop short of the top
     last, _ = _corrected(objective, np.array(rest.theta), box, known)
     best = max(rest, last, key=lambda start: start.lml)
     spent = end.evaluations + rest.evaluations + last.evaluations
     return best._replace(evaluations=spent)
-
-
-def _climb_exactly(
-    objective: Objective, theta: Array, box: SearchBox, known: Sequence[Start]
-) -> Start:
-    """Return where the objective itself leads to."""
-
-    def is_enough(theta: Array, lml: float) -> bool:
-        return _is_below(theta, lml, known)
-
-    found = _maximised(objective, theta, box, (_PRECISE, is_enough))
-    return Start(tuple(found.theta.tolist()), found.value, found.evaluations)
 
 
 def _approached(
@@ -135,7 +127,8 @@ def _approached(
         if near is None:
             break
         before, region = theta, box.around(theta, _REACH)
-        theta = _maximised(near, theta, region, (_ROUGH, is_enough)).theta
+        end = _maximised(near, theta, region, (_ROUGH, is_enough))
+        theta = np.array(end.theta)
         if np.abs(theta - before).max() < _NEARLY:
             break
     return theta
@@ -161,16 +154,16 @@ def _corrected(
     bend, is_bent, spent = _curvature(near, theta, box), False, 1
     while spent < _CORRECTIONS:
         at = theta, slope
-        found = _vertex(bend, at, box)
-        if is_bent or np.abs(found.theta - theta).max() > _FURTHEST:
-            found, is_bent = _stepped(near, at, box), True
-        if 0.0 <= found.value < _GAIN:
+        top, gain = _vertex(bend, at, box)
+        if is_bent or np.abs(top - theta).max() > _FURTHEST:
+            (top, gain), is_bent = _stepped(near, at, box), True
+        if 0.0 <= gain < _GAIN:
             return Start(tuple(theta.tolist()), lml, spent), True
-        better, new_slope = _tried(objective, found.theta)
+        better, new_slope = _tried(objective, top)
         spent += 1
-        is_kept = better >= lml + _KEPT * found.value and found.value > 0.0
+        is_kept = better >= lml + _KEPT * gain and gain > 0.0
         if better > lml:
-            theta, lml, slope = found.theta, better, new_slope
+            theta, lml, slope = top, better, new_slope
         if not is_kept and is_bent:
             break
         is_bent = not is_kept
@@ -188,7 +181,9 @@ def _curvature(near: Objective, theta: Array, box: SearchBox) -> Array:
     return 0.5 * (np.array(rows) + np.array(rows).T)
 
 
-def _vertex(bend: Array, at: tuple[Array, Array], box: SearchBox) -> "_Found":
+def _vertex(
+    bend: Array, at: tuple[Array, Array], box: SearchBox
+) -> tuple[Array, float]:
     """Return the top of a parabola in the box, and what it promises.
 
     Directions along which it is flat, or bends upwards, count as bent a little.
@@ -206,10 +201,12 @@ def _vertex(bend: Array, at: tuple[Array, Array], box: SearchBox) -> "_Found":
     step[free] = ways @ ((ways.T @ slope[free]) / np.maximum(bends, _FLAT))
     top = np.clip(theta + step, low, high)
     step = top - theta
-    return _Found(top, float(slope @ step - 0.5 * step @ bend @ step), 0)
+    return top, float(slope @ step - 0.5 * step @ bend @ step)
 
 
-def _stepped(near: Objective, at: tuple[Array, Array], box: SearchBox) -> "_Found":
+def _stepped(
+    near: Objective, at: tuple[Array, Array], box: SearchBox
+) -> tuple[Array, float]:
     """Return the top of an approximation with another slope, and what it promises.
 
     Args:
@@ -225,15 +222,8 @@ def _stepped(near: Objective, at: tuple[Array, Array], box: SearchBox) -> "_Foun
         lml, slope = near(there)
         return lml - value + float(missing @ (there - theta)), slope + missing
 
-    return _maximised(corrected, theta, box.around(theta, _REACH), (_FINE, None))
-
-
-class _Found(NamedTuple):
-    """The top of an objective, its value, and the evaluations it took."""
-
-    theta: Array
-    value: float
-    evaluations: int
+    top = _maximised(corrected, theta, box.around(theta, _REACH), (_FINE, None))
+    return np.array(top.theta), top.lml
 
 
 def _maximised(
@@ -241,7 +231,7 @@ def _maximised(
     theta: Array,
     box: SearchBox,
     until: tuple[float, Callable[[Array, float], bool] | None],
-) -> _Found:
+) -> Start:
     """Return the top of an objective that theta leads to.
 
     Args:
@@ -273,7 +263,8 @@ def _maximised(
         callback=look,
         options={"maxiter": 200, "gtol": 1e-5, "ftol": tolerance},
     )
-    return _Found(optimum.x * steps, -float(optimum.fun), int(optimum.nfev))
+    reached = tuple((optimum.x * steps).tolist())
+    return Start(reached, -float(optimum.fun), int(optimum.nfev))
 
 
 def _tried(objective: Objective, theta: Array) -> tuple[float, Array]:
