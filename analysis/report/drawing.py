@@ -181,7 +181,7 @@ def drawn_once(
 
 
 def shown_digest(shown: Any) -> str:  # noqa: ANN401
-    """Return the SHA-256 of a value; arrays are not copied for it.
+    """Return the SHA-256 of a value.
 
     Raises:
         TypeError: a value of a kind whose content is not known.
@@ -193,12 +193,12 @@ def shown_digest(shown: Any) -> str:  # noqa: ANN401
     return digest.hexdigest()
 
 
-def _parts(value: Any) -> Iterator[bytes | memoryview]:  # noqa: ANN401
+def _parts(value: Any) -> Iterator[bytes]:  # noqa: ANN401
     """Give the bytes of a value, each with its kind and the count of what is inside."""
     kind = type(value).__name__
     if isinstance(value, np.ndarray):
         yield f"{kind} {value.dtype.str} {value.shape}".encode()
-        yield memoryview(np.ascontiguousarray(value)).cast("B") if value.size else b""
+        yield value.tobytes()
     elif isinstance(value, _PLAIN):
         yield f"{kind} {value!r}".encode()
     elif isinstance(value, Mapping) or is_dataclass(value):
