@@ -79,7 +79,8 @@ def _faults(args: argparse.Namespace) -> list[str]:
     from experiments.settings import load_settings
 
     settings = load_settings(getattr(args, "config", None))
-    rig = build_rig(settings, settings.matrix.terrains[0], FakeOptions(True, 1))
+    fake = FakeOptions(is_fast=True, seed=1, is_brief=True)
+    rig = build_rig(settings, settings.matrix.terrains[0], fake)
     names = rig.simulation.fault_names if rig.simulation is not None else ()
     rig.backend.close()
     return sorted((*names, *COMPUTER_FAULTS))

@@ -30,7 +30,7 @@ def connect_rig(
     Raises:
         PreflightError: the CAN interface cannot be used.
     """
-    if console is not None and fake is not None and fake.is_fast:
+    if console is not None and fake is not None and fake.is_fast and not fake.is_brief:
         words = compiling_words()
         if words:
             console.say(words)

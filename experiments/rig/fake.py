@@ -62,6 +62,7 @@ class SimulatedRig:
         pace: how the simulated person pushes.
         twin: calibrations of the arm whose twin it is; None = an arm of its own.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        is_brief: it ends at once, and waits for no compiler.
     """
 
     rig: RigSettings
@@ -71,6 +72,7 @@ class SimulatedRig:
     pace: str
     twin: LawCalibrations | None = None
     cables: float | None = None
+    is_brief: bool = False
 
     def metadata(self) -> dict[str, Any]:
         """Return the world in plain values, for a process of its own."""
@@ -95,6 +97,7 @@ class SimulatedRig:
             "friction": self.friction,
             "pace": self.pace,
             "cables": self.cables,
+            "is_brief": self.is_brief,
             "body": None if self.twin is None else self._body(self.twin),
         }
 
@@ -143,10 +146,7 @@ def stepped(
     law: LawParts,
     shared: SharedLayout,
 ) -> tuple[Clock, RigBackend, SimulationControl]:
-    """Return (clock, crew, handle) of a simulation that runs in this thread.
-
-    `law`: models and compensation of the control law.
-    """
+    """Return (clock, crew, handle) of a simulation in this thread, under `law`."""
     from fakes import SteppedClock
     from fakes.bus import InProcessDoor
     from fakes.world import simulated_rig

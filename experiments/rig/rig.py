@@ -38,6 +38,7 @@ class FakeOptions:
         pace: how the simulated person pushes, a name of `fakes.plant.push.PACES`.
         is_twin: the arm, its sensor and the containers are what calibrations say.
         cables: resonance of the joints on their cables [Hz]; None = stiff ones.
+        is_brief: it ends at once, and waits for no compiler.
     """
 
     is_fast: bool
@@ -46,6 +47,7 @@ class FakeOptions:
     pace: str = "steady"
     is_twin: bool = False
     cables: float | None = None
+    is_brief: bool = False
 
 
 @dataclass(slots=True)
@@ -172,6 +174,7 @@ def _world(
         pace=fake.pace,
         twin=calibrations if fake.is_twin else None,
         cables=fake.cables,
+        is_brief=fake.is_brief,
     )
 
 

@@ -24,7 +24,6 @@ from acquisition.ipc import (
     name_process,
 )
 from fakes.bus import SocketHub
-from fakes.kernels import PINOCCHIO
 from fakes.pucks import WiredNetwork
 from fakes.sensor import SerialPty
 from fakes.truth import Truth, truth_records
@@ -150,6 +149,6 @@ def main(station: ChildContext) -> None:
     with temporary_folder("traction", Path(tempfile.gettempdir())) as folder:
         settings, clock = station.settings, WorldClock(SystemClock())
         # What is served on the wall clock waits for no compiler.
-        fields = {**settings, "dynamics": PINOCCHIO}
+        fields = {**settings, "is_brief": True}
         simulation = simulated_rig(fields, load_constants(), clock)
         RigServer(simulation, clock, folder, station.channel).serve()

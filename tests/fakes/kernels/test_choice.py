@@ -9,6 +9,8 @@ import pytest
 
 from acquisition.errors import SettingsError
 from experiments.rig.fake import compiling_words
+from experiments.rig.rig import FakeOptions, build_rig
+from experiments.settings.load import load_settings
 from fakes.kernels import choice
 from fakes.kernels.choice import (
     COMPILED,
@@ -146,6 +148,16 @@ def test_machine_code_that_was_changed_is_compiled_anew(tmp_path, monkeypatch):
     (folder / "steps.1.nbc").write_bytes(b"edoc")
     kernel_folder.cache_clear()
     assert not (kernel_folder() or folder).joinpath("steps.1.nbc").exists()
+
+
+@pytest.mark.parametrize("is_brief", [True, False])
+def test_what_ends_at_once_waits_for_no_compiler(is_brief):
+    settings = load_settings(None)
+    fake = FakeOptions(is_fast=True, seed=1, is_brief=is_brief)
+    rig = build_rig(settings, settings.matrix.terrains[0], fake)
+    dynamics = rig.simulation.parameters()["dynamics"]
+    rig.backend.close()
+    assert dynamics == (PINOCCHIO if is_brief else chosen_dynamics())
 
 
 def test_a_real_run_imports_neither_numba_nor_the_fakes():
