@@ -35,6 +35,7 @@ MAX_CHUNKS = 100_000
 MAX_NAMED = 1_000  # metadata records and attachments
 MAX_METADATA = 2**20  # bytes of one metadata record
 MAX_SUMMARY = 8 * 2**20  # bytes; two hours of chunks need half of it
+_LENGTH = struct.Struct("<I")  # of a text, and of the texts of a mapping
 _INDEX_HEAD = struct.Struct("<QQQQI")  # start, end, offset, length, bytes of places
 _INDEX_PLACE = struct.Struct("<HQ")  # channel, offset of its message index
 _INDEX_TAIL = struct.Struct("<QI")  # length of the indexes, length of the compression
@@ -186,7 +187,25 @@ def _metadata(data: memoryview, index: MetadataIndex, path: Path) -> Metadata:
     body = _record(data, index.offset, Opcode.METADATA, path)
     if len(body) > min(index.length, MAX_METADATA):
         raise TrialFileError(path, "has metadata of impossible length")
-    return Metadata.read(_stream(body))
+    name, at = _text_at(body, 0)
+    (size,) = _LENGTH.unpack_from(body, at)
+    at, end = at + _LENGTH.size, at + _LENGTH.size + size
+    if end > len(body):
+        raise TrialFileError(path, "has metadata that end too early")
+    values: dict[str, str] = {}
+    while at < end:
+        key, at = _text_at(body, at)
+        values[key], at = _text_at(body, at)
+    return Metadata(name=name, metadata=values)
+
+
+def _text_at(body: memoryview, at: int) -> tuple[str, int]:
+    """Return a text and the place behind it; several hundred are in a file."""
+    (length,) = _LENGTH.unpack_from(body, at)
+    start, end = at + _LENGTH.size, at + _LENGTH.size + length
+    if end > len(body):
+        raise ValueError("a text that ends too early")
+    return str(body[start:end], "utf-8"), end
 
 
 def _attachment(data: memoryview, index: AttachmentIndex, path: Path) -> Attachment:

@@ -186,16 +186,18 @@ def load_trial(path: Path | str) -> RecordedTrial:
     _check_cycles(path, cycles)
     at_hand = _calibrated(reader)
     payload, frame = at_hand.payload, at_hand.frame
+    metadata, attachments = reader.metadata, reader.attachments
+    del reader  # with the whole file, before as much is allocated again
     t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
     path_of_sole = at_hand.model.sole_path(np.ascontiguousarray(cycles["position"]))
     velocity = foot_velocity(t, path_of_sole.position)
     raw = np.ascontiguousarray(cycles["wrench_raw"])
     contact = payload.contact(raw, path_of_sole.rotation)
     force = payload.to_base(contact, path_of_sole.rotation)
-    axes, friction = frame.axes(), reader.attachments.get("friction.toml", b"")
+    axes, friction = frame.axes(), attachments.get("friction.toml", b"")
     trial = RecordedTrial(
         path=path,
-        metadata=reader.metadata,
+        metadata=metadata,
         terrain=at_hand.terrain,
         cycles=cycles,
         t=t,
@@ -210,9 +212,9 @@ def load_trial(path: Path | str) -> RecordedTrial:
         constants=at_hand.constants,
         sole_point=at_hand.sole_point,
         bracket=read_bracket(
-            path, reader.metadata["trial"], payload.bias, int(cycles["host_ns"][0])
+            path, metadata["trial"], payload.bias, int(cycles["host_ns"][0])
         ),
-        sensor_height=_sensor_height(reader.attachments.get("config.toml", b"")),
+        sensor_height=_sensor_height(attachments.get("config.toml", b"")),
         friction_text=friction.decode(errors="ignore"),
     )
     try:

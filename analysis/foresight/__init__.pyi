@@ -1,7 +1,5 @@
 from .curves import ForesightCurves, ForesightExcerpt, foresight_curves
 from .engine import (
-    EVERY,
-    FootSample,
     Foresight,
     ForesightFlag,
     ForesightState,
@@ -27,7 +25,7 @@ from .scores import (
     score_ground,
     score_slips,
 )
-from .signals import FEATURES, LAGS, Signals
+from .signals import EVERY, FEATURES, LAGS, FootSample, Signals
 from .ticks import ForesightRun
 from .training import fit_foresight, fit_ground
 from .watching import (
@@ -35,12 +33,11 @@ from .watching import (
     HORIZON,
     ROCKY_SURFACE,
     WatchedTrial,
-    foot_samples,
     watch,
     watch_all,
     watch_series,
-    way_along,
 )
+from .whole_record import FootRecord
 
 __all__ = [
     "EVERY",
@@ -51,6 +48,7 @@ __all__ = [
     "LAGS",
     "ROCKY_SURFACE",
     "SLID",
+    "FootRecord",
     "FootSample",
     "Foresight",
     "ForesightCurves",
@@ -80,7 +78,6 @@ __all__ = [
     "fit_ground",
     "fit_logistic",
     "folds_of",
-    "foot_samples",
     "foresee",
     "foresight_curves",
     "hold_out",
@@ -92,5 +89,4 @@ __all__ = [
     "watch",
     "watch_all",
     "watch_series",
-    "way_along",
 ]

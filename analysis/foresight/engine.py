@@ -18,9 +18,8 @@ from analysis.breakaway import BreakAwayModel
 from analysis.foresight.ground import GroundRecogniser, log_speed
 from analysis.foresight.ground_window import FASTEST, SLOWEST
 from analysis.foresight.model import ForesightModel, RigIdentity
-from analysis.foresight.signals import Signals
+from analysis.foresight.signals import EVERY, FootSample, Signals
 
-EVERY: Final = 5  # cycles between two states: 10 ms
 AT_REST: Final = 0.02  # m/s at which traction is expected of a foot that does not slide
 _CONTACT, _LIFTED = 0.5, 0.3  # N
 _LIFTED_CYCLES: Final = 100  # 0.2 s
@@ -53,25 +52,6 @@ _GROUND, _ALARM = int(ForesightFlag.GROUND), int(ForesightFlag.ALARM)
 _OTHER_RIG = int(ForesightFlag.OTHER_RIG)
 _BEYOND = int(ForesightFlag.BEYOND)
 _EXTRAPOLATED = int(ForesightFlag.EXTRAPOLATED)
-
-
-@dataclass(frozen=True, slots=True)
-class FootSample:
-    """One cycle of the loop as foresight reads it.
-
-    Attributes:
-        cycle: its number.
-        host_ns: its time [ns].
-        x: way of the sole along x_T [m].
-        F_t: traction [N].
-        F_n: normal force [N].
-    """
-
-    cycle: int
-    host_ns: int
-    x: float
-    F_t: float
-    F_n: float
 
 
 @dataclass(frozen=True, slots=True)

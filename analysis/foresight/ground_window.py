@@ -4,6 +4,9 @@ from collections.abc import Sequence
 from math import log
 from typing import Final
 
+import numpy as np
+
+from analysis.data import Array, Indices
 from analysis.foresight.signals import LEAST_LOAD
 
 WINDOWS: Final = (25, 50, 100)  # sliding ticks: 0.25, 0.5 and 1 s
@@ -33,6 +36,7 @@ _SPREAD = 0.05  # N^2, keeps a slope finite at a steady load
 _EDGE = 10  # ticks at each end of a window whose means make its change
 _OLDEST = 200  # ticks since the foot was set down that still count
 _KEPT = 2 * WINDOWS[-1]
+_EVERY_WINDOW = 5  # ticks from one window that is learnt from to the next
 
 
 class _Sums:
@@ -135,6 +139,26 @@ class GroundWindow:
             _mean(ratios[-_EDGE:]) - _mean(ratios[:_EDGE]),
             log(min(self.slid, _OLDEST)),
         ]
+
+
+def windows_of(tick: Indices, motion: Array) -> dict[int, Array]:
+    """Return the features of overlapping windows, by their size.
+
+    Args:
+        tick: numbers of sliding ticks, shape (n,).
+        motion: v_t [m/s], F_t [N], F_n [N] of each, shape (n, 3).
+    """
+    window = GroundWindow()
+    rows: dict[int, list[list[float]]] = {size: [] for size in WINDOWS}
+    for number, (v, F_t, F_n) in zip(tick.tolist(), motion.tolist(), strict=True):
+        window.push(number, v, F_t, F_n)
+        if window.count % _EVERY_WINDOW:
+            continue
+        for size in WINDOWS:
+            if window.count >= size:
+                rows[size].append(window.features(size))
+    width = len(GROUND_FEATURES)
+    return {size: np.array(of).reshape(-1, width) for size, of in rows.items()}
 
 
 def _log(value: float) -> float:

@@ -8,18 +8,20 @@ A slope is that of the straight line through the last n samples, taken at the ne
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from math import exp, log, sqrt
 from typing import Final
 
 from acquisition import PERIOD_NS
 
 PERIOD: Final = PERIOD_NS * 1e-9  # s
+EVERY: Final = 5  # cycles between two ticks: 10 ms
 MEMORY: Final = (
     100  # samples: 0.2 s of x and F_n, the longest that a feature looks back
 )
 SLIP_SPEED, EDGE_SPEED = 0.12, 0.03  # m/s that makes a stretch a slip, and its edges
 LEAST_LOAD: Final = 0.7  # N; ratios are not taken below
-_LEAST_PEAK = 0.5  # N, of a largest F_t that F_t is taken over
+LEAST_PEAK = 0.5  # N, of a largest F_t that F_t is taken over
 FEATURES: Final = (
     "log F_t",
     "F_t/F_n",
@@ -52,12 +54,31 @@ LAGS: Final[Mapping[str, float]] = {
     "F_n": 0.008,
     "slope_F_t": 0.024,
 }
-_SMOOTH = exp(-PERIOD / 0.008)  # of the forces
-_SLOW = exp(-PERIOD * 2.0 * 3.141592653589793 * 3.0)  # 3 Hz
-_POWER = exp(-PERIOD / 0.1)  # of both rms
-_STIFFNESS = 2200.0  # N/m of a foot that has not begun to slip
-_LEAST_FORCE, _LEAST_SPEED, _LEAST_WAY, _LEAST_TIME = 0.1, 2e-4, 1e-4, 0.01
-_LONGEST, _FARTHEST = 3.0, 0.1  # s, m since the last slip that still count
+SMOOTH = exp(-PERIOD / 0.008)  # of the forces
+SLOW = exp(-PERIOD * 2.0 * 3.141592653589793 * 3.0)  # 3 Hz
+POWER = exp(-PERIOD / 0.1)  # of both rms
+STIFFNESS = 2200.0  # N/m of a foot that has not begun to slip
+LEAST_FORCE, LEAST_SPEED, LEAST_WAY, LEAST_TIME = 0.1, 2e-4, 1e-4, 0.01
+LONGEST, FARTHEST = 3.0, 0.1  # s, m since the last slip that still count
+
+
+@dataclass(frozen=True, slots=True)
+class FootSample:
+    """One cycle of the loop as foresight reads it.
+
+    Attributes:
+        cycle: its number.
+        host_ns: its time [ns].
+        x: way of the sole along x_T [m].
+        F_t: traction [N].
+        F_n: normal force [N].
+    """
+
+    cycle: int
+    host_ns: int
+    x: float
+    F_t: float
+    F_n: float
 
 
 class Track:
@@ -173,12 +194,12 @@ class Signals:
         self._pressing.advance()
         self.v_t = v = self._speed.value
         self._v.push(v)
-        self.F_t = F_t + _SMOOTH * (self.F_t - F_t)
-        self.F_n = F_n + _SMOOTH * (self.F_n - F_n)
-        self._low = F_t + _SLOW * (self._low - F_t)
+        self.F_t = F_t + SMOOTH * (self.F_t - F_t)
+        self.F_n = F_n + SMOOTH * (self.F_n - F_n)
+        self._low = F_t + SLOW * (self._low - F_t)
         high = self.F_t - self._low
-        self._power_F = high * high + _POWER * (self._power_F - high * high)
-        self._power_v = v * v + _POWER * (self._power_v - v * v)
+        self._power_F = high * high + POWER * (self._power_F - high * high)
+        self._power_v = v * v + POWER * (self._power_v - v * v)
         self._follow_slip(v)
 
     def _follow_slip(self, v: float) -> None:
@@ -201,12 +222,12 @@ class Signals:
         """Return the numbers of `FEATURES`."""
         F_t, F_n, x, v = self.F_t, self.F_n, self._x, self.v_t
         now, push = x.ago(0), self._F_tt
-        force = max(F_t, _LEAST_FORCE)
+        force = max(F_t, LEAST_FORCE)
         ratio = F_t / max(F_n, LEAST_LOAD)
         way50, way100 = now - x.ago(50), now - x.ago(100)
         v30, v100, v200 = (now - x.ago(15)) / 0.03, way50 / 0.1, way100 / 0.2
-        waited = min((self.count - self._slip_ended) * PERIOD, _LONGEST)
-        gone = min(max(now - self._slip_x, 0.0), _FARTHEST)
+        waited = min((self.count - self._slip_ended) * PERIOD, LONGEST)
+        gone = min(max(now - self._slip_x, 0.0), FARTHEST)
         return [
             log(force),
             ratio,
@@ -219,16 +240,16 @@ class Signals:
             v30,
             v100,
             v200,
-            log(max(v30, _LEAST_SPEED)),
-            log(max(v100, _LEAST_SPEED)),
-            log(max(v200, _LEAST_SPEED)),
+            log(max(v30, LEAST_SPEED)),
+            log(max(v100, LEAST_SPEED)),
+            log(max(v200, LEAST_SPEED)),
             v - self._v.ago(25),
-            log(max(waited, _LEAST_TIME)),
-            log(gone + _LEAST_WAY),
+            log(max(waited, LEAST_TIME)),
+            log(gone + LEAST_WAY),
             gone,
-            F_t / max(self._largest, _LEAST_PEAK),
+            F_t / max(self._largest, LEAST_PEAK),
             sqrt(max(self._power_F, 0.0)),
             sqrt(max(self._power_v, 0.0)),
-            way50 - (push.ago(0) - push.ago(50)) / _STIFFNESS,
-            way100 - (push.ago(0) - push.ago(100)) / _STIFFNESS,
+            way50 - (push.ago(0) - push.ago(50)) / STIFFNESS,
+            way100 - (push.ago(0) - push.ago(100)) / STIFFNESS,
         ]

@@ -17,7 +17,7 @@ from analysis.foresight.ground import (
     GroundModel,
     log_speed,
 )
-from analysis.foresight.ground_window import GROUND_FEATURES, WINDOWS, GroundWindow
+from analysis.foresight.ground_window import WINDOWS
 from analysis.foresight.logistic import RidgeLogistic, all_pairs, fit_logistic
 from analysis.foresight.model import ForesightModel, Provenance, SlipModel
 from analysis.foresight.watching import FLAT_SURFACE, ROCKY_SURFACE, WatchedTrial
@@ -28,7 +28,6 @@ ALARM_SHARE = 0.08  # of the at-risk time outside the 0.2 s before slips, in tra
 FOLDS = 5
 _MULTIPLIED = (0, 1, 2, 5, 9, 10, 12, 17, 18, 22)  # features whose products count
 _EVERY_TICK = 2  # ticks are correlated: every second one is fitted to
-_EVERY_WINDOW = 5
 _NEW = 0.1  # share of an overlapping window that the one before did not have
 _LOG_SPREAD = 0.635  # ln s less E ln|e| of a normal variable
 _BEYOND = 1.25  # of the largest load and traction that were learnt from
@@ -175,10 +174,9 @@ def _fit_surfaces(
     known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
     if len({trial.surface for trial in known}) < 2:
         return ()
-    windows = [ground_windows(trial) for trial in known]
     fitted: list[tuple[int, RidgeLogistic]] = []
     for size in WINDOWS:
-        rows = [one[size] for one in windows]
+        rows = [trial.windows[size] for trial in known]
         is_rocky = np.concatenate(
             [
                 np.full(len(own), trial.surface == ROCKY_SURFACE)
@@ -193,17 +191,3 @@ def _fit_surfaces(
         squares = tuple((k, k) for k in range(X.shape[1]))
         fitted.append((size, fit_logistic(X, is_rocky, balance, squares)))
     return tuple(fitted)
-
-
-def ground_windows(trial: WatchedTrial) -> dict[int, Array]:
-    """Return the features of overlapping windows of sliding, by their size."""
-    window = GroundWindow()
-    rows: dict[int, list[list[float]]] = {size: [] for size in WINDOWS}
-    for row in trial.sliding:
-        v, F_t, F_n = trial.motion[row].tolist()
-        window.push(int(trial.tick[row]), v, F_t, F_n)
-        for size in WINDOWS:
-            if window.count >= size and window.count % _EVERY_WINDOW == 0:
-                rows[size].append(window.features(size))
-    width = len(GROUND_FEATURES)
-    return {size: np.array(of).reshape(-1, width) for size, of in rows.items()}

@@ -5,9 +5,8 @@ may look ahead while no feature does. At risk is a tick in contact and in no sli
 positive if a slip begins within the next 0.2 s.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from math import isfinite
 from typing import NamedTuple
 
 import numpy as np
@@ -24,10 +23,10 @@ from analysis.data import (
     groups_of,
     prepare_trial,
 )
-from analysis.foresight.engine import EVERY, FootSample
-from analysis.foresight.ground_window import FASTEST, SLOWEST
+from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
-from analysis.foresight.signals import FEATURES, PERIOD, Signals
+from analysis.foresight.signals import PERIOD, FootSample
+from analysis.foresight.whole_record import FootRecord, ticks_of_record
 
 HORIZON = 0.2  # s
 FLAT_SURFACE, ROCKY_SURFACE = "flat", "rocky"
@@ -45,13 +44,14 @@ class WatchedTrial:
         surface: "flat", "rocky" or a word of its own.
         rig: foot and rig.
         seed: of the simulation, "" where there was none.
-        samples: every cycle.
+        record: every cycle.
         onsets: when slips began [s since the first cycle].
         ends: when they ended [s], of the same shape.
         tick: number of every tick, shape (n,).
         t: its time [s], shape (n,).
         features: of `signals`, shape (n, 23).
         motion: v_t [m/s], F_t [N], F_n [N] of every tick, shape (n, 3).
+        windows: features of overlapping windows of sliding, by their size [ticks].
     """
 
     terrain: str
@@ -59,13 +59,19 @@ class WatchedTrial:
     surface: str
     rig: RigIdentity
     seed: str
-    samples: tuple[FootSample, ...]
+    record: FootRecord
     onsets: Array
     ends: Array
     tick: Indices
     t: Array
     features: Array
     motion: Array
+    windows: Mapping[int, Array]
+
+    @property
+    def samples(self) -> tuple[FootSample, ...]:
+        """Every cycle."""
+        return tuple(self.record.samples)
 
     @property
     def is_at_risk(self) -> np.ndarray:
@@ -87,34 +93,14 @@ class WatchedTrial:
     @property
     def sliding(self) -> list[int]:
         """Rows of the ticks in which the foot slides."""
-        v, F_n = self.motion[:, 0], self.motion[:, 2]
-        is_sliding = (v >= SLOWEST) & (v <= FASTEST) & (F_n > _CONTACT)
-        return np.flatnonzero(is_sliding).tolist()
+        return _sliding(self.motion)
 
 
-def foot_samples(trial: RecordedTrial) -> tuple[FootSample, ...]:
-    """Return the cycles of a record as foresight read them while it was recorded.
-
-    Live values are taken, not those that the analysis computes anew.
-    """
-    along = trial.frame.axes()[0].tolist()
-    rows = zip(
-        trial.cycles["cycle"].tolist(),
-        trial.cycles["host_ns"].tolist(),
-        trial.cycles["foot_position"].tolist(),
-        trial.cycles["traction"].tolist(),
-        strict=True,
-    )
-    return tuple(
-        FootSample(cycle, host_ns, way_along(along, sole), forces[1], forces[2])
-        for cycle, host_ns, sole, forces in rows
-    )
-
-
-def way_along(along: Sequence[float], position: Sequence[float]) -> float:
-    """Return the way of a position along x_T [m], in a fixed order of additions."""
-    way = along[0] * position[0] + along[1] * position[1]
-    return way + along[2] * position[2]
+def _sliding(motion: Array) -> list[int]:
+    """Return the rows in which the foot slides, of v_t, F_t and F_n."""
+    v, F_n = motion[:, 0], motion[:, 2]
+    is_sliding = (v >= SLOWEST) & (v <= FASTEST) & (F_n > _CONTACT)
+    return np.flatnonzero(is_sliding).tolist()
 
 
 def watch(trial: RecordedTrial, surface: str) -> WatchedTrial:
@@ -128,7 +114,8 @@ def watch(trial: RecordedTrial, surface: str) -> WatchedTrial:
         metadata.get("seed", ""),
     )
     smooth = prepare_trial(trial.series(), PrepareOptions()).smooth
-    return _watched(origin, foot_samples(trial), smooth)
+    along = trial.frame.axes()[0].tolist()  # live values, not those computed anew
+    return _watched(origin, FootRecord.of(trial.cycles, along), smooth)
 
 
 def watch_series(
@@ -150,15 +137,11 @@ def watch_series(
     steps = 0.5 * (series.v_t[1:] + series.v_t[:-1]) * np.diff(series.t)
     way = np.concatenate([[0.0], np.cumsum(steps)])
     columns = (way, series.F_t, series.F_n)
-    rows = zip(
-        numbers.tolist(),
-        (numbers * PERIOD_NS).tolist(),
-        *(np.interp(grid, series.t, column).tolist() for column in columns),
-        strict=True,
-    )
+    x, F_t, F_n = (np.interp(grid, series.t, column) for column in columns)
+    record = FootRecord(numbers, numbers * PERIOD_NS, x, F_t, F_n)
     origin = _Origin(series.terrain, series.name, surface, rig, "")
     moved = replace(smooth, t=smooth.t - start)
-    return _watched(origin, tuple(FootSample(*row) for row in rows), moved)
+    return _watched(origin, record, moved)
 
 
 class _Origin(NamedTuple):
@@ -171,22 +154,26 @@ class _Origin(NamedTuple):
     seed: str
 
 
-def _watched(
-    origin: _Origin, samples: tuple[FootSample, ...], smooth: Smoothed
-) -> WatchedTrial:
-    """Return samples with features and slips; both times begin with the first."""
-    slips = find_slips(smooth)
-    tick, t, features, motion = _ticks(samples, float(samples[0].host_ns))
+def _watched(origin: _Origin, record: FootRecord, smooth: Smoothed) -> WatchedTrial:
+    """Return a record with features and slips; both times begin with the first."""
+    slips, ticks = find_slips(smooth), ticks_of_record(record)
+    rows = _sliding(ticks.motion)
     return WatchedTrial(
         **origin._asdict(),
-        samples=samples,
+        record=record,
         onsets=np.array([slip.onset for slip in slips]),
         ends=np.array([slip.end for slip in slips]),
-        tick=tick,
-        t=t,
-        features=features,
-        motion=motion,
+        tick=ticks.tick,
+        t=_seconds(ticks.host_ns, record.host_ns[:1]),
+        features=ticks.features,
+        motion=ticks.motion,
+        windows=windows_of(ticks.tick[rows], ticks.motion[rows]),
     )
+
+
+def _seconds(host_ns: Indices, first: Indices) -> Array:
+    """Return times since the first cycle [s], rounded as plain floats are."""
+    return (host_ns - first.astype(np.float64)) * 1e-9
 
 
 def watch_all(
@@ -200,39 +187,3 @@ def watch_all(
     """
     surface = groups_of(kinds)["surface"]
     return [watch(t, surface[name]) for name, of in trials.items() for t in of]
-
-
-def _ticks(
-    samples: Sequence[FootSample], start_ns: float
-) -> tuple[Indices, Array, Array, Array]:
-    """Return number, time, features and motion of every tick with warm filters."""
-    ticks: list[int] = []
-    times: list[float] = []
-    features: list[list[float]] = []
-    motion: list[tuple[float, float, float]] = []
-    for sample, signals in _filtered(samples):
-        if sample.cycle % EVERY == 0 and signals.is_warm:
-            ticks.append(sample.cycle // EVERY)
-            times.append((sample.host_ns - start_ns) * 1e-9)
-            features.append(signals.features())
-            motion.append((signals.v_t, signals.F_t, signals.F_n))
-    shape = (len(times), len(FEATURES))
-    return (
-        np.array(ticks, dtype=np.intp),
-        np.array(times),
-        np.array(features).reshape(shape),
-        np.array(motion).reshape(-1, 3),
-    )
-
-
-def _filtered(samples: Sequence[FootSample]) -> Iterator[tuple[FootSample, Signals]]:
-    signals, last = None, -1
-    for sample in samples:
-        if not (isfinite(sample.x) and isfinite(sample.F_t) and isfinite(sample.F_n)):
-            continue
-        if signals is None or sample.cycle != last + 1:
-            signals = Signals(sample.x, sample.F_t, sample.F_n)
-        else:
-            signals.push(sample.x, sample.F_t, sample.F_n)
-        last = sample.cycle
-        yield sample, signals

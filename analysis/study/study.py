@@ -174,10 +174,13 @@ def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
 def _prepared(
     trials: Mapping[str, Sequence[TractionSeries]], options: PrepareOptions
 ) -> dict[str, tuple[PreparedTrial, ...]]:
-    return {
-        terrain: tuple(prepare_trial(series, options) for series in recorded)
-        for terrain, recorded in trials.items()
-    }
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):  # of two rows a matrix: more threads lose time
+        return {
+            terrain: tuple(prepare_trial(series, options) for series in recorded)
+            for terrain, recorded in trials.items()
+        }
 
 
 def _in_turn(

@@ -27,13 +27,12 @@ from acquisition.ipc import (
 )
 from analysis.breakaway import BreakAwayModel
 from analysis.foresight import (
-    FootSample,
+    FootRecord,
     Foresight,
     ForesightFlag,
     ForesightModel,
     ForesightState,
     RigIdentity,
-    way_along,
 )
 from analysis.terrains import foresight_in, load
 from experiments.operator import OTHER_RIG_TEXT, ForesightView
@@ -191,14 +190,7 @@ def states_of(
     foresight: Foresight, cycles: Record, along: Sequence[float]
 ) -> list[ForesightState]:
     """Return what is foreseen from cycles, one after the other."""
-    columns = ("cycle", "host_ns", "foot_position", "traction")
-    rows = zip(*(cycles[name].tolist() for name in columns), strict=True)
-    states = (
-        foresight.push(
-            FootSample(cycle, host_ns, way_along(along, sole), forces[1], forces[2])
-        )
-        for cycle, host_ns, sole, forces in rows
-    )
+    states = map(foresight.push, FootRecord.of(cycles, along).samples)
     return [state for state in states if state is not None]
 
 

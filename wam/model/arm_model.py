@@ -208,7 +208,7 @@ class ArmModel:
         """
         x, y, z = (np.repeat(axis[:, None], len(q), axis=1) for axis in np.eye(3))
         position = np.zeros((3, len(q)))
-        sines, cosines = np.sin(q.T), np.cos(q.T)
+        sines, cosines = (np.ascontiguousarray(f(q.T)) for f in (np.sin, np.cos))
         for joint in range(7):
             s, c = sines[joint], cosines[joint]
             x, y = c * x + s * y, c * y - s * x
@@ -219,7 +219,9 @@ class ArmModel:
             y, z = c * y + s * z, c * z - s * y
         sole = self.tool.sole if self.tool else np.zeros(3)
         position += sole[0] * x + sole[1] * y + sole[2] * z
-        rotation = np.ascontiguousarray(np.stack([x.T, y.T, z.T], axis=2))
+        rotation = np.empty((len(q), 3, 3))
+        for column, axis in enumerate((x, y, z)):
+            rotation[:, :, column] = axis.T
         return FootPath(np.ascontiguousarray(position.T), rotation)
 
     def _pose(self, q: Array, frame: int) -> tuple[Array, Array]:
