@@ -28,7 +28,7 @@ from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
-_MOST = 90  # pivots beyond which an evaluation costs half of an exact one
+_MOST = 80  # pivots beyond which an evaluation costs half of an exact one
 _LEAST = 1e-6  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 
