@@ -13,7 +13,7 @@ the determinant lemma give likelihood and gradient in O(n m^2):
 The pivots are those of a Cholesky factorisation of S^-1/2 K S^-1/2 (Harbrecht, Peters
 and Schneider 2012). What it leaves, R = K - V'V, has no negative eigenvalue, so its
 scaled trace t = sum_i R_ii / S_ii bounds the error: log det C is too small by t at
-most, r'C^-1 r too large by at most t times itself.
+most, r'C^-1 r too large by at most t times its value.
 """
 
 from collections.abc import Callable
