@@ -212,7 +212,8 @@ def test_the_database_answers_as_the_models_do(study, path):
     answer = known.predict(3.5, 0.05)
     assert answer.mean == pytest.approx(1.5 * 3.5, abs=0.6)
     assert 0.3 < answer.sd < 2.0
-    assert answer.quantile(0.5) == pytest.approx(answer.mean)
+    # quantiles have five digits: one above 10 N is rounded by up to 5e-4
+    assert answer.quantile(0.5) == pytest.approx(answer.mean, abs=2e-4)
     assert answer.quantile(0.05) < answer.mean < answer.quantile(0.95)
 
 
