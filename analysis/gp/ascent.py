@@ -28,7 +28,7 @@ _CORRECTIONS = 6  # steps by corrected slopes; two or three do
 _GAIN = 3e-6  # log likelihood below which a step is not worth an exact evaluation
 # twice the error that approximations aim at, and that they may have at most: on the
 # way, one after the other, and at the top
-_FAIR, GOOD = ((0.1, 5.0), (0.1, 5.0), (0.1, 5.0)), (0.1, 0.15)
+_FAIR, GOOD = ((0.1, 5.0), (0.1, 5.0), (0.1, 5.0)), (0.1, 0.3)
 _DIFFERENCE = 1e-4  # of theta, for second derivatives
 _FLAT = 1e-2  # smallest second derivative that counts
 _FURTHEST = 0.3  # that a parabola is believed
@@ -102,6 +102,10 @@ def climb(
     theta = np.clip(start, *box.bounds.T)
     if not isinstance(objective, Approximated):
         return _maximised(objective, theta, box, (_PRECISE, is_enough))
+    if known:
+        best = max(known, key=lambda start: start.lml)
+        if objective.near(np.array(best.theta), GOOD) is None:  # tops are rough here
+            return _maximised(objective, theta, box, (_ROUGH, is_enough))
     theta = _approached(objective, theta, box, known)
     end, is_top = _corrected(objective, theta, box, known)
     if is_top:

@@ -13,7 +13,7 @@ the determinant lemma give likelihood and gradient in O(n m^2):
 The pivots are those of a Cholesky factorisation of S^-1/2 K S^-1/2 (Harbrecht, Peters
 and Schneider 2012). What it leaves, R = K - V'V, has no negative eigenvalue, so its
 scaled trace t = sum_i R_ii / S_ii bounds the error: log det C is too small by t at
-most, r'C^-1 r too large by at most t times itself.
+most, r'C^-1 r too large by at most t times its value.
 """
 
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from analysis.gp.noise import Noise
 from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
-_MOST = 90  # pivots beyond which an evaluation costs half of an exact one
+_MOST = 80  # pivots beyond which an evaluation costs half of an exact one
 _LEAST = 1e-6  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 

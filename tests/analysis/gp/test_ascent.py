@@ -85,6 +85,18 @@ def test_a_start_ends_below_a_known_top_after_one_evaluation():
     assert -50.1 < end.lml <= -50.0
 
 
+def test_beside_a_rough_top_the_likelihood_is_climbed():
+    exact, near = Counted(), Counted()
+    objective = Approximated(
+        exact, lambda theta, t: None if np.abs(theta - TOP).max() < 1.0 else near
+    )
+    known = [Start(tuple(TOP), -50.0, 9)]
+    end = climb(objective, np.array([-2.0, 2.0, 1.0]), BOX, known)
+    assert near.count == 0
+    assert end.evaluations == exact.count
+    assert -50.1 < end.lml <= -50.0
+
+
 def test_an_approximation_without_a_covariance_is_given_up():
     def none(theta):
         raise SettingsError("none")
