@@ -39,7 +39,7 @@ from analysis.study import Store, Study, available_cores, run_tasks
 
 _MOST_DRAWING = 4  # processes
 _MANY_TERRAINS = 4  # from which on they pay
-_PLAIN = (type(None), bool, int, float, str, bytes, Enum, np.generic)
+_PLAIN = (type(None), bool, int, float, str, bytes, Enum)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
@@ -195,6 +195,8 @@ def shown_digest(shown: Any) -> str:  # noqa: ANN401
 
 def _parts(value: Any) -> Iterator[bytes]:  # noqa: ANN401
     """Give the bytes of a value, each with its kind and the count of what is inside."""
+    if isinstance(value, np.generic):  # the store gives it back as a plain value
+        value = value.item()
     kind = type(value).__name__
     if isinstance(value, np.ndarray):
         yield f"{kind} {value.dtype.str} {value.shape}".encode()

@@ -137,3 +137,9 @@ def test_what_is_no_figure_is_drawn_anew(store):
     store.put(task, ["figure"])
     assert drawn(pen, store) == [FIGURE]
     assert pen.drawings == 1
+
+
+@pytest.mark.parametrize("value", [np.float64(1.5), np.int64(3), np.bool_(True)])
+def test_a_number_shows_the_same_when_the_store_gives_it_back(value):
+    assert shown_digest([value]) == shown_digest([value.item()])
+    assert shown_digest([value]) != shown_digest([value.item() + 1])
