@@ -4,7 +4,6 @@ import argparse
 import compileall
 import os
 import shlex
-import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -46,15 +45,8 @@ NOT_READY = 75  # as EX_TEMPFAIL: something has to be installed first
 _MOST_MACHINES = 2  # unless more are asked for
 _STARTED = 30.0  # s until the emulator has its sockets
 _CLOCK = SystemClock()
-# Machine code of the simulation is compiled by the host, for any processor: compiling
-# takes the emulated one minutes. It is copied, as it has to be the user's own.
-_TARGET = "generic"
-_KERNELS = "kernels"  # folder in the cache
-_COMPILE = "from lab.guest.pushed_arm import load_simulation; load_simulation()"
 _JOB = """\
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
-export NUMBA_CPU_NAME={target} NUMBA_CACHE_DIR=/run/kernels
-cp -r {kernels} /run/kernels && chmod -R go-w /run/kernels
 cd {root}
 {python} -m lab.guest {names}
 echo b > /proc/sysrq-trigger
@@ -162,7 +154,6 @@ def run_machines(
     fetch_kernel(cache)  # once, before they all want it
     for package in _PROGRAM:  # the emulated processor is many times slower at it
         compileall.compile_dir(ROOT / package, quiet=1)
-    compile_simulation(cache / _KERNELS)
     with ThreadPoolExecutor(max(1, len(parts))) as pool:
         runs = [
             pool.submit(run_machine, part, cache, is_shown=is_shown) for part in parts
@@ -170,17 +161,6 @@ def run_machines(
         results = [result for run in runs for result in run.result()]
     order = {scenario.name: number for number, scenario in enumerate(ALL)}
     return sorted(results, key=lambda result: order.get(result.name, -1))
-
-
-def compile_simulation(folder: Path) -> None:
-    """Compile the simulation into `folder`, unless it is there or numba is not."""
-    folder.mkdir(parents=True, exist_ok=True)
-    subprocess.run(
-        [sys.executable, "-c", _COMPILE],
-        cwd=ROOT,
-        env=os.environ | {"NUMBA_CPU_NAME": _TARGET, "NUMBA_CACHE_DIR": str(folder)},
-        check=True,
-    )
 
 
 def run_machine(
@@ -197,13 +177,7 @@ def run_machine(
     names = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
     if is_shown:
         names += " --echo"
-    job = _JOB.format(
-        root=ROOT,
-        python=sys.executable,
-        names=names,
-        kernels=(cache / _KERNELS).resolve(),
-        target=_TARGET,
-    )
+    job = _JOB.format(root=ROOT, python=sys.executable, names=names)
     with tempfile.TemporaryDirectory(prefix="lab") as place:
         folder = Path(place)
         first_root = folder / "initramfs"

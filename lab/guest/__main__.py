@@ -8,7 +8,6 @@ from pathlib import Path
 
 from lab.guest.commands import ScenarioError, seconds, wait
 from lab.guest.machine_room import PLACE, MachineRoom
-from lab.guest.pushed_arm import load_simulation
 from lab.guest.scenarios.registry import Scenario, chosen
 from lab.results import (
     Begun,
@@ -71,7 +70,6 @@ def main(names: list[str]) -> None:
     # Guest time jumps while the host's files are read: read them before it counts.
     for name in _WARM:
         importlib.import_module(name)
-    load_simulation()
     booted = seconds()
     for scenario in chosen(names, is_short=False):
         _tell(Begun(scenario.name))

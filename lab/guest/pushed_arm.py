@@ -10,31 +10,16 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from acquisition import Clock, SystemClock
+from acquisition import SystemClock
 from experiments.rig.fake import SimulatedRig
-from experiments.settings import Settings, load_settings
+from experiments.settings import load_settings
 from experiments.tools import Lines
 from fakes.pucks import WiredNetwork
 from fakes.serving import open_can_port
-from fakes.world import LocalSimulation, simulated_rig
+from fakes.world import simulated_rig
 from fakes.world_clock import TICK_NS, WorldClock
 from lab.guest.far_sensor import FarEnd
 from wam.model import load_constants
-
-_ROW = "TF"
-
-
-def load_simulation() -> None:
-    """Build the simulated rig once: its machine code is compiled, or loaded."""
-    _simulated(load_settings(None), _ROW, 1, SystemClock()).rig.bus.shutdown()
-
-
-def _simulated(
-    settings: Settings, terrain: str, seed: int, clock: Clock
-) -> LocalSimulation:
-    row = settings.row(terrain)
-    world = SimulatedRig(settings.rig, row, seed, 0.02, "steady")
-    return simulated_rig(world.metadata(), load_constants(), clock)
 
 
 class PushedArm:
@@ -42,8 +27,10 @@ class PushedArm:
 
     def __init__(self, options: argparse.Namespace) -> None:
         settings = load_settings(options.config)
+        row = settings.row(options.row)
+        world = SimulatedRig(settings.rig, row, options.seed, 0.02, "steady")
         self._clock = WorldClock(SystemClock())
-        simulation = _simulated(settings, options.row, options.seed, self._clock)
+        simulation = simulated_rig(world.metadata(), load_constants(), self._clock)
         self._simulation, rig = simulation, simulation.rig
         self._rig = rig
         self._wired = WiredNetwork(rig.network, is_far=True)
@@ -103,7 +90,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--config", type=Path, required=True)
     options.add_argument("--bus", required=True, metavar="INTERFACE:CHANNEL")
-    options.add_argument("--row", default=_ROW)
+    options.add_argument("--row", default="TF")
     options.add_argument("--seed", type=int, default=1)
     options.add_argument("--line", type=Path)
     arm = PushedArm(options.parse_args())
