@@ -1,6 +1,6 @@
 """How fast trial files become arrays, and how fast other readers are beside it.
 
-    python benchmarks/load.py [--trials 80] [--seconds 30] [--rounds 7] [--json]
+    python -m benchmarks.load [--trials 80] [--seconds 30] [--rounds 7] [--json]
 
 Trials are written by the recorder's own writer: cycles with the noise of encoders and
 sensor, views at 50 Hz, sensor samples, a chunk every 0.25 s. A few differ, the others

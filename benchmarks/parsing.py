@@ -1,6 +1,6 @@
 """What one frame of a serial wrist sensor costs, from bytes to a dated sample.
 
-    python benchmarks/parsing.py [--frames 20000]
+    python -m benchmarks.parsing [--frames 20000]
 
 Each sensor's stream is fed in pieces as they come while the loop runs (3 ms), and at
 once; the dating is that of the product. The last column is how many times the stream's

@@ -1,6 +1,6 @@
 """The 500 Hz loop beside the same exchange in C, and a witness of stalls.
 
-    python benchmarks/realtime.py [--seconds 60] [--windows 6] [--json]
+    python -m benchmarks.realtime [--seconds 60] [--windows 6] [--json]
 
 The simulated rig is a process of its own that paces its frames like a wire, the wrist
 sensor is asked in every cycle, the recorder is on, the arm is held by the control law.

@@ -1,6 +1,6 @@
 """The recorder under load: losses, backlog, processor and memory of its process.
 
-    python benchmarks/recorder.py [--seconds 60] [--rate 500] [--json]
+    python -m benchmarks.recorder [--seconds 60] [--rate 500] [--json]
 
 A pacing writer fills the board as a loop would, `--rate` cycles a second with two force
 samples and thirteen frames each, bit patterns changing so that compression has work.
