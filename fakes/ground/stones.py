@@ -82,13 +82,9 @@ class StoneBed:
         del x
         return self.jams.capacity_at(F_n)
 
-    def _land(self, x: float) -> None:
-        """Touch the ground again; far from where the foot stood it is fresh."""
-        is_lifted, self.aloft = self.aloft >= LIFTED, 0.0
-        before = self.stood_at
-        if is_lifted and before is not None and abs(x - before) >= self.away:
-            self.sink = 0.0
-            self.jams.begin_at(x)
+    def _is_away(self, x: float) -> bool:
+        """Whether a lifted foot is far from where it stood: the bed is fresh there."""
+        return self.stood_at is not None and abs(x - self.stood_at) >= self.away
 
     def truth(self) -> dict[str, float]:
         """Return the parameters in force [SI]."""
@@ -102,7 +98,8 @@ class StoneBed:
     def step(self, dt: float, motion: Motion) -> Contact:
         """Advance the bed by `dt` [s] and return what it does to the foot."""
         x, _, z, vx, _, vz, _, _, _ = motion
-        sink = self.sink
+        is_fresh = self.aloft >= LIFTED and self._is_away(x)
+        sink = 0.0 if is_fresh else self.sink
         row, share = locate(x)
         h, s = self.profile, self.slope
         depth = h[row] + share * (h[row + 1] - h[row]) - sink - z
@@ -111,8 +108,10 @@ class StoneBed:
             self.footing.release()
             self.jams.lose_contact()
             return NO_CONTACT
-        if self.aloft > 0.0:
-            self._land(x)
+        if is_fresh:
+            self.sink = 0.0
+            self.jams.begin_at(x)
+        self.aloft = 0.0
         self.stood_at = x
         slope = s[row] + share * (s[row + 1] - s[row])
         F_n = self.k_n * depth + self.c_n * (slope * vx - vz)

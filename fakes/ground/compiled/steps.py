@@ -106,20 +106,21 @@ def _plate_step(g, dt, m):
 def _touch(g, dt, m):
     """Meet the surface; return what is to be drawn."""
     x, z = m[0], m[2]
-    depth = _at(g.profile, x) - g.sink - z
+    is_fresh = g.aloft >= LIFTED and abs(x - g.stood_at) >= g.away  # NaN: nowhere yet
+    sink = 0.0 if is_fresh else g.sink
+    depth = _at(g.profile, x) - sink - z
     if depth <= 0.0:
         g.aloft += dt
         g.elastic, g.is_loaded = 0.0, 0
         g.anchor[:] = math.nan
         _release(g)
         return DONE
-    g.depth, g.sunk_before = depth, g.sink
+    g.depth, g.sunk_before = depth, sink
     g.phase = ON_THE_GROUND
-    if g.aloft > 0.0:
-        is_lifted, g.aloft = g.aloft >= LIFTED, 0.0
-        if is_lifted and abs(x - g.stood_at) >= g.away:  # never where it never stood
-            g.sink = 0.0
-            return LANDED
+    g.aloft = 0.0
+    if is_fresh:
+        g.sink = 0.0
+        return LANDED
     return DONE
 
 

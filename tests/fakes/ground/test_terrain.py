@@ -117,6 +117,17 @@ def test_a_bed_sinks_under_a_moving_foot_only():
     assert still.step(DT, deep)[2] > moving.step(DT, deep)[2] + 1.0
 
 
+def test_a_bed_has_not_sunk_where_a_lifted_foot_comes_down_moving():
+    bed, fresh = (StoneBed(STONES["big"], 0.0, rng(3)) for _ in range(2))
+    drag(bed, travel=0.1)
+    for _ in range(round(1.5 / DT)):
+        bed.step(DT, standing(bed.surface(0.0) + 0.05))
+    x = 0.1 + 2.0 * bed.away
+    coming_down = (x, 0.0, bed.surface(x) - 0.003, SPEED, 0.0, 0.0, *NO_TURN)
+    assert bed.step(DT, coming_down)[2] == fresh.step(DT, coming_down)[2]
+    assert bed.sink == fresh.sink < 1e-5
+
+
 def test_a_slope_weakens_a_bed():
     assert slope_factor(0.0) == 1.0
     factors = [slope_factor(math.radians(angle)) for angle in (5, 10, 15)]
