@@ -3,8 +3,11 @@
 avoid-slip chooses the load and the traction by P(slip | F_t, F_n) of the ground: the
 smallest load at which the peak has half the risk that may be taken, or else all of it;
 on ground where no load buys that, the load beyond which another newton brings less than
-3 %, and the traction at the risk, for as long as the impulse takes. A foot that slips
-all the same is let go, and pushes again with 0.8 of what failed once it rests.
+3 %, and the traction at the risk, for as long as the impulse takes. A foot under which
+the ground begins to give - it has crept 6 mm and still moves, or hurries - is eased: a
+tenth less traction every 20 ms until it rests, and no more than that from then on. A
+foot that slips all the same is let go, and pushes again with 0.8 of what failed once it
+rests.
 """
 
 from collections.abc import Mapping
@@ -36,6 +39,9 @@ _OWN_SHARE = 0.5  # of the risk, where load can buy it
 _OF_CAPACITY = 0.75  # that the oracle takes
 _STILL, _REST = 0.01, 0.15  # m/s, s: a foot that slipped rests
 _LESS = 0.8  # of what failed
+# A foot that has crept this far or is this fast, and still moves, is about to slip.
+_CREPT, _HURRIED, _MOVES = 0.006, 0.03, 0.004  # m, m/s, m/s
+_EASED = 0.9  # of the traction, every 20 ms until it rests
 _SETTLED = 0.06  # s after what was asked for, until the force is gone
 
 
@@ -71,6 +77,9 @@ def avoid_slip(
         return replace(
             last, F_t=0.0, phase=StancePhase.BACK_OFF, since=t, most=_LESS * last.most
         )
+    if last.phase is StancePhase.PUSH and _gives_way(sample):
+        most = _EASED * min(last.F_t, last.most)
+        return replace(last, F_t=most, most=most)
     return _pushing(sample, request)
 
 
@@ -166,6 +175,12 @@ def _pushing(sample: StanceSample, request: StanceRequest) -> StanceCommand:
         return replace(last, phase=StancePhase.PUSH, since=sample.t, F_t=0.0)
     phase = StancePhase.DONE if is_over else StancePhase.RELEASE
     return replace(last, F_t=max(force, 0.0), phase=phase)
+
+
+def _gives_way(sample: StanceSample) -> bool:
+    """Whether the ground begins to give: the foot has crept far, or hurries."""
+    crept, v_t = sample.x - sample.last.x0, sample.v_t
+    return v_t > _HURRIED or (crept > _CREPT and v_t > _MOVES)
 
 
 def _backing_off(sample: StanceSample) -> StanceCommand:

@@ -126,6 +126,16 @@ def test_a_foot_that_creeps_is_not_let_go(x, v_t):
     assert command.phase is StancePhase.PUSH
 
 
+@pytest.mark.parametrize(("x", "v_t"), [(0.007, 0.01), (0.001, 0.04)])
+def test_a_foot_under_which_the_ground_begins_to_give_is_eased(x, v_t):
+    command = avoid_slip(pushing(5.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
+    after = replace(pushing(5.0, t=0.52, x=x, v_t=0.001), last=command)
+
+    assert command.phase is StancePhase.PUSH
+    assert command.F_t == command.most == pytest.approx(4.5)
+    assert avoid_slip(after, ON_STONES, REQUEST).F_t == command.F_t
+
+
 def test_a_foot_that_slipped_pushes_again_once_it_rests():
     last = StanceCommand(0.0, 5.0, StancePhase.BACK_OFF, since=0.6, most=3.2)
     moving = replace(REST, t=0.7, is_loaded=True, v_t=0.02, last=last)
