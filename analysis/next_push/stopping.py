@@ -3,8 +3,8 @@
 Enough is where two more trials, at the aim and the point of the target where they move
 the answer most, would move it by less than single trials differ: two standard
 deviations of the move against sqrt(sc^2 + 2 so^2 tau / T). One trial earlier it must
-have been so, too: hyperparameters of a few trials wander. The matrix still decides how
-many there are to be.
+have been so, too: hyperparameters of a few trials wander. For break-away it is never
+enough with less than a slip a trial. The matrix still decides how many there are to be.
 """
 
 from collections.abc import Sequence
@@ -109,6 +109,8 @@ def stopping_with(knowledge: Knowledge, target: str) -> Stopping:
     records = knowledge.records
     change, spread = _change(knowledge, target)
     is_enough = len(records) >= _FEWEST and change < spread
+    if target == "break-away" and _slips_a_trial(records) < 1.0:
+        is_enough = False  # a plate that slides: one further slip would tell most of it
     if is_enough:
         before = Knowledge.at(records[:-1], knowledge.theta)
         change_before, spread_before = _change(before, target)
@@ -144,6 +146,9 @@ def _slip_change(records: Sequence[PushRecord]) -> tuple[float, float]:
     x = np.log(np.array(_LOADS) / _REFERENCE_LOAD)
     ends = np.array([np.ones(2), x])
     lost = np.einsum("ie,kij,je->ke", ends, now - np.linalg.inv(further), ends)
-    slips = sum(r.slips.size for r in records) / len(records)
     change = 2.0 * _PEAK_SPREAD * float(np.sqrt(max(lost.max(), 0.0)))
-    return change, _PEAK_SPREAD / float(np.sqrt(max(slips, 1.0)))
+    return change, _PEAK_SPREAD / float(np.sqrt(max(_slips_a_trial(records), 1.0)))
+
+
+def _slips_a_trial(records: Sequence[PushRecord]) -> float:
+    return sum(r.slips.size for r in records) / len(records)

@@ -1,6 +1,7 @@
 """What the next push teaches, when there are enough, and what a sidecar keeps."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -169,6 +170,14 @@ def test_slips_at_all_loads_are_enough_for_break_away():
     told = stopping_of([wide(k) for k in range(16)], "big", "break-away")
     assert told.is_enough
     assert "%" in told.text
+
+
+def test_a_plate_that_slides_is_never_enough_for_break_away():
+    one, *rest = [wide(k) for k in range(16)]
+    sliding = [one, *(replace(record, slips=np.zeros(0)) for record in rest)]
+    told = stopping_of(sliding, "flat", "break-away")
+    assert told.change < told.spread
+    assert not told.is_enough
 
 
 def test_more_trials_move_the_answer_less():
