@@ -173,8 +173,8 @@ def test_slips_at_all_loads_are_enough_for_break_away():
 
 
 def test_a_plate_that_slides_is_never_enough_for_break_away():
-    one, *rest = [wide(k) for k in range(16)]
-    sliding = [one, *(replace(record, slips=np.zeros(0)) for record in rest)]
+    slipping, rest = [wide(k) for k in range(3)], [wide(k) for k in range(3, 16)]
+    sliding = [*slipping, *(replace(record, slips=np.zeros(0)) for record in rest)]
     told = stopping_of(sliding, "flat", "break-away")
     assert told.change < told.spread
     assert not told.is_enough
