@@ -12,7 +12,14 @@ from math import exp, inf, isfinite, log, nan, sqrt
 from typing import Any
 
 from analysis.breakaway import FootPush
-from analysis.stance.seam import ENOUGH, FAST, MOVED, StanceForesight, StanceRequest
+from analysis.stance.seam import (
+    ENOUGH,
+    FAST,
+    MOVED,
+    StanceForesight,
+    StanceRequest,
+    gives_way,
+)
 
 STEP = 0.15  # g
 LEAST_SCALE, MOST_SCALE = 0.14, 4.5
@@ -31,7 +38,7 @@ class StanceOutcome:
         risk: foreseen of what was planned; NaN = nothing was.
         scale: by which the ground was taken to bear more.
         load: normal force, mean while the stance lasted [N].
-        force: largest traction that was held or reached before a slip [N].
+        force: largest traction that was held or reached before the ground gave [N].
         delivered: impulse [N s].
         early: impulse in the first second [N s].
         seconds: from the end of loading to the end.
@@ -39,6 +46,7 @@ class StanceOutcome:
         slid: way after the slip began [m]; 0 without one.
         fastest: largest speed over 20 ms [m/s].
         is_slip: the sole moved more than 10 mm, or faster than 0.06 m/s.
+        is_giving: the ground gave or began to: slips are among them.
         is_success: 95 % of the impulse without a slip.
     """
 
@@ -54,6 +62,7 @@ class StanceOutcome:
     slid: float
     fastest: float
     is_slip: bool
+    is_giving: bool
     is_success: bool
 
     @property
@@ -66,7 +75,7 @@ class StanceOutcome:
         """The stance as a push that teaches break-away; None = it pushed too little."""
         if self.force < _LEAST_FORCE:
             return None
-        return FootPush(0.0, self.force, self.load, is_held=not self.is_slip)
+        return FootPush(0.0, self.force, self.load, is_held=not self.is_giving)
 
     def to_dict(self) -> dict[str, float | bool | None]:
         """Return it as plain values, for JSON; None = not known."""
@@ -77,7 +86,7 @@ class StanceOutcome:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "StanceOutcome":
-        """Return the outcome of plain values.
+        """Return the outcome of plain values; earlier ones knew of slips alone.
 
         Raises:
             KeyError, TypeError, ValueError: they are none.
@@ -87,8 +96,11 @@ class StanceOutcome:
             for name in cls.__slots__
             if not name.startswith("is_")
         }
-        flags = {name: bool(content[name]) for name in ("is_slip", "is_success")}
-        return cls(**numbers, **flags)
+        is_slip, is_success = bool(content["is_slip"]), bool(content["is_success"])
+        is_giving = bool(content.get("is_giving", is_slip))
+        return cls(
+            **numbers, is_slip=is_slip, is_giving=is_giving, is_success=is_success
+        )
 
 
 @dataclass(slots=True)
@@ -107,6 +119,7 @@ class StanceWatch:
     _moved: float = 0.0
     _fastest: float = 0.0
     _slip_at: float = inf
+    _is_giving: bool = False
 
     def push(self, dt: float, x: float, v_t: float, F_t: float, F_n: float) -> None:
         """Take what happened in the last `dt` [s]."""
@@ -119,8 +132,11 @@ class StanceWatch:
         self._fastest = max(self._fastest, v_t)
         if self._slip_at < inf:
             return
-        self._force = max(self._force, F_t)
-        if x - self.x0 > MOVED or v_t > FAST:
+        if not self._is_giving:
+            self._force = max(self._force, F_t)
+        is_slip = x - self.x0 > MOVED or v_t > FAST
+        self._is_giving |= is_slip or gives_way(x - self.x0, v_t)
+        if is_slip:
             self._slip_at = x - self.x0
 
     def outcome(self, request: StanceRequest) -> StanceOutcome:
@@ -140,6 +156,7 @@ class StanceWatch:
             slid=max(self._moved - self._slip_at, 0.0) if is_slip else 0.0,
             fastest=self._fastest,
             is_slip=is_slip,
+            is_giving=self._is_giving,
             is_success=is_enough and not is_slip,
         )
 

@@ -29,6 +29,7 @@ from analysis.stance.seam import (
     StancePolicy,
     StanceRequest,
     StanceSample,
+    gives_way,
 )
 
 AS_STANDING = 4.0  # N, load of a foot that nobody presses
@@ -39,9 +40,8 @@ _OWN_SHARE = 0.5  # of the risk, where load can buy it
 _OF_CAPACITY = 0.75  # that the oracle takes
 _STILL, _REST = 0.01, 0.15  # m/s, s: a foot that slipped rests
 _LESS = 0.8  # of what failed
-# A foot that has crept this far or is this fast, and still moves, is about to slip.
-_CREPT, _HURRIED, _MOVES = 0.006, 0.03, 0.004  # m, m/s, m/s
-_EASED = 0.9  # of the traction, every 20 ms until it rests
+_EASED = 0.9  # of the traction, every 20 ms until the foot rests
+_LET_GO = 3.0  # times as fast as the force asked for falls, where that may be chosen
 _SETTLED = 0.06  # s after what was asked for, until the force is gone
 
 
@@ -77,10 +77,10 @@ def avoid_slip(
         return replace(
             last, F_t=0.0, phase=StancePhase.BACK_OFF, since=t, most=_LESS * last.most
         )
-    if last.phase is StancePhase.PUSH and _gives_way(sample):
+    if last.phase is StancePhase.PUSH and gives_way(sample.x - last.x0, sample.v_t):
         most = _EASED * min(last.F_t, last.most)
         return replace(last, F_t=most, most=most)
-    return _pushing(sample, request)
+    return _pushing(sample, request, _LET_GO * request.rate)
 
 
 def oracle(
@@ -105,16 +105,20 @@ POLICIES: Final[Mapping[str, StancePolicy]] = {
 def planned(foresight: StanceForesight, request: StanceRequest) -> tuple[float, float]:
     """Return load and largest traction [N] of a stance at the asked risk.
 
-    Without any known terrain it is that of constant mu.
+    Without any known terrain it is that of constant mu. That stances so far held more
+    than was learnt raises the traction; it never lightens the load.
     """
     if not foresight.is_known:
         return min(max(request.peak / CONSTANT_MU, LEAST_F_N), MOST_F_N), request.peak
     loads = _loads()
+    learnt = replace(foresight, scale=min(foresight.scale, 1.0))
     for risk in (_OWN_SHARE * request.risk, request.risk):
         for load in loads:
-            if foresight.risk(request.peak, load) <= risk:
+            if learnt.risk(request.peak, load) <= risk:
                 return load, request.peak
-    forces = [foresight.available(load, request.risk) for load in loads]
+    forces = [
+        min(foresight.available(load, request.risk), request.peak) for load in loads
+    ]
     for load, force, more in zip(loads, forces, forces[1:], strict=False):
         if more - force < _GAIN * _LOAD_STEP * force:
             return load, force
@@ -143,7 +147,7 @@ def _as_asked(
         return replace(last, phase=StancePhase.PUSH, since=sample.t)
     if sample.t >= LONGEST or last.phase is StancePhase.DONE:
         return replace(last, F_t=0.0, phase=StancePhase.DONE)
-    return _pushing(sample, request)
+    return _pushing(sample, request, request.rate)
 
 
 def _loading(
@@ -159,28 +163,24 @@ def _loading(
     return replace(last, phase=StancePhase.PUSH, since=sample.t, x0=sample.x)
 
 
-def _pushing(sample: StanceSample, request: StanceRequest) -> StanceCommand:
-    """Push until what is left of the impulse comes by letting go."""
+def _pushing(
+    sample: StanceSample, request: StanceRequest, fall: float
+) -> StanceCommand:
+    """Push until what is left of the impulse comes by letting go at `fall` [N/s]."""
     last, rate = sample.last, request.rate
     if last.phase is StancePhase.PUSH:
         left = request.impulse - sample.impulse
-        if last.F_t**2 < 2.0 * rate * left:
+        if last.F_t**2 < 2.0 * fall * left:
             force = min(rate * (sample.t - last.since), last.most)
             return replace(last, F_t=force)
         last = replace(last, phase=StancePhase.RELEASE, since=sample.t, most=last.F_t)
-    force = last.most - rate * (sample.t - last.since)
-    is_over = force <= 0.0 and sample.t > last.since + last.most / rate + _SETTLED
+    force = last.most - fall * (sample.t - last.since)
+    is_over = force <= 0.0 and sample.t > last.since + last.most / fall + _SETTLED
     if is_over and sample.impulse < ENOUGH * request.impulse:
         # The ground gave less than it was asked for: once more.
         return replace(last, phase=StancePhase.PUSH, since=sample.t, F_t=0.0)
     phase = StancePhase.DONE if is_over else StancePhase.RELEASE
     return replace(last, F_t=max(force, 0.0), phase=phase)
-
-
-def _gives_way(sample: StanceSample) -> bool:
-    """Whether the ground begins to give: the foot has crept far, or hurries."""
-    crept, v_t = sample.x - sample.last.x0, sample.v_t
-    return v_t > _HURRIED or (crept > _CREPT and v_t > _MOVES)
 
 
 def _backing_off(sample: StanceSample) -> StanceCommand:

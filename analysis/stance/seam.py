@@ -21,6 +21,8 @@ LEAST_PEAK, MOST_PEAK = 4.0, 10.0  # N
 LONGEST: Final = 3.0  # s that a stance may take
 RAMP, PLATEAU = 0.3, 0.4  # s of what is asked for
 MOVED, FAST = 0.010, 0.06  # m and m/s: beyond, the foot has slipped
+# A foot that has crept this far or is this fast, and still moves, is about to slip.
+_CREPT, _HURRIED, _MOVES = 0.006, 0.03, 0.004  # m, m/s, m/s
 ENOUGH = 0.95  # of the impulse
 _MOST_FORCE = 30.0  # N, end of a risk table
 _HALVINGS = 40
@@ -190,6 +192,16 @@ class StanceForesight:
                 (middle, high) if self.risk(middle, F_n) < risk else (low, middle)
             )
         return min(low, _MOST_FORCE)
+
+
+def gives_way(crept: float, v_t: float) -> bool:
+    """Return whether the ground begins to give under a foot that is pushed.
+
+    Args:
+        crept: way of the sole since the push began [m].
+        v_t: slip velocity over the last 20 ms [m/s].
+    """
+    return v_t > _HURRIED or (crept > _CREPT and v_t > _MOVES)
 
 
 def risk_tables(models: Mapping[str, BreakAwayModel]) -> dict[str, RiskTable]:

@@ -161,7 +161,7 @@ class _Draws:
             if sample.last.most != self._most:
                 self._load = exp(self._rng.uniform(log(3.0), log(20.0)))
                 self._most = float(
-                    self._rng.uniform(1.0, min(12.0, 1.2 * self._load + 4.0))
+                    self._rng.uniform(1.0, min(11.0, 1.2 * self._load + 4.0))
                 )
             return StanceCommand(0.0, self._load, StancePhase.LOAD, most=self._most)
         return avoid_slip(sample, foresight, request)

@@ -47,6 +47,23 @@ def test_speed_alone_is_a_slip():
     assert not stance(0.059, seconds=0.1).is_slip
 
 
+def test_ground_that_gives_is_no_slip_but_teaches_that_it_gave():
+    gave, held = stance(0.04, seconds=0.1), stance(0.002)
+
+    assert gave.is_giving
+    assert not gave.is_slip
+    assert gave.push is not None
+    assert held.push is not None
+    assert (gave.push.is_held, held.push.is_held) == (False, True)
+
+
+def test_a_record_of_earlier_stances_knows_of_slips_alone():
+    told = stance(0.03).to_dict()
+    del told["is_giving"]
+
+    assert StanceOutcome.from_dict(told) == stance(0.03)
+
+
 def test_too_little_impulse_is_no_success():
     assert not stance(0.0, force=3.0).is_success
 

@@ -78,6 +78,13 @@ def test_a_larger_scale_takes_more_and_a_smaller_one_less():
     assert taken[0] == pytest.approx(0.5 * taken[1], rel=0.03)
 
 
+def test_a_larger_scale_never_lightens_the_load():
+    known = planned(ON_PLATE, REQUEST)
+
+    assert planned(replace(ON_PLATE, scale=3.0), REQUEST) == known
+    assert known[1] == REQUEST.peak
+
+
 def test_uncertain_ground_lies_between_the_grounds():
     mixed = StanceForesight({"stones": 0.5, "plate": 0.5}, TABLES)
     ends = ON_STONES.risk(5.0, 10.0), ON_PLATE.risk(5.0, 10.0)
@@ -147,7 +154,7 @@ def test_a_foot_that_slipped_pushes_again_once_it_rests():
 
 
 def test_the_impulse_ends_a_stance_and_three_seconds_do():
-    nearly = avoid_slip(pushing(4.0, t=0.8, impulse=4.0), ON_STONES, REQUEST)
+    nearly = avoid_slip(pushing(4.0, t=0.8, impulse=4.1), ON_STONES, REQUEST)
     late = avoid_slip(pushing(4.0, t=3.0, impulse=1.0), ON_STONES, REQUEST)
 
     assert nearly.phase is StancePhase.RELEASE
