@@ -11,7 +11,8 @@ from .hierarchy import (
 from .kernels import Kernel, SquaredExponential
 from .likelihood import Likelihood, factorise
 from .noise import ConstantNoise, LogLinearNoise
-from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
+from .refit import refit_gp, without_idle_inputs
+from .regression import GaussianProcess, LeaveOut, fit_gp
 from .search import Start
 from .trial_noise import TrialNoise, TrialRows
 
@@ -24,6 +25,7 @@ __all__ = [
     "GroundProcess",
     "GroundRows",
     "Kernel",
+    "LeaveOut",
     "Likelihood",
     "LogLinearNoise",
     "PredictiveProcess",

@@ -29,6 +29,8 @@ _NOISE_STEP = 0.1  # the likelihood bends most along the noise: its steps are sh
 _APART = 1.5  # of starts in one of the shape: two steps of the lengths offered
 _ELSEWHERE = 1.0  # a start nearer to a known top leads back to it
 _ROUGH = 150  # rows by which the first starts are chosen
+_RIVAL = 5.0  # log likelihood below the best one at which a top may still become it
+_NEIGHBOURS = 0.5  # tops nearer to each other in the shape are one
 _FLAT = 3.0  # logarithm from which on a length or bias makes no difference
 
 
@@ -99,20 +101,45 @@ def climb_from(
     objective: Objective,
     X: Array,
     sd_y: float,
-    start: Array,
+    starts: Sequence[Array],
+    exact: Score | None = None,
 ) -> Optimum:
-    """Return the top that one start leads to: for where the best top is nearly known.
+    """Return the best top that starts lead to: for where tops are nearly known.
 
     Args:
         model: kernel and noise; theta is the kernel's, then the noise's.
         objective: theta -> likelihood and its slope; may raise SettingsError.
         X: inputs, shape (n, d).
         sd_y: standard deviation of the outputs.
-        start: theta to begin with.
+        starts: thetas to begin with.
+        exact: theta -> likelihood of all rows: one more start is chosen by it, where
+            the best top may be another one than those known.
     """
-    box = _box(model, X, sd_y)
-    reached = [climb(objective, start, box, [])]
-    return _optimum(model, objective, box, ([start], reached))
+    box, reached = _box(model, X, sd_y), list[Start]()
+    began = list(starts)
+    for start in began:
+        reached.append(climb(objective, start, box, reached))
+    if exact is not None:
+        last = _last_start(model[0], began, exact, (began, reached), box)
+        began.append(last)
+        reached.append(climb(objective, last, box, reached))
+    return _optimum(model, objective, box, (began, reached))
+
+
+def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
+    """Return the tops that starts reached, best first; no two of them are neighbours.
+
+    Tops too far below the best one are left out.
+    """
+    tops: list[Array] = []
+    ranked = sorted(reached, key=lambda start: -start.lml)
+    for start in ranked:
+        theta = np.array(start.theta)
+        if ranked[0].lml - start.lml > _RIVAL:
+            break
+        if not tops or _gap(kernel, theta, tops) >= _NEIGHBOURS:
+            tops.append(theta)
+    return tops
 
 
 def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> SearchBox:
