@@ -11,9 +11,9 @@ from .hierarchy import (
 from .kernels import Kernel, SquaredExponential
 from .likelihood import Likelihood, factorise
 from .noise import ConstantNoise, LogLinearNoise
-from .refit import refit_gp, without_idle_inputs
+from .quasi_newton import Start
+from .refit import refit_gp
 from .regression import GaussianProcess, LeaveOut, fit_gp
-from .search import Start
 from .trial_noise import TrialNoise, TrialRows
 
 __all__ = [
@@ -41,5 +41,4 @@ __all__ = [
     "prior_of",
     "refit_gp",
     "trial_noise",
-    "without_idle_inputs",
 ]

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.data import Array
+from analysis.gp.ascent import objective_of
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.low_rank import near_over
 from analysis.gp.noise import Noise
 from analysis.gp.regression import GaussianProcess
-from analysis.gp.search import climb_from, distinct_tops, objective_of
+from analysis.gp.search import climb_from, distinct_tops
 
 _SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
-_LONG = 1.0  # logarithm of a length from which on an input may be idle
 
 
 def refit_gp(
@@ -51,27 +51,6 @@ def refit_gp(
         wanted = (*process.kernel.names, *model[1].names)
         starts.append(np.array([known[name] for name in wanted]))
     return _climbed(process, model, y, starts, is_searched=noise is not None)
-
-
-def without_idle_inputs(process: GaussianProcess, y: Array) -> GaussianProcess:
-    """Return the process, or a likelier one that makes no use of one of its inputs.
-
-    On a straight trend a long length and an endless one are two tops, and the search
-    offers the second only where the likelihood is flat between them.
-
-    Args:
-        process: what to begin with.
-        y: its training outputs, shape (n,).
-    """
-    model, best = (process.kernel, process.noise), process
-    for k, name in enumerate(process.kernel.names):
-        if name.rpartition("_")[2].startswith("l") and process.theta[k] > _LONG:
-            start = process.theta.copy()
-            start[k] = np.inf  # the climb begins at the bound
-            other = _climbed(process, model, y, [start])
-            best, less = sorted((best, other), key=lambda gp: -gp.lml)
-            best = replace(best, starts=(*best.starts, *less.starts))
-    return best
 
 
 def _climbed(

@@ -11,10 +11,10 @@ from scipy.linalg import solve_triangular
 
 from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
 from analysis.gp.likelihood import Factor, factorise, lapack, split
 from analysis.gp.noise import ConstantNoise, Noise
+from analysis.gp.quasi_newton import Start
 from analysis.gp.search import posterior_search, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 

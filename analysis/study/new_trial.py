@@ -26,7 +26,6 @@ from analysis.gp import (
     TrialRows,
     fit_gp,
     refit_gp,
-    without_idle_inputs,
 )
 from analysis.study.distribution import FEWEST, NewTrialPrediction
 from analysis.study.metrics import clearly_best
@@ -189,7 +188,7 @@ class NewTrialFit:
 
     def _candidates(self, kernel: Kernel) -> list[_Candidate]:
         outputs = self._outputs(self._chosen, None)
-        process = fit_gp(
+        normal = fit_gp(
             self._rows.inputs,
             outputs,
             kernel,
@@ -197,7 +196,6 @@ class NewTrialFit:
             is_centred=self._curve is None,
             trials=self._trials,
         )
-        normal = without_idle_inputs(process, outputs)
         fitted = [_Candidate(NORMAL, normal, None)]
         if len(self._left_out) < 2:
             return fitted
@@ -219,7 +217,10 @@ class NewTrialFit:
             lml = process.lml + float(log_warp_slope(self._rows.F_t, c).sum())
             return lml, _Candidate(WARPED, process, c)
 
-        return max(map(bent, _BENDS), key=lambda pair: pair[0])[1]
+        best = max(map(bent, _BENDS), key=lambda pair: pair[0])[1]
+        z, process = self._outputs(self._chosen, best.c), best.process
+        # the same noise as another one: other tops are searched for, too
+        return best._replace(process=refit_gp(process, z, noise=process.noise))
 
     def _noise(self, within: ConstantNoise | LogLinearNoise) -> TrialNoise:
         load = self._rows.F_n
