@@ -119,7 +119,7 @@ def best_of(model: NewTrialModel, training: TrainingSet, starts: int) -> float:
             objective,
             gp.X,
             sd,
-            centre + rng.normal(0.0, 1.0, centre.size),
+            [centre + rng.normal(0.0, 1.0, centre.size)],
         ).lml
         for _ in range(starts)
     ]

@@ -11,8 +11,9 @@ from .hierarchy import (
 from .kernels import Kernel, SquaredExponential
 from .likelihood import Likelihood, factorise
 from .noise import ConstantNoise, LogLinearNoise
-from .regression import GaussianProcess, fit_gp, refit_gp, without_idle_inputs
-from .search import Start
+from .quasi_newton import Start
+from .refit import refit_gp
+from .regression import GaussianProcess, LeaveOut, fit_gp
 from .trial_noise import TrialNoise, TrialRows
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "GroundProcess",
     "GroundRows",
     "Kernel",
+    "LeaveOut",
     "Likelihood",
     "LogLinearNoise",
     "PredictiveProcess",
@@ -39,5 +41,4 @@ __all__ = [
     "prior_of",
     "refit_gp",
     "trial_noise",
-    "without_idle_inputs",
 ]

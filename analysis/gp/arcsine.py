@@ -24,6 +24,8 @@ from analysis.gp.kernels import (
     length_pairs,
 )
 
+Part = tuple[slice, slice]  # rows and columns of a matrix that are computed
+
 _ROOT_2 = np.sqrt(2.0)
 _BIASES = (20.0, 0.05)  # beta that a search may start with
 
@@ -78,7 +80,10 @@ class Arcsine(Composable):
 
     def over(self, X: Array, X_other: Array | None = None) -> Evaluator:
         """Return what gives K and its contraction for any theta."""
-        return _ArcsineOver(self, X, X_other)
+        other = X if X_other is None else X_other
+        parts = computed_parts(len(X), len(other), is_upper=X_other is None)
+        over = _PrintedOver if self.as_printed else _NetworkOver
+        return over(self, (X, other), parts)
 
     def design(self, sd_y: float, sd_x: Array) -> Sequence[Array]:
         """Return sf = sd(y)/2 and a large or small bias with every pair of lengths.
@@ -103,21 +108,68 @@ class Arcsine(Composable):
         return centre[:, None] + np.array(span)
 
 
-class _ArcsineOver:
-    """The kernel over two sets of rows, in memory of its own.
+class _NetworkOver:
+    """The kernel of a network, c = 1, over two sets of rows in memory of its own.
 
-    Of D = sqrt(A A' - N^2), the sine's partner, everything that depends on the rows
-    alone is computed once: by Lagrange's identity A A' - N^2 = c (c + p + p') +
-    sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and the lengths taken out these are
-    squares of x_a - x'_a and of x_a x'_b - x_b x'_a. The latter is written as
-    x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where two rows are close.
+    With V = U / sqrt(A) the sine is u = V V'. As 1 - u^2 is above 1/(1 + p), it loses
+    no more digits to cancellation than the size of p has: five at the steepest.
     """
 
-    def __init__(self, kernel: Arcsine, X: Array, X_other: Array | None) -> None:
-        is_upper, X_other = X_other is None, X if X_other is None else X_other
-        self._kernel, self._X, self._X_other = kernel, X, X_other
+    def __init__(
+        self, kernel: Arcsine, rows: tuple[Array, Array], parts: Sequence[Part]
+    ) -> None:
+        self._kernel, self._rows, self._parts = kernel, rows, parts
+        shape = len(rows[0]), len(rows[1])
+        self._K, self._u = np.zeros(shape), np.empty(shape)
+
+    def __call__(self, theta: Array) -> tuple[Array, Contraction]:
+        """Return K = sf^2 asin(u) and its contraction."""
+        V, V_other = (self._scaled(theta, X) for X in self._rows)
+        sf2, K, u = float(np.exp(2.0 * theta[0])), self._K, self._u
+        np.matmul(V, np.ascontiguousarray(V_other.T), out=u)
+        for part in self._parts:
+            np.arcsin(u[part], out=K[part])
+            K[part] *= sf2
+        return K, lambda W: self._contract(W, sf2, V, V_other)
+
+    def _scaled(self, theta: Array, X: Array) -> Array:
+        rows = self._kernel.rows(theta, X)
+        return rows.U / np.sqrt(rows.A)[:, None]
+
+    def _contract(self, W: Array, sf2: float, V: Array, V_other: Array) -> Array:
+        """Return sum_ij W_ij dK_ij/dtheta.
+
+        For any parameter t, dk/dt = sf^2 [dN/dt / sqrt(A A') - u/2 (dA/dt / A +
+        dA'/dt / A')] / sqrt(1 - u^2). So q = W / sqrt(1 - u^2) and that times u are all
+        that is needed, and their products with V.
+        """
+        of_sf, u = 2.0 * float(np.vdot(W, self._K)), self._u
+        for part in self._parts:
+            sine = u[part]
+            W[part] /= np.sqrt(1.0 - sine * sine)
+        of_shape = 2.0 * np.einsum("na,na->a", V, W @ V_other)
+        r = np.multiply(W, u, out=W)
+        of_shape -= r.sum(axis=1) @ (V * V) + r.sum(axis=0) @ (V_other * V_other)
+        return _slopes(of_sf, sf2 * of_shape)
+
+
+class _PrintedOver:
+    """The kernel as printed, c = 0, over two sets of rows in memory of its own.
+
+    Its sine is 1 where rows repeat, so the angle comes from the tangent N / D. Of
+    D = sqrt(A A' - N^2) everything that depends on the rows alone is computed once: by
+    Lagrange's identity D^2 = sum_{a<b} (U_a U'_b - U_b U'_a)^2, and with beta and the
+    lengths taken out these are squares of x_a - x'_a and of x_a x'_b - x_b x'_a. The
+    latter is written as x_b (x_a - x'_a) - x_a (x_b - x'_b), so nothing cancels where
+    two rows are close.
+    """
+
+    def __init__(
+        self, kernel: Arcsine, rows: tuple[Array, Array], parts: Sequence[Part]
+    ) -> None:
+        self._kernel, (X, X_other) = kernel, rows
+        self._X, self._X_other, self._parts = X, X_other, parts
         shape, d = (X.shape[0], X_other.shape[0]), X.shape[1]
-        self._parts = computed_parts(*shape, is_upper=is_upper)
         self._pairs = [(a, b) for a in range(d) for b in range(a + 1, d)]
         self._squares = np.empty((d + len(self._pairs), *shape))
         steps = [np.subtract.outer(X[:, a], X_other[:, a]) for a in range(d)]
@@ -133,28 +185,24 @@ class _ArcsineOver:
         others = self._kernel.rows(theta, self._X_other)
         sf2, K, D = float(np.exp(2.0 * theta[0])), self._K, self._D
         np.matmul(rows.U, np.ascontiguousarray(others.U.T), out=self._N)
-        self._fill_squares(theta, rows, others)
+        self._fill_squares(theta)
         for part in self._parts:
             np.sqrt(D[part], out=D[part])
-            with np.errstate(divide="ignore"):  # repeated inputs as printed: pi/2
+            with np.errstate(divide="ignore"):  # repeated inputs: pi/2
                 np.divide(self._N[part], D[part], out=K[part])
             np.arctan(K[part], out=K[part])
             K[part] *= sf2
-        if self._kernel.as_printed:
-            # at repeated inputs the arcsine has its cusp: its slope is set to 0
-            D[D == 0.0] = np.inf
+        # at repeated inputs the arcsine has its cusp: its slope is set to 0
+        D[D == 0.0] = np.inf
         return K, lambda W: self._contract(W, sf2, rows, others)
 
-    def _fill_squares(self, theta: Array, rows: Augmented, others: Augmented) -> None:
+    def _fill_squares(self, theta: Array) -> None:
         """Put D^2 into the memory of D."""
-        c, D, beta = self._kernel.c, self._D, np.exp(theta[-1])
         inverse = 2.0 * np.exp(-2.0 * theta[1:-1])
-        weights = [beta * inverse, [inverse[a] * inverse[b] for a, b in self._pairs]]
+        of_pairs = [inverse[a] * inverse[b] for a, b in self._pairs]
+        weights = np.concatenate([np.exp(theta[-1]) * inverse, of_pairs])
         flat = self._squares.reshape(self._squares.shape[0], -1)
-        np.matmul(np.concatenate(weights), flat, out=D.reshape(-1))
-        if c:
-            D += (c * (rows.A - 0.5 * c))[:, None]
-            D += c * (others.A - 0.5 * c)
+        np.matmul(weights, flat, out=self._D.reshape(-1))
 
     def _contract(
         self, W: Array, sf2: float, rows: Augmented, others: Augmented
@@ -171,6 +219,12 @@ class _ArcsineOver:
         of_shape = 2.0 * np.einsum("na,na->a", rows.U, q @ others.U)
         of_shape -= (rows.U**2).T @ (r.sum(axis=1) / rows.A)
         of_shape -= (others.U**2).T @ (r.sum(axis=0) / others.A)
-        of_shape *= sf2
-        # U_0^2 = beta and U_d^2 ~ l_d^-2: slopes of log beta and of -2 log l_d
-        return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])
+        return _slopes(of_sf, sf2 * of_shape)
+
+
+def _slopes(of_sf: float, of_shape: Array) -> Array:
+    """Return the slopes in theta from those of log U_0^2 = log beta and of log U_d^2.
+
+    U_d^2 ~ l_d^-2, and a sum over U_a stands for twice a slope of log U_a^2.
+    """
+    return np.concatenate([[of_sf], -of_shape[1:], [0.5 * of_shape[0]]])

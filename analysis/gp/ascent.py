@@ -15,17 +15,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import SettingsError
 from analysis.data import Array
+from analysis.gp.kernels import Kernel
+from analysis.gp.likelihood import split
+from analysis.gp.low_rank import Near
+from analysis.gp.noise import Noise
+from analysis.gp.quasi_newton import (
+    HOPELESS,
+    Objective,
+    SearchBox,
+    Start,
+    maximised,
+    tried,
+)
 
-Objective = Callable[[Array], tuple[float, Array]]
-
-_HOPELESS = 1e25  # objective where no jitter helps
 _SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
 _REACH = 2.0  # of theta that an approximation is climbed over before it is made anew
 _NEARLY = 1.0  # a shorter way needs no other approximation
 _CORRECTIONS = 6  # steps by corrected slopes; two or three do
-_GAIN = 3e-6  # log likelihood below which a step is not worth an exact evaluation
+_GAIN = 1e-5  # log likelihood below which a step is not worth an exact evaluation
 # twice the error that approximations aim at, and that they may have at most: on the
 # way, one after the other, and at the top
 _FAIR, GOOD = ((0.1, 5.0), (0.1, 5.0), (0.1, 5.0)), (0.1, 0.3)
@@ -33,38 +41,8 @@ _DIFFERENCE = 1e-4  # of theta, for second derivatives
 _FLAT = 1e-2  # smallest second derivative that counts
 _FURTHEST = 0.3  # that a parabola is believed
 _ROUGH, _FINE, _PRECISE = 1e-6, 1e-8, 2e-9  # relative changes that end a climb
+_LOST = (1.0, 3, 0.05)  # below the best top, steps, and their share of what is missing
 _KEPT = 0.3  # share of the promised gain below which an approximation is given up
-
-
-class Start(NamedTuple):
-    """One start of the search and what it reached.
-
-    Attributes:
-        theta: hyperparameters at its end: a top, or just below the top of another.
-        lml: log marginal likelihood there, priors included.
-        evaluations: how often the exact likelihood was evaluated.
-    """
-
-    theta: tuple[float, ...]
-    lml: float
-    evaluations: int
-
-
-class SearchBox(NamedTuple):
-    """Where theta is sought.
-
-    Attributes:
-        bounds: of theta, shape (p, 2).
-        steps: size of its steps, shape (p,).
-    """
-
-    bounds: Array
-    steps: Array
-
-    def around(self, theta: Array, reach: float) -> "SearchBox":
-        """Return the part of the box that is no further than `reach` from theta."""
-        low, high = np.clip([theta - reach, theta + reach], *self.bounds.T)
-        return self._replace(bounds=np.column_stack([low, high]))
 
 
 class Approximated(NamedTuple):
@@ -95,27 +73,47 @@ def climb(
         box: where theta is sought.
         known: what other starts have reached.
     """
+    is_lost = _watch(known)
 
     def is_enough(theta: Array, lml: float) -> bool:
-        return _is_below(theta, lml, known)
+        return _is_below(theta, lml, known) or is_lost(lml)
 
     theta = np.clip(start, *box.bounds.T)
     if not isinstance(objective, Approximated):
-        return _maximised(objective, theta, box, (_PRECISE, is_enough))
+        return maximised(objective, theta, box, (_PRECISE, is_enough))
     if known:
         best = max(known, key=lambda start: start.lml)
         if objective.near(np.array(best.theta), GOOD) is None:  # tops are rough here
-            return _maximised(objective, theta, box, (_ROUGH, is_enough))
+            return maximised(objective, theta, box, (_ROUGH, is_enough))
     theta = _approached(objective, theta, box, known)
     end, is_top = _corrected(objective, theta, box, known)
     if is_top:
         return end
-    rest = _maximised(objective, np.array(end.theta), box, (_ROUGH, is_enough))
+    rest = maximised(objective, np.array(end.theta), box, (_ROUGH, is_enough))
     # on a ridge that may stop short of the top
     last, _ = _corrected(objective, np.array(rest.theta), box, known)
     best = max(rest, last, key=lambda start: start.lml)
     spent = end.evaluations + rest.evaluations + last.evaluations
     return best._replace(evaluations=spent)
+
+
+def _watch(known: Sequence[Start]) -> Callable[[float], bool]:
+    """Return what tells, step by step, that a climb will not reach the best known top.
+
+    It is lost far below, where the last steps gained little of what is missing.
+    """
+    best = max((start.lml for start in known), default=-np.inf)
+    below, steps, share = _LOST
+    passed: list[float] = []
+
+    def is_lost(lml: float) -> bool:
+        passed.append(lml)
+        missing = best - lml
+        if len(passed) <= steps or missing < below:
+            return False
+        return lml - passed[-1 - steps] < share * missing
+
+    return is_lost
 
 
 def _approached(
@@ -131,7 +129,7 @@ def _approached(
         if near is None:
             break
         before, region = theta, box.around(theta, _REACH)
-        end = _maximised(near, theta, region, (_ROUGH, is_enough))
+        end = maximised(near, theta, region, (_ROUGH, is_enough))
         theta = np.array(end.theta)
         if np.abs(theta - before).max() < _NEARLY:
             break
@@ -151,8 +149,8 @@ def _corrected(
     """
     near = objective.near(theta, GOOD)
     if near is None:
-        return Start(tuple(theta.tolist()), -_HOPELESS, 0), False
-    lml, slope = _tried(objective, theta)
+        return Start(tuple(theta.tolist()), -HOPELESS, 0), False
+    lml, slope = tried(objective, theta)
     if _is_below(theta, lml, known):
         return Start(tuple(theta.tolist()), lml, 1), True
     bend, is_bent, spent = _curvature(near, theta, box), False, 1
@@ -163,7 +161,7 @@ def _corrected(
             (top, gain), is_bent = _stepped(near, at, box), True
         if 0.0 <= gain < _GAIN:
             return Start(tuple(theta.tolist()), lml, spent), True
-        better, new_slope = _tried(objective, top)
+        better, new_slope = tried(objective, top)
         spent += 1
         is_kept = better >= lml + _KEPT * gain and gain > 0.0
         if better > lml:
@@ -177,10 +175,9 @@ def _corrected(
 def _curvature(near: Objective, theta: Array, box: SearchBox) -> Array:
     """Return minus the second derivatives of an approximation, shape (p, p)."""
     inwards = np.where(theta < box.bounds.mean(axis=1), _DIFFERENCE, -_DIFFERENCE)
-    slope = _tried(near, theta)[1]
+    slope = tried(near, theta)[1]
     rows = [
-        (slope - _tried(near, theta + step)[1]) / step.sum()
-        for step in np.diag(inwards)
+        (slope - tried(near, theta + step)[1]) / step.sum() for step in np.diag(inwards)
     ]
     return 0.5 * (np.array(rows) + np.array(rows).T)
 
@@ -219,64 +216,15 @@ def _stepped(
         box: where the top is sought.
     """
     theta, slope = at
-    value, own = _tried(near, theta)
+    value, own = tried(near, theta)
     missing = slope - own
 
     def corrected(there: Array) -> tuple[float, Array]:
         lml, slope = near(there)
         return lml - value + float(missing @ (there - theta)), slope + missing
 
-    top = _maximised(corrected, theta, box.around(theta, _REACH), (_FINE, None))
+    top = maximised(corrected, theta, box.around(theta, _REACH), (_FINE, None))
     return np.array(top.theta), top.lml
-
-
-def _maximised(
-    objective: Objective,
-    theta: Array,
-    box: SearchBox,
-    until: tuple[float, Callable[[Array, float], bool] | None],
-) -> Start:
-    """Return the top of an objective that theta leads to.
-
-    Args:
-        objective: theta -> value and slope.
-        theta: to begin with.
-        box: where it is sought.
-        until: relative change of the value that ends it, and what ends it at once.
-    """
-    from scipy.optimize import OptimizeResult, minimize
-
-    (bounds, steps), (tolerance, is_enough) = box, until
-
-    def downhill(x: Array) -> tuple[float, Array]:
-        value, slope = _tried(objective, x * steps)
-        return -value, -slope * steps
-
-    def look(intermediate_result: OptimizeResult) -> None:
-        if is_enough and is_enough(
-            intermediate_result.x * steps, -intermediate_result.fun
-        ):
-            raise StopIteration
-
-    optimum = minimize(
-        downhill,
-        theta / steps,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=bounds / steps[:, None],
-        callback=look,
-        options={"maxiter": 200, "gtol": 1e-5, "ftol": tolerance},
-    )
-    reached = tuple((optimum.x * steps).tolist())
-    return Start(reached, -float(optimum.fun), int(optimum.nfev))
-
-
-def _tried(objective: Objective, theta: Array) -> tuple[float, Array]:
-    """Return value and slope; hopeless where the covariance cannot be factorised."""
-    try:
-        return objective(theta)
-    except SettingsError:
-        return -_HOPELESS, np.zeros_like(theta)
 
 
 def _is_below(theta: Array, lml: float, known: Sequence[Start]) -> bool:
@@ -292,3 +240,34 @@ def _tops_at(theta: Array, lml: float, known: Sequence[Start]) -> list[Start]:
         for top in known
         if abs(top.lml - lml) < low and np.abs(theta - top.theta).max() < near
     ]
+
+
+def objective_of(
+    model: tuple[Kernel, Noise], likelihood: Objective, near: Near
+) -> Approximated:
+    """Return what is climbed: the likelihood times the noise's prior.
+
+    Args:
+        model: kernel and noise.
+        likelihood: the exact one.
+        near: its approximations.
+    """
+
+    def near_with_prior(theta: Array, trace: tuple[float, float]) -> Objective | None:
+        found = near(theta, trace)
+        return None if found is None else _with_prior(model, found)
+
+    return Approximated(_with_prior(model, likelihood), near_with_prior)
+
+
+def _with_prior(model: tuple[Kernel, Noise], likelihood: Objective) -> Objective:
+    """Return the likelihood with the noise's prior, and its slope."""
+    kernel, noise = model
+
+    def objective(theta: Array) -> tuple[float, Array]:
+        lml, slope = likelihood(theta)
+        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
+        slope[-prior_slope.size :] += prior_slope
+        return lml + prior, slope
+
+    return objective

@@ -11,18 +11,15 @@ from scipy.linalg import solve_triangular
 
 from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
-from analysis.gp.likelihood import Factor, Likelihood, factorise, split
-from analysis.gp.low_rank import near_over
+from analysis.gp.likelihood import Factor, factorise, lapack, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.search import climb_from, objective_of, posterior_search, spread
+from analysis.gp.quasi_newton import Start
+from analysis.gp.search import posterior_search, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
 
-_SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
-_LONG = 1.0  # logarithm of a length from which on an input may be idle
 _BLOCK = 500  # rows predicted at a time: their matrix stays in the cache
 
 
@@ -70,6 +67,10 @@ class GaussianProcess:
             for i in range(0, Z.shape[0], _BLOCK)
         ]
         return self.offset + np.concatenate([np.zeros(0), *blocks])
+
+    def factor(self) -> Factor:
+        """Return the factor of the covariance of the training rows."""
+        return _factor((self.kernel, self.noise), self.theta, self.X, self.trials)
 
     def describe(self) -> dict[str, Any]:
         """Return hyperparameters, likelihood, starts, jitter and standardisation."""
@@ -122,7 +123,7 @@ class GaussianProcess:
         """
         theta, theta_noise = split(self.kernel, self.theta)
         Z = (inputs - self.centre) / self.scale
-        L = _factor((self.kernel, self.noise), self.theta, self.X, self.trials).L
+        L = self.factor().L
         mean, variance = np.empty(Z.shape[0]), self.kernel.diagonal(theta, Z)
         for i in range(0, Z.shape[0], _BLOCK):
             cross = self.kernel.matrix(theta, self.X, Z[i : i + _BLOCK])
@@ -133,6 +134,52 @@ class GaussianProcess:
         if include_noise:
             variance = variance + self.noise.variance(theta_noise, Z)
         return mean, variance
+
+
+class LeaveOut:
+    """A process that is asked what it would predict without some of its rows.
+
+    Its hyperparameters, standardisation and offset stay. With P = C^-1 of all rows and
+    b those left out, the inverse of the others' covariance is, in their places,
+    P - P_.b P_bb^-1 P_b. (a partitioned inverse; for one row Rasmussen and Williams
+    2006, eq. 5.12). With k the covariances of a new row and A = P_b. k that makes
+
+        mean = k'alpha - A'P_bb^-1 alpha_b,  variance = k** - k'P k + A'P_bb^-1 A
+
+    where the parts of rows b cancel, whatever their covariance with the new row is.
+
+    Args:
+        process: fitted to the rows in `process.X`.
+    """
+
+    def __init__(self, process: GaussianProcess) -> None:
+        self._process = process
+        factor = process.factor()
+        self._L, self._P = factor.L, factor.inverse()
+
+    def predict(self, rows: slice, inputs: Array) -> tuple[Array, Array]:
+        """Return mean and variance of measurements at `inputs` without some rows.
+
+        Args:
+            rows: training rows that are left out.
+            inputs: in the units of the training inputs, shape (m, d).
+
+        Returns:
+            Mean and variance, noise included, each of shape (m,).
+        """
+        process = self._process
+        theta, theta_noise = split(process.kernel, process.theta)
+        Z = (inputs - process.centre) / process.scale
+        cross = process.kernel.matrix(theta, process.X, Z)
+        half = lapack("trtrs")(self._L, cross, lower=1)[0]
+        L_left, _ = lapack("potrf")(self._P[rows, rows], lower=1, clean=1)
+        joint = np.column_stack([self._P[rows] @ cross, process.alpha[rows]])
+        left = lapack("trtrs")(L_left, joint, lower=1)[0]
+        mean = process.offset + process.alpha @ cross - left[:, -1] @ left[:, :-1]
+        variance = process.kernel.diagonal(theta, Z)
+        variance -= np.einsum("nm,nm->m", half, half)
+        variance += np.einsum("nm,nm->m", left[:, :-1], left[:, :-1])
+        return mean, np.maximum(variance, 0.0) + process.noise.variance(theta_noise, Z)
 
 
 def _factor(
@@ -190,60 +237,6 @@ def fit_gp(
         jitter=factor.jitter,
         at_bound=optimum.at_bound,
         trials=trials,
-    )
-
-
-def refit_gp(process: GaussianProcess, y: Array, ratio: float) -> GaussianProcess:
-    """Return a process of other outputs over the same rows, by a climb from this one.
-
-    For outputs so alike that the best top is nearly known.
-
-    Args:
-        process: what to begin with.
-        y: training outputs, shape (n,).
-        ratio: standard deviation of `y` over that of the outputs of `process`.
-    """
-    names = (*process.kernel.names, *process.noise.names)
-    is_size = [name.rpartition("_")[2] in _SIZES for name in names]
-    return _climbed(process, y, process.theta + np.log(ratio) * np.array(is_size))
-
-
-def without_idle_inputs(process: GaussianProcess, y: Array) -> GaussianProcess:
-    """Return the process, or a likelier one that makes no use of one of its inputs.
-
-    On a straight trend a long length and an endless one are two tops, and the search
-    offers the second only where the likelihood is flat between them.
-
-    Args:
-        process: what to begin with.
-        y: its training outputs, shape (n,).
-    """
-    best = process
-    for k, name in enumerate(process.kernel.names):
-        if name.rpartition("_")[2].startswith("l") and process.theta[k] > _LONG:
-            start = process.theta.copy()
-            start[k] = np.inf  # the climb begins at the bound
-            best = max(best, _climbed(process, y, start), key=lambda gp: gp.lml)
-    return best
-
-
-def _climbed(process: GaussianProcess, y: Array, start: Array) -> GaussianProcess:
-    """Return the process of outputs y that a climb from `start` leads to."""
-    model = (process.kernel, process.noise)
-    offset = float(y.mean()) if process.offset else 0.0
-    rows = (process.X, y - offset, process.trials)
-    objective = objective_of(model, Likelihood(model, *rows), near_over(model, *rows))
-    optimum = climb_from(model, objective, process.X, float(np.std(y - offset)), start)
-    factor = _factor(model, optimum.theta, process.X, process.trials)
-    return replace(
-        process,
-        theta=optimum.theta,
-        alpha=factor.solve(y - offset),
-        offset=offset,
-        lml=optimum.lml,
-        starts=(*process.starts, *optimum.starts),
-        jitter=factor.jitter,
-        at_bound=optimum.at_bound,
     )
 
 

@@ -1,10 +1,11 @@
-"""The search for hyperparameters: bounded quasi-Newton from three starts, always.
+"""The search for hyperparameters: bounded quasi-Newton from three starts or four.
 
 One start misses the best optimum of a Gaussian process in every fourth fit or so, and
 no three fixed ones suit all data. The first two are therefore chosen among the points
 that a kernel offers, by the likelihood of a part of the rows. The third is chosen when
 these have reached their tops: as the noise is known by then, the likelihood of all rows
-tells where another top may be. A start that comes to stand just below a top that was
+tells where another top may be. A fourth begins at the best top with an input switched
+off, where its length is long. A start that comes to stand just below a top that was
 reached before is left there.
 """
 
@@ -15,11 +16,12 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.ascent import GOOD, Approximated, Objective, SearchBox, Start, climb
+from analysis.gp.ascent import GOOD, Approximated, climb, objective_of
 from analysis.gp.kernels import Kernel
-from analysis.gp.likelihood import Likelihood, split
-from analysis.gp.low_rank import Near, near_over
+from analysis.gp.likelihood import Likelihood
+from analysis.gp.low_rank import near_over
 from analysis.gp.noise import Noise
+from analysis.gp.quasi_newton import Objective, SearchBox, Start
 from analysis.gp.trial_noise import TrialRows
 
 Score = Callable[[Array], float]
@@ -28,7 +30,10 @@ _AT_BOUND = 1e-3
 _NOISE_STEP = 0.1  # the likelihood bends most along the noise: its steps are shorter
 _APART = 1.5  # of starts in one of the shape: two steps of the lengths offered
 _ELSEWHERE = 1.0  # a start nearer to a known top leads back to it
+_LONG = 1.0  # logarithm of a length from which on an input may be idle
 _ROUGH = 150  # rows by which the first starts are chosen
+_RIVAL = 5.0  # log likelihood below the best one at which a top may still become it
+_NEIGHBOURS = 0.5  # tops nearer to each other in the shape are one
 _FLAT = 3.0  # logarithm from which on a length or bias makes no difference
 
 
@@ -91,6 +96,10 @@ def maximise(
         reached.append(climb(objective, start, box, reached))
     began.append(_last_start(kernel, offered, exact, (began, reached), box))
     reached.append(climb(objective, began[-1], box, reached))
+    best = max(reached, key=lambda start: start.lml)
+    for start in _idle_starts(model, best, exact, box):
+        began.append(start)
+        reached.append(climb(objective, start, box, reached))
     return _optimum(model, objective, box, (began, reached))
 
 
@@ -99,20 +108,49 @@ def climb_from(
     objective: Objective,
     X: Array,
     sd_y: float,
-    start: Array,
+    starts: Sequence[Array],
+    exact: Score | None = None,
 ) -> Optimum:
-    """Return the top that one start leads to: for where the best top is nearly known.
+    """Return the best top that starts lead to: for where tops are nearly known.
 
     Args:
         model: kernel and noise; theta is the kernel's, then the noise's.
         objective: theta -> likelihood and its slope; may raise SettingsError.
         X: inputs, shape (n, d).
         sd_y: standard deviation of the outputs.
-        start: theta to begin with.
+        starts: thetas to begin with.
+        exact: theta -> likelihood of all rows: one more start is chosen by it, where
+            the best top may be another one than those known.
     """
-    box = _box(model, X, sd_y)
-    reached = [climb(objective, start, box, [])]
-    return _optimum(model, objective, box, ([start], reached))
+    box, reached = _box(model, X, sd_y), list[Start]()
+    began = list(starts)
+    for start in began:
+        reached.append(climb(objective, start, box, reached))
+    if exact is not None:
+        last = _last_start(model[0], began, exact, (began, reached), box)
+        began.append(last)
+        reached.append(climb(objective, last, box, reached))
+        best = max(reached, key=lambda start: start.lml)
+        for start in _idle_starts(model, best, exact, box):
+            began.append(start)
+            reached.append(climb(objective, start, box, reached))
+    return _optimum(model, objective, box, (began, reached))
+
+
+def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
+    """Return the tops that starts reached, best first; no two of them are neighbours.
+
+    Tops too far below the best one are left out.
+    """
+    tops: list[Array] = []
+    ranked = sorted(reached, key=lambda start: -start.lml)
+    for start in ranked:
+        theta = np.array(start.theta)
+        if ranked[0].lml - start.lml > _RIVAL:
+            break
+        if not tops or _gap(kernel, theta, tops) >= _NEIGHBOURS:
+            tops.append(theta)
+    return tops
 
 
 def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> SearchBox:
@@ -190,6 +228,27 @@ def _last_start(
     return max(far or offered, key=lambda theta: _scored(exact, theta))
 
 
+def _idle_starts(
+    model: tuple[Kernel, Noise], best: Start, exact: Score, box: SearchBox
+) -> list[Array]:
+    """Return the best top without a long length, where that costs next to nothing.
+
+    On a straight trend a long length and an endless one are two tops. Of several inputs
+    the likeliest one to be idle is chosen.
+    """
+    kernel, _ = model
+    starts = []
+    for k, name in enumerate(kernel.names):
+        theta = np.array(best.theta)
+        is_length = name.rpartition("_")[2].startswith("l")
+        if is_length and _LONG < theta[k] < box.bounds[k, 1] - _NEIGHBOURS:
+            theta[k] = box.bounds[k, 1]
+            starts.append((_scored(exact, theta), k, theta))
+    if not starts or max(starts)[0] < best.lml - _RIVAL:
+        return []
+    return [max(starts)[2]]
+
+
 def _gap(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
     """Return how far theta is from the nearest of others in one of the shape."""
     shape = [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
@@ -234,34 +293,3 @@ def posterior_search(
     scores = StartScores(rough.value, likelihood.value)
     objective = objective_of(model, likelihood, near_over(model, X, r, trials))
     return maximise(model, objective, X, float(np.std(r)), scores)
-
-
-def objective_of(
-    model: tuple[Kernel, Noise], likelihood: Objective, near: Near
-) -> Approximated:
-    """Return what is climbed: the likelihood times the noise's prior.
-
-    Args:
-        model: kernel and noise.
-        likelihood: the exact one.
-        near: its approximations.
-    """
-
-    def near_with_prior(theta: Array, trace: tuple[float, float]) -> Objective | None:
-        found = near(theta, trace)
-        return None if found is None else _with_prior(model, found)
-
-    return Approximated(_with_prior(model, likelihood), near_with_prior)
-
-
-def _with_prior(model: tuple[Kernel, Noise], likelihood: Objective) -> Objective:
-    """Return the likelihood with the noise's prior, and its slope."""
-    kernel, noise = model
-
-    def objective(theta: Array) -> tuple[float, Array]:
-        lml, slope = likelihood(theta)
-        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
-        slope[-prior_slope.size :] += prior_slope
-        return lml + prior, slope
-
-    return objective

@@ -19,6 +19,7 @@ from analysis.gp import (
     LogLinearNoise,
     SquaredExponential,
     fit_gp,
+    refit_gp,
 )
 from analysis.study.distribution import Distribution
 from analysis.study.metrics import Prediction
@@ -246,15 +247,17 @@ class ModelFitter:
 
     def gp_with_chosen_noise(self) -> GpModel:
         """Return a Gaussian process whose noise is chosen among the training trials."""
-        training, options, subset = self.training, self.options, self.training.subset
-        choice = choose_noise(training, options.gp_points, options.seed)
+        training, constant = self.training, self.gp(SquaredExponential())
+        outputs = training.subset.F_t
+        changing = refit_gp(constant.process, outputs, noise=LogLinearNoise())
+        processes = (constant.process, changing)
+        choice = choose_noise(training, processes, self.options.seed)
         if choice.chosen == "constant":
-            return replace(self.gp(SquaredExponential()), choice=choice)
-        process = fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise())
+            return replace(constant, choice=choice)
         tails = (
-            TailedNoise.of(process, training) if choice.chosen == "student" else None
+            TailedNoise.of(changing, training) if choice.chosen == "student" else None
         )
-        return GpModel(process, tails=tails, choice=choice)
+        return GpModel(changing, tails=tails, choice=choice)
 
     def new_trial(
         self, kernel: Kernel, *, is_around_tustin: bool = False

@@ -15,17 +15,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, Indices, SampleTable, TrainingSet
+from analysis.data import Array, Indices, TrainingSet
 from analysis.gp import (
     ConstantNoise,
     GaussianProcess,
     Kernel,
+    LeaveOut,
     LogLinearNoise,
     TrialNoise,
     TrialRows,
     fit_gp,
     refit_gp,
-    without_idle_inputs,
 )
 from analysis.study.distribution import FEWEST, NewTrialPrediction
 from analysis.study.metrics import clearly_best
@@ -104,7 +104,8 @@ class NewTrialModel:
     def predict(self, F_n: Array, v_t: Array) -> NewTrialPrediction:
         """Return the distribution of measurements of a new trial."""
         inputs, around = np.column_stack([F_n, v_t]), (self.curve, self.c)
-        prediction = _predict(self.process, inputs, self.trials, around)
+        said = self.process.predict(inputs)
+        prediction = _prediction(self.process, inputs, said, self.trials, around)
         return replace(prediction, shape=self.shape)
 
     def describe(self) -> dict[str, Any]:
@@ -186,32 +187,40 @@ class NewTrialFit:
         )
 
     def _candidates(self, kernel: Kernel) -> list[_Candidate]:
-        normal = self._fitted(kernel, ConstantNoise(), None)
+        outputs = self._outputs(self._chosen, None)
+        normal = fit_gp(
+            self._rows.inputs,
+            outputs,
+            kernel,
+            self._noise(ConstantNoise()),
+            is_centred=self._curve is None,
+            trials=self._trials,
+        )
         fitted = [_Candidate(NORMAL, normal, None)]
         if len(self._left_out) < 2:
             return fitted
         if LOGLINEAR in self._families:
-            changing = self._fitted(kernel, LogLinearNoise(), None)
+            noise = self._noise(LogLinearNoise())
+            changing = refit_gp(normal, outputs, noise=noise)
             fitted.append(_Candidate(LOGLINEAR, changing, None))
         if WARPED in self._families:
-            c = max(_BENDS, key=lambda c: self._warped_likelihood(normal, c))
-            bent = self._fitted(kernel, ConstantNoise(), c)
-            fitted.append(_Candidate(WARPED, bent, c))
+            fitted.append(self._bent(normal))
         return fitted
 
-    def _fitted(
-        self, kernel: Kernel, within: ConstantNoise | LogLinearNoise, c: float | None
-    ) -> GaussianProcess:
-        outputs = self._outputs(self._chosen, c)
-        process = fit_gp(
-            self._rows.inputs,
-            outputs,
-            kernel,
-            self._noise(within),
-            is_centred=self._curve is None,
-            trials=self._trials,
-        )
-        return without_idle_inputs(process, outputs)
+    def _bent(self, normal: GaussianProcess) -> _Candidate:
+        """Return the likeliest warp, by the likelihood of z and its Jacobian."""
+        sd = float(self._outputs(self._chosen, None).std())
+
+        def bent(c: float) -> tuple[float, _Candidate]:
+            z = self._outputs(self._chosen, c)
+            process = refit_gp(normal, z, float(z.std()) / sd)
+            lml = process.lml + float(log_warp_slope(self._rows.F_t, c).sum())
+            return lml, _Candidate(WARPED, process, c)
+
+        best = max(map(bent, _BENDS), key=lambda pair: pair[0])[1]
+        z, process = self._outputs(self._chosen, best.c), best.process
+        # the same noise as another one: other tops are searched for, too
+        return best._replace(process=refit_gp(process, z, noise=process.noise))
 
     def _noise(self, within: ConstantNoise | LogLinearNoise) -> TrialNoise:
         load = self._rows.F_n
@@ -223,13 +232,6 @@ class NewTrialFit:
             load=(float(load.mean()) / usual, float(load.std()) / usual),
         )
 
-    def _warped_likelihood(self, normal: GaussianProcess, c: float) -> float:
-        """Return the likelihood of y under a warp: that of z and its Jacobian."""
-        before = self._outputs(self._chosen, None)
-        z = self._outputs(self._chosen, c)
-        lml = refit_gp(normal, z, float(z.std() / before.std())).lml
-        return lml + float(log_warp_slope(self._rows.F_t, c).sum())
-
     def _outputs(self, rows: Indices, c: float | None) -> Array:
         taken = self._training.rows.take(rows)
         return warped(taken.F_t, c) - _curve(self._curve, taken.inputs, c)
@@ -238,22 +240,15 @@ class NewTrialFit:
         """Return log density and normal score of rows of every trial left out."""
         if len(self._left_out) < 2:
             return [(np.zeros(1), np.zeros(1))]
-        return [self._without(candidate, rows) for rows in self._left_out]
-
-    def _without(self, candidate: _Candidate, rows: Indices) -> tuple[Array, Array]:
-        """Return what the process says of one trial when given only the others."""
-        process, c = candidate.process, candidate.c
-        is_other = self._trials.trial != self._trial[rows[0]]
-        label = self._trials.trial[is_other]
-        others = process.given(
-            self._rows.take(np.flatnonzero(is_other)).inputs,
-            self._outputs(self._chosen[is_other], c),
-            TrialRows(label, np.zeros(label.size)),
-        )
-        tested: SampleTable = self._training.rows.take(rows)
-        count = len(self._left_out) - 1
-        prediction = _predict(others, tested.inputs, count, (self._curve, c))
-        return prediction.log_density(tested.F_t), prediction.normal_score(tested.F_t)
+        process, around = candidate.process, (self._curve, candidate.c)
+        without, count = LeaveOut(process), len(self._left_out) - 1
+        found = []
+        for rows, block in zip(self._left_out, self._trials.blocks(), strict=True):
+            tested = self._training.rows.take(rows)
+            said = without.predict(block, tested.inputs)
+            made = _prediction(process, tested.inputs, said, count, around)
+            found.append((made.log_density(tested.F_t), made.normal_score(tested.F_t)))
+        return found
 
 
 def fit_new_trial(
@@ -269,15 +264,23 @@ def family_counts(models: Sequence[NewTrialModel]) -> Mapping[str, int]:
     return {family: chosen.count(family) for family in FAMILIES}
 
 
-def _predict(
+def _prediction(
     process: GaussianProcess,
     inputs: Array,
+    said: tuple[Array, Array],
     trials: int,
     around: tuple[TustinFit | None, float | None],
 ) -> NewTrialPrediction:
-    """Return what a process of z predicts around a curve, warped with c."""
-    curve, c = around
-    mean, variance = process.predict(inputs)
+    """Return what a process of z says of forces, around a curve, warped with c.
+
+    Args:
+        process: of z.
+        inputs: where, shape (n, 2).
+        said: its mean and variance there, noise included.
+        trials: number of trials that it was given.
+        around: curve and c.
+    """
+    (curve, c), (mean, variance) = around, said
     between = np.zeros(mean.shape)
     if isinstance(process.noise, TrialNoise):
         theta = process.theta[len(process.kernel.names) :]

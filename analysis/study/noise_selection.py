@@ -2,15 +2,16 @@
 
 "student" is Student's t whose scale changes with the inputs like that of "loglinear".
 Chosen among the training trials only, by the log density of trials that were left out
-of an inner fit; the simplest wins unless another is clearly better.
+of an inner fit, which begins where the fit to all of them ended; the simplest wins
+unless another is clearly better.
 """
 
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.data import Array, SampleTable, TrainingSet
-from analysis.gp import ConstantNoise, GaussianProcess, LogLinearNoise, fit_gp
+from analysis.data import Array, Indices, SampleTable, TrainingSet
+from analysis.gp import GaussianProcess, refit_gp
 from analysis.study.metrics import Prediction, clearly_best, log_density
 
 NoiseName = Literal["constant", "loglinear", "student"]
@@ -20,6 +21,8 @@ _GROUPS = 3  # of training trials; each is left out once
 _NU = (2.1, 60.0)  # beyond 60 a normal; without an end the density loses its digits
 _SPREAD = (0.2, 5.0)
 _FEWEST = 20  # rows outside the chosen ones that tails can be judged by
+_MOST = 2000  # of them; neighbours in a trial repeat each other
+_SCORED = 200  # rows of a trial left out, at most about twice as many
 
 
 class TailedNoise(NamedTuple):
@@ -46,17 +49,19 @@ class TailedNoise(NamedTuple):
 
         is_outside = np.ones(training.rows.count, dtype=bool)
         is_outside[training.chosen] = False
-        outside = training.rows.take(np.flatnonzero(is_outside))
-        if outside.count < _FEWEST:
+        outside = thinned(np.flatnonzero(is_outside), _MOST)
+        if outside.size < _FEWEST:
             return None
-        normal = predict_normal(process, outside)
-
-        def cost(x: Array) -> float:
-            tails = cls(float(np.exp(x[0])), float(np.exp(x[1])))
-            return -float(np.mean(log_density(outside.F_t, tails.applied_to(normal))))
-
-        bounds = np.log(np.array([_NU, _SPREAD]))
-        optimum = minimize(cost, np.log([6.0, 1.0]), method="L-BFGS-B", bounds=bounds)
+        rows = training.rows.take(outside)
+        normal = predict_normal(process, rows)
+        z = (rows.F_t - normal.mean) / normal.scale
+        optimum = minimize(
+            lambda x: tail_cost(x, z),
+            np.log([6.0, 1.0]),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=np.log(np.array([_NU, _SPREAD])),
+        )
         return cls(float(np.exp(optimum.x[0])), float(np.exp(optimum.x[1])))
 
     def applied_to(self, normal: Prediction) -> Prediction:
@@ -77,7 +82,11 @@ class NoiseChoice(NamedTuple):
     nlpd: dict[str, float]
 
 
-def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
+def choose_noise(
+    training: TrainingSet,
+    processes: tuple[GaussianProcess, GaussianProcess],
+    seed: int,
+) -> NoiseChoice:
     """Return the noise that predicts left-out training trials best.
 
     The trials are left out in up to three groups. Another noise than the constant one
@@ -85,17 +94,48 @@ def choose_noise(training: TrainingSet, points: int, seed: int) -> NoiseChoice:
 
     Args:
         training: the training trials; the trial a fold is tested on is not among them.
-        points: rows of an inner fit.
-        seed: of the choice of those rows.
+        processes: with constant noise and with noise that changes with the inputs,
+            fitted to the chosen rows.
+        seed: of the choice of the rows of the inner fits.
     """
     groups = min(_GROUPS, len(training.lengths))
     if groups < 2:
         return NoiseChoice("constant", {})
     nlpd = np.concatenate(
-        [_left_out(training, group, points, seed) for group in range(groups)]
+        [_left_out(training, group, processes, seed) for group in range(groups)]
     )
     averages = {str(n): float(x) for n, x in zip(NAMES, nlpd.mean(axis=0), strict=True)}
     return NoiseChoice(NAMES[clearly_best(nlpd)], averages)
+
+
+def tail_cost(x: Array, z: Array) -> tuple[float, Array]:
+    """Return the mean negative log density of Student's t, and its slope in x.
+
+    With s the spread and w = z^2 / (nu s^2) that is, but for what depends on z alone,
+
+        log s + log(nu)/2 + log G(nu/2) - log G((nu + 1)/2) + (nu + 1)/2 log(1 + w)
+
+    Args:
+        x: (log nu, log s).
+        z: measurements in predicted standard deviations around the mean, shape (n,).
+    """
+    from scipy.special import digamma, gammaln
+
+    nu = float(np.exp(x[0]))
+    w = z * z / (nu * np.exp(2.0 * x[1]))
+    far, share = float(np.mean(np.log1p(w))), float(np.mean(w / (1.0 + w)))
+    cost = x[1] + 0.5 * x[0] + gammaln(0.5 * nu) - gammaln(0.5 * (nu + 1.0))
+    of_nu = digamma(0.5 * nu) - digamma(0.5 * (nu + 1.0)) + far
+    slope = [
+        0.5 + 0.5 * nu * of_nu - 0.5 * (nu + 1.0) * share,
+        1.0 - (nu + 1.0) * share,
+    ]
+    return float(cost + 0.5 * (nu + 1.0) * far), np.array(slope)
+
+
+def thinned(rows: Indices, most: int) -> Indices:
+    """Return every row, or every k-th where there are twice as many as `most`."""
+    return rows[:: max(1, rows.size // most)]
 
 
 def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
@@ -104,25 +144,32 @@ def predict_normal(process: GaussianProcess, rows: SampleTable) -> Prediction:
     return Prediction(mean, np.sqrt(variance))
 
 
-def _left_out(training: TrainingSet, group: int, points: int, seed: int) -> Array:
+def _left_out(
+    training: TrainingSet,
+    group: int,
+    processes: tuple[GaussianProcess, GaussianProcess],
+    seed: int,
+) -> Array:
     """Return the NLPD of every trial of a group under every noise, (trials, 3)."""
     trial = training.trial_of()
     is_inner = trial % _GROUPS != group
-    inner_rows = training.rows.take(np.flatnonzero(is_inner))
-    count = min(points, inner_rows.count)
-    rng = np.random.default_rng((seed, group))
-    chosen = rng.choice(inner_rows.count, count, replace=False)
+    rows = training.rows.take(np.flatnonzero(is_inner))
     lengths = tuple(n for k, n in enumerate(training.lengths) if k % _GROUPS != group)
-    inner = TrainingSet(inner_rows, lengths, chosen)
+    count = min(training.chosen.size, rows.count)
+    rng = np.random.default_rng((seed, group))
+    inner = TrainingSet(rows, lengths, rng.choice(rows.count, count, replace=False))
     subset = inner.subset
-    processes = (
-        fit_gp(subset.inputs, subset.F_t, None, ConstantNoise()),
-        fit_gp(subset.inputs, subset.F_t, None, LogLinearNoise()),
+    constant, changing = (
+        refit_gp(p.given(subset.inputs, subset.F_t), subset.F_t) for p in processes
     )
-    tails = TailedNoise.of(processes[1], inner)
+    tails = TailedNoise.of(changing, inner)
     return np.array(
         [
-            _nlpds(training.rows.take(np.flatnonzero(trial == k)), processes, tails)
+            _nlpds(
+                training.rows.take(thinned(np.flatnonzero(trial == k), _SCORED)),
+                (constant, changing),
+                tails,
+            )
             for k in range(group, len(training.lengths), _GROUPS)
         ]
     )

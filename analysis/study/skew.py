@@ -41,12 +41,6 @@ class ShapeMap(NamedTuple):
         """Return S(x)."""
         return np.sinh(self._inner(x))
 
-    def log_slope(self, x: Array) -> Array:
-        """Return log dS/dx."""
-        far = (x - self.xi) / np.exp(self.log_eta)
-        steep = np.log(np.cosh(self._inner(x))) - 0.5 * np.log1p(far**2)
-        return steep + self.log_delta - self.log_eta
-
     def inverse(self, score: Array) -> Array:
         """Return x of S(x) = score."""
         bent = (np.arcsinh(score) + self.epsilon) / np.exp(self.log_delta)
@@ -54,7 +48,24 @@ class ShapeMap(NamedTuple):
 
     def log_gain(self, x: Array) -> Array:
         """Return by how much the log density changes where the score was x."""
-        return 0.5 * (x**2 - self.score(x) ** 2) + self.log_slope(x)
+        return self.gain_and_slopes(x)[0]
+
+    def gain_and_slopes(self, x: Array) -> tuple[Array, Array]:
+        """Return the gain, and its slopes in (xi, log eta, epsilon, log delta), (4, n).
+
+        With f = (x - xi) / eta, I = delta asinh f - epsilon and S = sinh I it is
+        (x^2 - S^2)/2 + log dS/dx, and dS/dx = cosh I delta / (eta sqrt(1 + f^2)).
+        """
+        eta, delta = np.exp(self.log_eta), np.exp(self.log_delta)
+        far = (x - self.xi) / eta
+        root, inner = np.sqrt(1.0 + far * far), self._inner(x)
+        score, steep = np.sinh(inner), np.cosh(inner)
+        gain = 0.5 * (x * x - score * score) + np.log(steep / root)
+        of_inner, share = score / steep - score * steep, far / root
+        of_far = delta * of_inner / root - share / root
+        slopes = [-of_far / eta, -of_far * far - 1.0, -of_inner]
+        slopes.append((inner + self.epsilon) * of_inner + 1.0)
+        return gain + self.log_delta - self.log_eta, np.stack(slopes)
 
     def _inner(self, x: Array) -> Array:
         far = (x - self.xi) / np.exp(self.log_eta)
@@ -97,17 +108,20 @@ def choose_shape(scores: Sequence[Array]) -> tuple[ShapeMap | None, float]:
     count = len(scores)
     if count < 3:
         return None, 0.0
+    whole = _fitted_shape(scores)
     gains = np.array(
         [
-            float(_fitted_shape([*scores[:k], *scores[k + 1 :]]).log_gain(x).mean())
+            float(
+                _fitted_shape([*scores[:k], *scores[k + 1 :]], whole).log_gain(x).mean()
+            )
             for k, x in enumerate(scores)
         ]
     )
     gain, error = float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(count))
-    return (_fitted_shape(scores) if gain > error else None), gain
+    return (whole if gain > error else None), gain
 
 
-def _fitted_shape(scores: Sequence[Array]) -> ShapeMap:
+def _fitted_shape(scores: Sequence[Array], start: ShapeMap | None = None) -> ShapeMap:
     """Return the shape of largest likelihood, each trial with the same weight."""
     from scipy.optimize import minimize
 
@@ -115,9 +129,12 @@ def _fitted_shape(scores: Sequence[Array]) -> ShapeMap:
     weight = np.concatenate([np.full(part.size, 1.0 / part.size) for part in scores])
     weight /= weight.sum()
 
-    def cost(theta: Array) -> float:
-        gain = float(weight @ ShapeMap(*theta).log_gain(x))
-        return _RIDGE * float(theta @ theta) - gain
+    def cost(theta: Array) -> tuple[float, Array]:
+        gain, slopes = ShapeMap(*theta).gain_and_slopes(x)
+        ridge = _RIDGE * float(theta @ theta)
+        return ridge - float(weight @ gain), 2.0 * _RIDGE * theta - slopes @ weight
 
-    optimum = minimize(cost, np.zeros(4), method="L-BFGS-B", bounds=_BOX)
+    optimum = minimize(
+        cost, start or np.zeros(4), jac=True, method="L-BFGS-B", bounds=_BOX
+    )
     return ShapeMap(*(float(value) for value in optimum.x))

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.gp.ascent import Approximated, SearchBox, Start, climb
+from analysis.gp.ascent import Approximated, climb
+from analysis.gp.quasi_newton import SearchBox, Start
 
 BOX = SearchBox(np.array([[-4.0, 4.0]] * 3), np.array([1.0, 1.0, 0.5]))
 TOP = np.array([0.7, -1.1, 0.4])

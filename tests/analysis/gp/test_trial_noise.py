@@ -7,7 +7,8 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
-from analysis.gp.regression import GaussianProcess, fit_gp, refit_gp
+from analysis.gp.refit import refit_gp
+from analysis.gp.regression import GaussianProcess, fit_gp
 from analysis.gp.trial_noise import TrialNoise, TrialRows
 
 SE = SquaredExponential(2)

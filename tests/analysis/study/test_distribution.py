@@ -122,3 +122,14 @@ def test_a_skewed_prediction_is_scored_by_median_and_mean():
     assert found.rmse == pytest.approx(abs(1.5 - law.mean[0]))
     assert found.rmse != pytest.approx(found.mae, rel=1e-3)
     assert found.coverage95 == 1.0
+
+
+def test_the_slopes_of_a_shape_agree_with_differences():
+    x, step = np.linspace(-3.0, 3.0, 9), 1e-6
+    slopes = SHAPE.gain_and_slopes(x)[1]
+    for k in range(4):
+        aside = step * np.eye(4)[k]
+        high, low = (
+            ShapeMap(*(np.array(SHAPE) + d)).log_gain(x) for d in (aside, -aside)
+        )
+        np.testing.assert_allclose(slopes[k], (high - low) / (2.0 * step), atol=1e-7)

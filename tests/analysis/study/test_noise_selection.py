@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from analysis.data.samples import SampleTable, TrainingSet
+from analysis.gp.noise import LogLinearNoise
+from analysis.gp.refit import refit_gp
 from analysis.gp.regression import fit_gp
-from analysis.study.metrics import Prediction
-from analysis.study.noise_selection import TailedNoise, choose_noise
+from analysis.study.metrics import Prediction, log_density
+from analysis.study.noise_selection import TailedNoise, choose_noise, tail_cost
 
 PER_TRIAL = 120
 
@@ -18,9 +20,16 @@ def training(noise, trials=6, seed=0):
     return TrainingSet(rows, (PER_TRIAL,) * trials, chosen)
 
 
+def chosen_for(data):
+    rows = data.subset
+    constant = fit_gp(rows.inputs, rows.F_t)
+    changing = refit_gp(constant, rows.F_t, noise=LogLinearNoise())
+    return choose_noise(data, (constant, changing), seed=0)
+
+
 def test_constant_noise_is_kept_where_it_is_the_truth():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size))
-    choice = choose_noise(data, 100, seed=0)
+    choice = chosen_for(data)
     assert choice.chosen == "constant"
     assert set(choice.nlpd) == {"constant", "loglinear", "student"}
 
@@ -29,19 +38,19 @@ def test_noise_that_grows_with_load_is_chosen():
     data = training(
         lambda rng, F_n: 0.05 * np.exp(0.5 * F_n) * rng.normal(size=F_n.size)
     )
-    choice = choose_noise(data, 100, seed=0)
+    choice = chosen_for(data)
     assert choice.chosen == "loglinear"
     assert choice.nlpd["loglinear"] < choice.nlpd["constant"] - 0.03
 
 
 def test_heavy_tails_are_chosen():
     data = training(lambda rng, F_n: 0.3 * rng.standard_t(2.2, F_n.size))
-    assert choose_noise(data, 100, seed=0).chosen == "student"
+    assert chosen_for(data).chosen == "student"
 
 
 def test_one_training_trial_leaves_nothing_to_choose_by():
     data = training(lambda rng, F_n: rng.normal(0, 0.5, F_n.size), trials=1)
-    assert choose_noise(data, 50, seed=0).chosen == "constant"
+    assert chosen_for(data).chosen == "constant"
 
 
 def test_tails_have_the_degrees_of_freedom_of_the_noise():
@@ -66,3 +75,23 @@ def test_without_rows_outside_the_chosen_there_are_no_tails():
     everything = TrainingSet(data.rows, data.lengths, np.arange(data.rows.count))
     process = fit_gp(data.subset.inputs, data.subset.F_t)
     assert TailedNoise.of(process, everything) is None
+
+
+def test_the_slope_of_the_tails_agrees_with_differences():
+    z = np.random.default_rng(0).standard_t(3.0, 200)
+    x, step = np.log([4.0, 0.8]), 1e-6
+    for k in (0, 1):
+        aside = step * np.eye(2)[k]
+        difference = (tail_cost(x + aside, z)[0] - tail_cost(x - aside, z)[0]) / 2e-6
+        assert tail_cost(x, z)[1][k] == pytest.approx(difference, abs=1e-8)
+
+
+def test_the_cost_of_tails_is_their_density_but_for_a_constant():
+    z = np.random.default_rng(1).normal(size=50)
+    normal = Prediction(np.zeros(50), np.ones(50))
+    costs = [
+        tail_cost(np.log([nu, spread]), z)[0]
+        + log_density(z, TailedNoise(nu, spread).applied_to(normal)).mean()
+        for nu, spread in ((2.5, 0.6), (8.0, 1.3), (40.0, 1.0))
+    ]
+    np.testing.assert_allclose(costs, costs[0], atol=1e-12)

@@ -1,0 +1,26 @@
+import numpy as np
+import pytest
+
+from analysis.gp.arcsine import Arcsine
+from analysis.gp.kernels import SquaredExponential
+from analysis.gp.noise import ConstantNoise, LogLinearNoise
+from analysis.gp.regression import LeaveOut, fit_gp
+from analysis.gp.trial_noise import TrialNoise, TrialRows
+
+
+@pytest.mark.parametrize("kernel", [SquaredExponential(), Arcsine()])
+@pytest.mark.parametrize("within", [ConstantNoise(), LogLinearNoise()])
+def test_rows_left_out_are_as_if_they_had_never_been_there(kernel, within):
+    rng = np.random.default_rng(0)
+    X, trial = rng.uniform(0.5, 5.0, (60, 2)), np.repeat(np.arange(4), 15)
+    y = np.sin(X[:, 0]) + rng.normal(size=4)[trial] + rng.normal(0.0, 0.2, 60)
+    places = TrialRows(trial, np.zeros(60))
+    process = fit_gp(X, y, kernel, TrialNoise(within), trials=places)
+    new, without = rng.uniform(0.5, 5.0, (30, 2)), LeaveOut(process)
+    for k, rows in enumerate(places.blocks()):
+        rest = trial != k
+        others = TrialRows(trial[rest], np.zeros(rest.sum()))
+        mean, variance = process.given(X[rest], y[rest], others).predict(new)
+        found = without.predict(rows, new)
+        np.testing.assert_allclose(found[0], mean, atol=1e-9)
+        np.testing.assert_allclose(found[1], variance, rtol=1e-8)
