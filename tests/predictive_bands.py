@@ -134,6 +134,8 @@ def load_study(path: Path) -> dict[str, list[TractionSeries]]:
     for session in list_sessions(path):
         series = [load_trial(file).series() for file in session.kept_trials()]
         trials.setdefault(session.terrain, []).extend(series)
+    if not trials:
+        sys.exit(f"{path} - expected a table, or a folder with a folder `sessions`.")
     return trials
 
 
