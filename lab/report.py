@@ -34,6 +34,8 @@ _NOT_SHOWN = """
 - How late a real host wakes: guest time does not pass while the host does other things.
 - The time that an adapter on USB needs: both cards are PCI cards without a delay.
 - Hardware time stamps: `kvaser_pci` has software time stamps only.
+- Replies one by one in a session: what its simulated arm says within 0.55 ms leaves
+  together. In "home arm" they come one by one.
 - The start of a process: programs begin forked, their libraries loaded, but for the
   `check` of "home arm", which is executed. The preflight tests the loop for 0.5 s
   (`[loop] test_time`), there for 2 s.

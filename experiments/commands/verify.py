@@ -75,7 +75,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
 
     from acquisition import SessionError
     from experiments.operator import BAD, GOOD, Console
-    from experiments.report import check_publication
+    from experiments.report import changed_files
 
     if len(folders) != 1 or len(args.sessions) != 1:
         raise SessionError(
@@ -83,7 +83,7 @@ def _verify_published(folders: list[Path], args: argparse.Namespace) -> int:
             hint="For example: traction verify crate --rebuild",
         )
     console = Console(color=not args.no_color)
-    changes = check_publication(folders[0])
+    changes = changed_files(folders[0])
     if args.json:
         console.say(json.dumps([asdict(change) for change in changes], indent=1))
     for change in [] if args.json else changes:

@@ -1,3 +1,4 @@
+from .checksums import changed_files
 from .choices import (
     AnalysisChoices,
     analysis_choices,
@@ -5,6 +6,7 @@ from .choices import (
     repeat_study,
     tell_missing,
 )
+from .crate import is_publication
 from .credits import LICENCES, parse_author
 from .export import export_sessions
 from .foresight import (
@@ -17,7 +19,7 @@ from .playback import play, serve
 from .progress import fitting
 from .publication import PublishRequest, publish_sessions
 from .quantities import KEPT, QUANTITIES
-from .rebuilding import TOLERANCE, check_publication, is_publication, rebuild
+from .rebuilding import TOLERANCE, rebuild
 from .sessions import (
     REPORTED,
     ReportRequest,
@@ -42,7 +44,7 @@ __all__ = [
     "StudyForesight",
     "TableColumn",
     "analysis_choices",
-    "check_publication",
+    "changed_files",
     "choose_sessions",
     "columns_of",
     "compare_with_truth",

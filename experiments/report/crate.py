@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquisition import MissingLibraryError
-from experiments.report.checksums import digest_of
+from experiments.report.checksums import SUMS, digest_of
 
 if TYPE_CHECKING:
     from experiments.report.credits import Credits
@@ -35,7 +35,6 @@ _MEDIA = {
     ".md": "text/markdown",
     ".patch": "text/x-diff",
 }
-_OTHER = "text/plain"
 _COMMIT = re.compile("[0-9a-f]{40}")
 
 
@@ -109,6 +108,11 @@ class PublishedPhoto:
     taken_utc: str
 
 
+def is_publication(path: Path) -> bool:
+    """Return whether `path` is a folder that `traction publish` wrote."""
+    return (path / METADATA).is_file() or (path / SUMS).is_file()
+
+
 def require_rocrate() -> None:
     """Find out before anything is written whether rocrate is installed.
 
@@ -157,8 +161,9 @@ class _CrateBuilder:
         from rocrate.rocrate import ROCrate
 
         self.crate: Any = ROCrate(version="1.1")
+        below = (p.relative_to(folder) for p in folder.rglob("*") if p.is_file())
         self.files: Mapping[str, Any] = {
-            name: self._file(folder / name, name) for name in _names(folder)
+            name: self._file(folder / name, name) for name in sorted(map(str, below))
         }
         self.people: dict[str, Any] = {}
         self.tools: dict[str, Any] = {}
@@ -233,7 +238,7 @@ class _CrateBuilder:
             name,
             properties={
                 "name": name,
-                "encodingFormat": _MEDIA.get(path.suffix, _OTHER),
+                "encodingFormat": _MEDIA.get(path.suffix, "text/plain"),
                 "sha256": digest_of(path),
                 "contentSize": str(path.stat().st_size),
             },
@@ -289,11 +294,6 @@ class _CrateBuilder:
 def _single(values: list[Any]) -> Any:  # noqa: ANN401
     """Return a list of one as its element, as the profile's checks want it."""
     return values[0] if len(values) == 1 else values
-
-
-def _names(folder: Path) -> list[str]:
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return sorted(str(path.relative_to(folder)) for path in files)
 
 
 def _slug(text: str) -> str:

@@ -1,4 +1,4 @@
-"""A publication held against its checksums, and its table computed once more."""
+"""The table of a publication computed once more from its recordings."""
 
 import csv
 import math
@@ -13,8 +13,6 @@ from acquisition import SettingsError, TrialFileError
 from analysis.findings import compute_results, findings_rows, with_tares
 from analysis.study import FitOptions, to_csv
 from experiments.operator import Console
-from experiments.report.checksums import SUMS, ChangedFile, changed_files
-from experiments.report.crate import METADATA
 from experiments.report.publication import ANALYSIS, TABLE
 from experiments.report.sessions import REPORTED, ReportRequest, study_sessions
 from experiments.session import list_sessions, read_json
@@ -38,20 +36,6 @@ class TableComparison:
     rows: int
     worst: float
     different: Sequence[str]
-
-
-def is_publication(path: Path) -> bool:
-    """Return whether `path` is a folder that `traction publish` wrote."""
-    return (path / METADATA).is_file() or (path / SUMS).is_file()
-
-
-def check_publication(folder: Path) -> list[ChangedFile]:
-    """Return every file that is missing, changed or new.
-
-    Raises:
-        TrialFileError: the list of checksums is missing or damaged.
-    """
-    return changed_files(folder)
 
 
 def rebuild(folder: Path, console: Console) -> TableComparison:

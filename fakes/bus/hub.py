@@ -5,14 +5,13 @@ import select
 import socket
 from pathlib import Path
 
-import can
-
-from acquisition import LinkError, SettingsError
+from acquisition import LinkError, SettingsError, SystemClock
 from fakes.bus.client import FRAME_SIZE, open_socket, pack_frame, unpack_frame
-from wam.bus import open_bus
+from wam.bus import open_door
 
 CLIENTS = 32
 _PACKETS_AT_A_TIME = 64  # of one client, before the next one is heard
+_HIGHEST_ID, _LONGEST_DATA = 0x7FF, 8  # of a classic data frame
 _LONGEST_PATH = 107  # bytes, the kernel's limit
 
 Frame = tuple[int, bytes]
@@ -174,11 +173,8 @@ def _remove_stale(path: Path) -> None:
     path.unlink()
 
 
-_DRAIN_AT_MOST = 512
-
-
 class CanPort:
-    """Carries frames between a bus of python-can and a network; never waits.
+    """Carries frames between a CAN bus and a network; never waits.
 
     Attributes:
         name: the bus as INTERFACE:CHANNEL.
@@ -191,13 +187,10 @@ class CanPort:
         self.name = f"{interface}:{channel}"
         self.ignored = 0
         self.lost = 0
-        self._bus = open_bus(interface, channel, bitrate)
+        self._door = open_door(interface, channel, bitrate, SystemClock())
         self._inbox: list[Frame] = []
         self._is_open = True
-        try:
-            self._descriptor = self._bus.fileno()
-        except NotImplementedError:
-            self._descriptor = -1
+        self._descriptor = self._door.fileno()
 
     def fileno(self) -> int:
         """Return the bus's descriptor, -1 if it has none."""
@@ -221,34 +214,28 @@ class CanPort:
 
     def send(self, can_id: int, data: bytes) -> None:
         """Send a frame of the network."""
-        message = can.Message(arbitration_id=can_id, is_extended_id=False, data=data)
         try:
-            self._bus.send(message)
-        except (can.CanError, OSError):
+            self._door.send(can_id, data)
+        except LinkError:
             self.lost += 1  # as on a wire without an acknowledgement
 
     def close(self) -> None:
         """Give the bus back; a second call does nothing."""
         if self._is_open:
             self._is_open = False
-            self._bus.shutdown()
+            self._door.close()
 
     def _drain(self) -> None:
         try:
-            for _ in range(_DRAIN_AT_MOST):
-                if (message := self._bus.recv(0)) is None:
-                    return
-                self._sort(message)
-        except (can.CanError, OSError) as error:
+            arrived = self._door.receive()
+        except LinkError as error:
             raise LinkError(
-                f"CAN {self.name} broke: {error}.", hint="Check it, then serve again."
+                f"CAN {self.name} broke: {error.message}",
+                hint="Check it, then serve again.",
             ) from error
-
-    def _sort(self, message: can.Message) -> None:
-        is_other_kind = (
-            message.is_extended_id or message.is_remote_frame or message.is_error_frame
-        )
-        if is_other_kind or message.is_fd:
-            self.ignored += 1
-        else:
-            self._inbox.append((message.arbitration_id, bytes(message.data)))
+        for can_id, data, _ in arrived:
+            # Other kinds of frames have flags in their identifier, or are longer.
+            if can_id > _HIGHEST_ID or len(data) > _LONGEST_DATA:
+                self.ignored += 1
+            else:
+                self._inbox.append((can_id, data))

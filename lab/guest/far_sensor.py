@@ -51,6 +51,8 @@ class FarEnd:
         if not self._is_on:
             return
         self._left += b"".join(data for _, data in self._stream.due(t_ns))
+        if not self._left:
+            return
         with contextlib.suppress(OSError):
             self._left = self._left[os.write(self._port, self._left) :]
 

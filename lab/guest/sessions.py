@@ -12,7 +12,7 @@ from lab.guest.machine_room import MachineRoom
 _START = 60.0  # s of guest time until the arm is to be activated
 _STEP = 30.0  # s until the program goes on by itself
 _REVIEW = 90.0  # s until a trial is reviewed: what that needs is read from the host
-_REACTION = 0.3  # s from a prompt to the key
+_REACTION = 0.1  # s from a prompt to the key
 _REST = 0.7  # s in which the foot comes to rest on the ground
 _PUSH = 1.0  # s of a trial, ended by key: every second costs the host many
 TERRAIN = "TF"
@@ -95,8 +95,15 @@ class LedSession:
         self.end()
 
     def end(self) -> None:
-        """Wait for the end of the last tare and of the program."""
-        self.room.finish(self.program, _STEP)
+        """End the session by key; raises ScenarioError if it does not end well."""
+        code = self.ended()
+        require(code == 0, f"exit code {code} in place of 0")
+
+    def ended(self) -> int:
+        """End the session by key, its last tare taken; return the exit code."""
+        self.program.expect("[space] to end the session", _STEP)
+        self._press(" ")
+        return self.program.wait(_STEP)
 
     def pause(self) -> None:
         """Let the arm hold for a second, then go on; a trial is ready before."""

@@ -61,7 +61,7 @@ def bad_adapter(room: MachineRoom) -> Figures:
     disturb(room.shell, FAR_CAN, "loss 0.2%")
     session.record(2)
     session.keep()
-    code = session.program.wait(PATIENCE)
+    code = session.ended()
     clear(room.shell, FAR_CAN)
     for fault in ("reply-late", "reply-lost-some"):
         hold_to(promise(fault, "recording"), code)

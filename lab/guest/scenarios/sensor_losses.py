@@ -40,7 +40,7 @@ def lost_and_back(room: MachineRoom) -> Figures:
         session.record()
         session.keep()
         # As `ft-stale` ends, which comes back by itself like these two.
-        hold_to(promise("ft-stale", "recording"), session.program.wait(PATIENCE))
+        hold_to(promise("ft-stale", "recording"), session.ended())
     finally:
         monitor.close()
     verify_kept(room, 1)

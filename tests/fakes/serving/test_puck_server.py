@@ -192,9 +192,12 @@ def test_a_port_on_another_bus_ignores_frames_of_other_kinds():
     with can.Bus(interface="virtual", channel="other-kinds") as host:
         host.send(can.Message(arbitration_id=0x404, is_extended_id=True, data=b"\x30"))
         host.send(can.Message(arbitration_id=0x404, is_extended_id=False, data=b"\x30"))
+        host.send(
+            can.Message(0.0, 0x404, is_extended_id=False, is_fd=True, data=bytes(12))
+        )
         assert port.is_readable()
         assert port.receive() == [(0x404, b"\x30")]
-    assert port.ignored == 1
+    assert port.ignored == 2
     port.close()
     port.close()
 
