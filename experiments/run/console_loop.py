@@ -29,7 +29,8 @@ TICK = 0.02  # period of the console [s]
 REFRESH_NS = 125_000_000  # between two pictures of the live screen
 DAMP_SECONDS = 0.2  # between an urgent stop and the brakes
 _OWN_QUIT = frozenset({Prompt.REVIEW, Prompt.READY})  # [q] has a meaning of its own
-_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED})  # nothing is wanted of the arm
+# Nothing is wanted of the arm.
+_AT_REST = frozenset({Prompt.REVIEW, Prompt.PAUSED, Prompt.UNDO})
 _TOO_LATE = "No verdict to take back. Any trial, any time: traction verdict --help"
 _T = TypeVar("_T")
 View = Callable[[int], list[str]]

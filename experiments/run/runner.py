@@ -2,7 +2,6 @@
 
 import traceback
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 
 from acquisition import TractionError
@@ -114,17 +113,26 @@ class SessionRunner:
             is_over = context.journal.state.is_over
 
     def _close_session(self) -> None:
-        """Tare once more, and let the last verdict be taken back."""
+        """Tare once more, and let the last verdict be taken back.
+
+        Everything is kept already: a fault is told, and the session ends as it would.
+        """
         context = self._context
         take_end_tare(context)
         if context.given is None or context.operator.who in NO_PERSONS:
             return
         context.say("[space] to end the session  [u]ndo the verdict")
         while context.console_loop.undo_left:
-            with suppress(StopRequestedError):  # everything is kept: [q] ends it too
-                if context.console_loop.tick(Prompt.UNDO) != " ":
-                    continue
-            return
+            try:
+                if context.console_loop.tick(Prompt.UNDO) == " ":
+                    return
+            except StopRequestedError:  # [q] ends it too
+                return
+            except ArmFaultError as fault:
+                context.say(f"▲ {context.fault_text(fault.verdict)}")
+            except TractionError as error:
+                context.say(f"▲ {error.message}")
+                return
 
     def _try(self, step: Callable[[], None]) -> None:
         """Do one step; a fault that leaves the arm holding does not end the session.

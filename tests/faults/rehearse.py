@@ -212,6 +212,7 @@ def copied(data: Path, target: Path) -> Path:
 def _press(asked) -> str:
     """Press the keys that make a session short."""
     waits = {Prompt.READY: (0.3, " "), Prompt.RECORDING: (0.5, " ")}
+    waits[Prompt.UNDO] = (0.3, " ")
     wait, key = waits.get(asked.prompt, (0.3, "k"))
     if asked.prompt in {Prompt.SUPPORT, Prompt.PAUSED}:
         return " "
@@ -288,6 +289,8 @@ def _at(patch, phase: str, scenes: list[SimulatedScene], inject: Strike) -> None
         return _press(asked) if phase != "end" or asked.prompt is not prompt else ""
 
     patch.setattr(AutoOperator, "answer", answer)
+    if phase == "end":  # a person, who can take the last verdict back
+        patch.setattr(AutoOperator, "who", "mk")
     if phase == "preflight":
         _before(patch, experiments.run.session, "run_preflight", strike_once)
     if phase == "idle":
