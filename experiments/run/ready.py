@@ -3,12 +3,11 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from acquisition import MOTOR_FRESH_SHIFT, BusCondition, SafetyMode, SessionError
+from acquisition import MOTOR_FRESH_SHIFT, BusCondition, SafetyMode
 from acquisition.control_loop import ArmState
 from acquisition.trial_file import list_folder
 from experiments.messages import BUS_WORDS, preflight_error, pucks_have
 from experiments.operator import (
-    NOTE_KEYS,
     KeyAction,
     Prompt,
     ReadyView,
@@ -19,7 +18,8 @@ from experiments.operator import (
 from experiments.run.console_loop import ConsoleLoop
 from experiments.run.context import RunContext
 from experiments.run.stop import ArmFaultError, StopRequestedError
-from experiments.session import LONGEST_TEXT, Event, TrialName, add_remark, clean_text
+from experiments.run.verdicts import take_note
+from experiments.session import Event, TrialName
 from experiments.trial import kept_rows, next_push, review_trial
 
 PATIENCE = 120.0  # how long a person may take to activate the arm [s]
@@ -116,46 +116,6 @@ def ready_view(context: RunContext) -> ReadyView:
         undo_left=context.console_loop.undo_left,
         arm="floating" if is_pushed else "holding; keep clear of it",
     )
-
-
-def take_note(context: RunContext, name: TrialName, *, is_on_trial: bool) -> None:
-    """Let a remark be typed and write it into the journal.
-
-    Args:
-        context: what the session shares.
-        name: the trial it is about.
-        is_on_trial: it goes into the trial's sidecar too.
-
-    Raises:
-        ArmFaultError: as `ConsoleLoop.line`.
-    """
-    console_loop = context.console_loop
-    context.say(NOTE_KEYS)
-    console_loop.show(lambda _: [f"Note: {context.operator.draft}▏", NOTE_KEYS])
-    try:
-        while (text := console_loop.line(name)) is None:
-            pass
-    finally:
-        console_loop.show(None)
-    try:
-        text = clean_text(text[:LONGEST_TEXT])
-    except SessionError:  # nothing but spaces
-        context.say("Nothing noted.")
-        return
-    _write_note(context, name if is_on_trial else None, text)
-
-
-def _write_note(context: RunContext, name: TrialName | None, text: str) -> None:
-    who = context.metadata.operator
-    if name is None:
-        context.append(Event.NOTED, text=text, who=who)
-        context.say(f"Noted on {context.metadata.folder.id}: {text}")
-        return
-    context.append(
-        Event.NOTED, trial=name.number, attempt=name.attempt, text=text, who=who
-    )
-    place = add_remark(context.metadata.folder, name, text, who)
-    context.say(f"Noted on {place}: {text}")
 
 
 def _show(context: RunContext) -> None:

@@ -5,44 +5,31 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from acquisition import TractionError
-from acquisition.control_loop import ArmState
-from analysis.data import MINIMUM_TRAVEL_SHARE
-from experiments.arguments import data_option
 from experiments.messages import CATALOGUE, FaultContext, rest_text
 from experiments.operator import (
     NO_PERSONS,
-    REJECT_REASONS,
     EndView,
-    KeyAction,
     Prompt,
     end_lines,
-    key_action,
 )
 from experiments.run.console_loop import ConsoleLoop
-from experiments.run.context import RunContext, open_context
-from experiments.run.photo import collect_photo
-from experiments.run.ready import activate, take_note, wait_ready
+from experiments.run.context import open_context
+from experiments.run.ready import activate, wait_ready
 from experiments.run.record import record_trial
 from experiments.run.stances import StuckFootError
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
+from experiments.run.verdicts import ask_verdict, judge_again
 from experiments.session import (
-    STANCES,
     Event,
     Journal,
     StanceTask,
     TrialName,
-    TrialOutcome,
     write_text,
 )
 from experiments.trial import SessionMetadata
 
 FAULTS_IN_A_ROW = 5  # end the session: recording again does not help
-_ENDED = "session ended at the review"
-_NO_VERDICT = (
-    "{trial} has no verdict yet: [k] keeps it, [r1]..[r5] rejects it; the session ends "
-    "then. [q] again ends it now: {trial} goes to rejected/, nothing is lost."
-)
 
 
 class SessionRunner:
@@ -201,104 +188,3 @@ class SessionRunner:
         )
         for line in end_lines(view):
             context.say(line)
-
-
-def ask_verdict(context: RunContext, name: TrialName, outcome: TrialOutcome) -> None:
-    """Ask until a trial is kept or rejected; the verdict is the operator's alone.
-
-    Raises:
-        ArmFaultError: the arm is not under control; the trial is rejected.
-        StopRequestedError: the session is to end; the trial is rejected.
-    """
-    context.say_keys(Prompt.REVIEW)
-    context.fault_context = FaultContext(name.kept, prompt=Prompt.REVIEW)
-    least = MINIMUM_TRAVEL_SHARE * context.rig.frame.travel
-    is_whole = outcome.displacement >= least or outcome.reason == STANCES
-    is_asked = not is_whole  # one that is not whole is rejected by [q] at once
-    feet = context.watch_foot()
-    while True:
-        try:
-            key = context.console_loop.tick(Prompt.REVIEW, name, is_complete=is_whole)
-            if key_action(Prompt.REVIEW, key) is KeyAction.NOTE:
-                take_note(context, name, is_on_trial=True)
-                context.say_keys(Prompt.REVIEW)
-        except ArmFaultError as fault:
-            try:
-                context.clear_faults(fault)
-            except ArmFaultError:
-                # The trial is whole, but no verdict can be given any more.
-                context.reject(name, _ENDED)
-                raise
-            continue
-        if key_action(Prompt.REVIEW, key) is KeyAction.QUIT and not is_asked:
-            is_asked = context.is_last = True
-            context.say(_NO_VERDICT.format(trial=name.kept))
-        elif _apply_key(context, name, key or feet.key("k")):
-            return
-
-
-def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
-    """Return whether `key` was a verdict.
-
-    Raises:
-        StopRequestedError: it, or Ctrl-C, ends the session.
-    """
-    action = key_action(Prompt.REVIEW, key)
-    if action is KeyAction.KEEP:
-        collect_photo(context, name)
-        context.record_verdict(Event.TRIAL_KEPT, name, "")
-        context.open_undo(name, "", is_kept=True)
-        return True
-    if action is KeyAction.REDO:
-        reason = REJECT_REASONS[key[1:]]
-        collect_photo(context, name)
-        context.reject(name, reason)
-        context.open_undo(name, reason, is_kept=False)
-        return True
-    if action is KeyAction.QUIT or context.stop.count:
-        context.reject(name, _ENDED)
-        context.say(_later(context, name))
-        raise StopRequestedError
-    return False
-
-
-def judge_again(context: RunContext) -> None:
-    """Ask once more for the newest verdict; until another is given it stands.
-
-    Raises:
-        ArmFaultError: the arm is not under control.
-        StopRequestedError: the session is to end.
-    """
-    given = context.close_undo()
-    if given is None:
-        return
-    context.console_loop.show(None)
-    context.loop_client.request(ArmState.HOLD)
-    context.fault_context = FaultContext(given.name.kept, prompt=Prompt.REVIEW)
-    context.say_page(context.page)
-    context.say(f"{given.text}: this stands until you give another verdict.")
-    context.say_keys(Prompt.REVIEW)
-    action, key = None, ""
-    while action not in (KeyAction.KEEP, KeyAction.REDO):
-        try:
-            key = context.console_loop.tick(Prompt.REVIEW, given.name, is_complete=True)
-            action = key_action(Prompt.REVIEW, key)
-            if action is KeyAction.NOTE:
-                take_note(context, given.name, is_on_trial=True)
-                context.say_keys(Prompt.REVIEW)
-        except ArmFaultError as fault:
-            context.clear_faults(fault)
-        if action is KeyAction.QUIT or context.stop.count:
-            raise StopRequestedError
-    context.change_verdict(
-        given, is_kept=action is KeyAction.KEEP, reason=REJECT_REASONS.get(key[1:], "")
-    )
-
-
-def _later(context: RunContext, name: TrialName) -> str:
-    """Return where a trial without a verdict went, and how it is kept after all."""
-    session = context.metadata.folder
-    command = f"traction verdict {session.id} {name.rejected} keep REASON"
-    command += data_option(session.path.parent.parent)
-    what = f"{name.kept} was not judged: rejected/{name.rejected}.mcap."
-    return f"{what} To keep it: {command}"

@@ -11,9 +11,9 @@ from experiments.operator.keys import NOTE_KEYS, REJECT_REASONS, screen_keys
 from experiments.operator.prompts import Prompt
 from experiments.run import ready
 from experiments.run.console_loop import TICK
-from experiments.run.ready import ready_view, take_note, wait_ready
-from experiments.run.runner import ask_verdict
+from experiments.run.ready import ready_view, wait_ready
 from experiments.run.stop import ArmFaultError, StopRequestedError
+from experiments.run.verdicts import ask_verdict, take_note
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
 from tests.experiments.run.bench import Keys, make_context

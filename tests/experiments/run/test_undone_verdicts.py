@@ -9,8 +9,8 @@ from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run.console_loop import TICK
 from experiments.run.context import UNDO_NS
 from experiments.run.ready import wait_ready
-from experiments.run.runner import ask_verdict, judge_again
 from experiments.run.stop import StopRequestedError, UndoRequestedError
+from experiments.run.verdicts import ask_verdict, judge_again
 from experiments.session.reducer import replay
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
