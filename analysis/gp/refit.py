@@ -18,6 +18,7 @@ from analysis.gp.regression import GaussianProcess
 from analysis.gp.search import climb_from, distinct_tops
 
 _SIZES = frozenset({"sf", "sn", "sc", "sp", "so"})  # in the unit of the outputs
+_VANISHED = 2.0  # below where a search begins: a spread there has no slope to leave by
 
 
 def refit_gp(
@@ -48,6 +49,9 @@ def refit_gp(
     for theta in distinct_tops(process.kernel, process.starts):
         moved = theta + np.log(ratio) * np.array(size)
         known = own | dict(zip(names, moved.tolist(), strict=True))
+        for name, value in own.items():
+            if name.rpartition("_")[2] in _SIZES:
+                known[name] = max(known[name], value - _VANISHED)
         wanted = (*process.kernel.names, *model[1].names)
         starts.append(np.array([known[name] for name in wanted]))
     return _climbed(process, model, y, starts, is_searched=noise is not None)
