@@ -5,6 +5,7 @@
 COMMIT is checked out into a folder of its own, which is removed afterwards. Both run in
 this interpreter, each with data of its own, in turn, so that a busy machine slows both.
 Times of an earlier machine say nothing here; how many times faster a command is, does.
+A command may do more than it did: simulated sessions last longer than in early commits.
 Takes a quarter of an hour; libraries that the commit needs are those installed here.
 """
 
