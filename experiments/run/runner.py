@@ -7,9 +7,7 @@ from dataclasses import replace
 from acquisition import TractionError
 from experiments.messages import CATALOGUE, FaultContext, rest_text
 from experiments.operator import (
-    NO_PERSONS,
     EndView,
-    Prompt,
     end_lines,
 )
 from experiments.run.console_loop import ConsoleLoop
@@ -19,7 +17,7 @@ from experiments.run.record import record_trial
 from experiments.run.stances import StuckFootError
 from experiments.run.stop import ArmFaultError, StopRequestedError, UndoRequestedError
 from experiments.run.tare import prove_mounting, take_end_tare, take_tare
-from experiments.run.verdicts import ask_verdict, judge_again
+from experiments.run.verdicts import ask_verdict, await_undo, judge_again
 from experiments.session import (
     Event,
     Journal,
@@ -100,26 +98,9 @@ class SessionRunner:
             is_over = context.journal.state.is_over
 
     def _close_session(self) -> None:
-        """Tare once more, and let the last verdict be taken back.
-
-        Everything is kept already: a fault is told, and the session ends as it would.
-        """
-        context = self._context
-        take_end_tare(context)
-        if context.given is None or context.operator.who in NO_PERSONS:
-            return
-        context.say("[space] to end the session  [u]ndo the verdict")
-        while context.console_loop.undo_left:
-            try:
-                if context.console_loop.tick(Prompt.UNDO) == " ":
-                    return
-            except StopRequestedError:  # [q] ends it too
-                return
-            except ArmFaultError as fault:
-                context.say(f"▲ {context.fault_text(fault.verdict)}")
-            except TractionError as error:
-                context.say(f"▲ {error.message}")
-                return
+        """Tare once more, and let the last verdict be taken back."""
+        take_end_tare(self._context)
+        await_undo(self._context)
 
     def _try(self, step: Callable[[], None]) -> None:
         """Do one step; a fault that leaves the arm holding does not end the session.

@@ -1,13 +1,15 @@
 """What the operator says of a trial: remarks, its verdict, and another one later."""
 
-from acquisition import SessionError
+from acquisition import SessionError, TractionError
 from acquisition.control_loop import ArmState
 from analysis.data import MINIMUM_TRAVEL_SHARE
 from experiments.arguments import data_option
 from experiments.messages import FaultContext
 from experiments.operator import (
+    NO_PERSONS,
     NOTE_KEYS,
     REJECT_REASONS,
+    WARNING,
     KeyAction,
     Prompt,
     key_action,
@@ -89,6 +91,30 @@ def _apply_key(context: RunContext, name: TrialName, key: str) -> bool:
         context.say(_later(context, name))
         raise StopRequestedError
     return False
+
+
+def await_undo(context: RunContext) -> None:
+    """Let a person take the last verdict back before the session ends.
+
+    Everything is kept already: a fault is told, and the session ends as it would.
+
+    Raises:
+        UndoRequestedError: the verdict is taken back.
+    """
+    if context.given is None or context.operator.who in NO_PERSONS:
+        return
+    context.say("[space] to end the session  [u]ndo the verdict")
+    while context.console_loop.undo_left:
+        try:
+            if context.console_loop.tick(Prompt.UNDO) == " ":
+                return
+        except StopRequestedError:  # [q] ends it too
+            return
+        except ArmFaultError as fault:
+            context.say(f"{WARNING} {context.fault_text(fault.verdict)}")
+        except TractionError as error:
+            context.say(f"{WARNING} {error.message}")
+            return
 
 
 def judge_again(context: RunContext) -> None:

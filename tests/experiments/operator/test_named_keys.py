@@ -23,8 +23,7 @@ SHOWN_AT = {
     "run/pose_walk.py": {Prompt.SUPPORT, Prompt.CLEAR, Prompt.MOVING},
     "run/ready.py": {Prompt.READY, Prompt.PAUSED, Prompt.SUPPORT},
     "run/resume.py": {Prompt.CHOICE},
-    "run/runner.py": {Prompt.UNDO},
-    "run/verdicts.py": {Prompt.REVIEW},
+    "run/verdicts.py": {Prompt.REVIEW, Prompt.UNDO},
     "run/tare.py": {Prompt.SUPPORT},
 }
 UNITS = ("report/", "commands/fake.py")  # [m] and [s] are no keys there

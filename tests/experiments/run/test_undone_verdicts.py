@@ -4,13 +4,15 @@ import json
 
 import pytest
 
+from acquisition import DeviceFaultError
+from acquisition.control_loop.faults import Action, Fault, GuardVerdict
 from experiments.operator.keys import REJECT_REASONS
 from experiments.operator.prompts import AutoOperator, Prompt
 from experiments.run.console_loop import TICK
 from experiments.run.context import UNDO_NS
 from experiments.run.ready import wait_ready
 from experiments.run.stop import StopRequestedError, UndoRequestedError
-from experiments.run.verdicts import ask_verdict, judge_again
+from experiments.run.verdicts import ask_verdict, await_undo, judge_again
 from experiments.session.reducer import replay
 from experiments.session.sidecar import TrialName, TrialOutcome
 from experiments.session.states import Event
@@ -156,6 +158,34 @@ def test_a_script_takes_a_verdict_back_in_a_whole_session(tmp_path, config):
     assert sorted(p.name for p in (folder / "trials").glob("*.mcap"))[0] == "T01.mcap"
     assert (folder / "rejected" / "T01a.mcap").exists()
     assert "T01 kept: this stands until you give another verdict." in done.out
+
+
+def broken():
+    """Fail as a loop does whose process died."""
+    raise DeviceFaultError("The recorder ended.")
+
+
+def test_a_fault_at_the_end_is_told_once_and_takes_no_time_from_undo(tmp_path, capsys):
+    context = judged(tmp_path, "k", "", "", "", "u")
+    context.loop_client.status.verdict = GuardVerdict(Action.IDLE, Fault.E_STOP)
+    with pytest.raises(UndoRequestedError):
+        await_undo(context)
+    assert capsys.readouterr().out.count("▲ Stop pressed") == 1
+
+
+def test_what_fails_at_the_end_is_told_and_ends_the_wait(tmp_path, capsys):
+    context = judged(tmp_path, "k")
+    context.loop_client.on_advance.append(broken)
+    await_undo(context)
+    assert "▲ The recorder ended." in capsys.readouterr().out
+    assert context.console_loop.undo_left > 0.0
+
+
+@pytest.mark.parametrize("key", [" ", "q"])
+def test_a_key_ends_the_wait_at_the_end(tmp_path, key):
+    context = judged(tmp_path, "k", key)
+    await_undo(context)
+    assert UNDO_NS * 1e-9 - context.console_loop.undo_left < 2.0 * TICK
 
 
 @pytest.mark.slow
