@@ -147,6 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
         _complete()
+    for library in ("OPENBLAS", "OMP"):  # its threads would wait for busy cores
+        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
     named = with_present_names(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
     args = parser.parse_args(named)

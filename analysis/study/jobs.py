@@ -1,9 +1,17 @@
-"""The one door to joblib and dask: independent tasks on cores or on a cluster."""
+"""The one door to joblib and dask: independent tasks on cores or on a cluster.
 
+Matrices of a few hundred rows are too large for the heap of the C library as it comes:
+every temporary one is mapped, cleared and unmapped again, and with threads beside it
+each unmapping interrupts the other cores. Workers of a Dask cluster on two cores took
+1.4 times the processor time by that (`python -m benchmarks.cluster`).
+"""
+
+import ctypes
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from ipaddress import ip_address
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
@@ -19,6 +27,9 @@ Progress = Callable[[int, int], None]
 _FEW = 3  # tasks that cost less than starting workers
 _MAPPED = 20_000  # bytes of an array that is not copied into every task
 _PATIENCE = 10.0  # s to reach a scheduler
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # parameters of mallopt(3)
+_KEPT = 256 * 2**20  # bytes of freed memory at the end of the heap
+_LARGEST = 32 * 2**20  # bytes from the heap at most; glibc takes no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +107,7 @@ def run_tasks(
     Raises:
         SettingsError: the scheduler does not answer, or is reached without TLS.
     """
+    keep_memory()  # what is fitted here, beside the tasks, is quicker for it, too
     where = workers if isinstance(workers, Workers) else Workers(workers)
     results = {} if store is None else _stored(store, tasks)
     left = [k for k in range(len(tasks)) if k not in results]
@@ -163,10 +175,27 @@ def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
 def _one_threaded(
     function: Callable[[Task], Result], number: int, task: Task
 ) -> tuple[int, Result]:
+    # A library is limited only once it is loaded: SciPy brings one of its own.
+    import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
+    keep_memory()
     with threadpool_limits(1):
         return number, function(task)
+
+
+@cache
+def keep_memory() -> bool:
+    """Let the C library keep large blocks that are freed, for the next matrix.
+
+    Returns:
+        whether it can be asked to; without, work takes longer.
+    """
+    with suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        asked = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _KEPT))
+        return all(mallopt(name, size) for name, size in asked)
+    return False
 
 
 def is_guarded(address: str) -> bool:
