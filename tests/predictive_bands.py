@@ -1,6 +1,7 @@
 """Do predictive bands hold for trials that no model has seen? Takes minutes.
 
 python -m tests.predictive_bands STUDY... [--jobs 2] [--starts 20] [--terrains S0,TF]
+python -m tests.predictive_bands STUDY... --many
 
 A study is a table of trials (npz) or a folder of recorded sessions. Every trial is left
 out once. Printed are, for stones and plates, NLPD of the noise chosen by earlier
@@ -18,7 +19,9 @@ import numpy as np
 
 from analysis.data import (
     FLAT,
+    PooledSamples,
     PrepareOptions,
+    SampleTable,
     TractionSeries,
     TrainingSet,
     load_tables,
@@ -40,6 +43,7 @@ from experiments.session import list_sessions
 BEFORE, EFFECT, NEW = "noise chosen", "trial effect alone", "new trial"
 MODELS = (BEFORE, EFFECT, NEW)
 BANDS = (("coverage50", 0.50), ("coverage90", 0.90), ("coverage95", 0.95))
+MANY_ROWS = 900  # of a fit to the trials of other studies
 SAME_TOP = 1e-3  # of the log likelihood
 LEAST_GAIN = 0.10  # nat, on stones over the noise chosen
 NO_WORSE = 0.01  # nat: a difference below is noise with twenty trials
@@ -150,6 +154,50 @@ def evaluate(
     return run_tasks(run_fold, [Task(fold, starts) for fold in folds], jobs)
 
 
+def many_known(
+    studies: Sequence[dict[str, list[TractionSeries]]], terrain: str
+) -> list[float]:
+    """Return the NLPD of every study's trials by a fit to those of all others."""
+    samples = []
+    for study in studies:
+        own = [prepare_trial(series, PrepareOptions()) for series in study[terrain]]
+        pool = PooledSamples.of({terrain: own}, {terrain: range(len(own))})
+        samples.append([pool.trial(terrain, k) for k in range(len(own))])
+    found = []
+    for tested in samples:
+        rest = [trial for group in samples if group is not tested for trial in group]
+        rows, rng = SampleTable.joined(rest), np.random.default_rng(0)
+        chosen = rng.choice(rows.count, min(MANY_ROWS, rows.count), replace=False)
+        lengths = tuple(trial.count for trial in rest)
+        training = TrainingSet(rows, lengths, np.sort(chosen))
+        model = NewTrialFit(training, None).fit(SquaredExponential())
+        found.append(
+            np.mean(
+                [
+                    score(trial.F_t, model.predict(trial.F_n, trial.v_t)).nlpd
+                    for trial in tested
+                ]
+            )
+        )
+    return [float(value) for value in found]
+
+
+def print_many(paths: Sequence[Path]) -> None:
+    studies = [load_study(path) for path in paths]
+    sys.stdout.write(f"NLPD by the trials of others: {', '.join(map(str, paths))}\n")
+    whole = []
+    for terrain in studies[0]:
+        whole.append(many_known(studies, terrain))
+        kind = terrain_kind(terrain, [s.stones for s in studies[0][terrain]])
+        values = "  ".join(f"{value:.3f}" for value in whole[-1])
+        sys.stdout.write(f"{terrain:4} {kind:8} {values}\n")
+        if kind == FLAT:
+            whole.pop()
+        sys.stdout.flush()
+    values = "  ".join(f"{value:.3f}" for value in np.mean(whole, axis=0))
+    sys.stdout.write(f"stones        {values}\n")
+
+
 def of_kind(
     outcomes: Sequence[Outcome],
     trials: dict[str, list[TractionSeries]],
@@ -228,7 +276,11 @@ def main() -> int:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--starts", type=int, default=0)
     parser.add_argument("--terrains", default="")
+    parser.add_argument("--many", action="store_true")
     args = parser.parse_args()
+    if args.many:
+        print_many(args.studies)
+        return 0
     say, is_met = sys.stdout.write, True
     for path in args.studies:
         trials = load_study(path)
