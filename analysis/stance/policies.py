@@ -5,10 +5,10 @@ smallest load at which the peak has half the risk that may be taken, or else all
 on ground where no load buys that, the load beyond which another newton brings less than
 3 %, and the traction at the risk, for as long as the impulse takes. A foot under which
 the ground begins to give - it has crept 6 mm and still moves, or hurries - is eased and
-pressed: a fifth less traction and a tenth more load every 20 ms until it rests. From
-then on its traction grows by 1 N/s until the impulse is there, or the ground gives
-again. A foot that slips all the same is let go, and pushes again from 0.8 of what
-failed once it rests.
+pressed: a tenth less traction and a tenth more load every 20 ms until it rests. From
+then on its traction grows by 1 N/s, but only where what is left of the impulse would
+not come within 3 s. A foot that slips all the same is let go, and pushes again from 0.8
+of what failed once it rests.
 """
 
 from collections.abc import Mapping
@@ -43,8 +43,8 @@ _STILL, _REST = 0.01, 0.15  # m/s, s: a foot that slipped rests
 _LESS = 0.8  # of what failed
 # Of traction and load, every 20 ms until the foot rests. More load bears more on a
 # plate that was taken for better ground; on stones it does little good or harm.
-_EASED, _PRESSED = 0.8, 1.1
-_GROWTH = 0.02  # N, by which an eased foot's traction grows every 20 ms
+_EASED, _PRESSED = 0.9, 1.1
+_GROWTH = 0.02  # N, every 20 ms: of an eased foot that would not be done in 3 s
 _LET_GO = 100.0  # N/s: as fast as the law of the sole lets go
 _SETTLED = 0.06  # s after what was asked for, until the force is gone
 _PUSHING = StancePhase.PUSH, StancePhase.EASED
@@ -172,10 +172,11 @@ def _pushing(
 ) -> StanceCommand:
     """Push until what is left of the impulse comes by letting go at `fall` [N/s]."""
     last, rate = sample.last, request.rate
-    if last.phase is StancePhase.EASED:
+    left = request.impulse - sample.impulse
+    is_late = last.most * (LONGEST - sample.t) < left
+    if last.phase is StancePhase.EASED and is_late:
         last = replace(last, most=min(last.most + _GROWTH, request.peak))
     if last.phase in _PUSHING:
-        left = request.impulse - sample.impulse
         if last.F_t**2 < 2.0 * fall * left:
             force = min(rate * (sample.t - last.since), last.most)
             return replace(last, F_t=force)

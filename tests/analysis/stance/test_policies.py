@@ -131,7 +131,7 @@ def test_a_foot_that_creeps_is_not_let_go(x, v_t):
     command = avoid_slip(pushing(4.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
 
     assert command.phase is not StancePhase.BACK_OFF
-    assert command.F_t >= 3.2
+    assert command.F_t >= 3.6
 
 
 @pytest.mark.parametrize(("x", "v_t"), [(0.007, 0.01), (0.001, 0.04)])
@@ -139,7 +139,7 @@ def test_a_foot_under_which_the_ground_begins_to_give_is_eased_and_pressed(x, v_
     command = avoid_slip(pushing(5.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
 
     assert command.phase is StancePhase.EASED
-    assert command.F_t == command.most == pytest.approx(4.0)
+    assert command.F_t == command.most == pytest.approx(4.5)
     assert command.F_n == pytest.approx(5.5)
 
 
@@ -154,8 +154,9 @@ def resting(eased: StanceCommand, t: float) -> StanceSample:
     return replace(REST, t=t, is_loaded=True, x=0.007, v_t=0.001, last=eased)
 
 
-def test_an_eased_foot_that_rests_takes_more_again_slowly_and_keeps_its_load():
-    eased = StanceCommand(4.0, 5.5, StancePhase.EASED, since=0.0, most=4.0)
+def test_an_eased_foot_that_would_be_late_takes_more_slowly_and_keeps_its_load():
+    # 4.2 N s are left, and 1 N for 2.5 s would bring 2.5 of them
+    eased = StanceCommand(1.0, 5.5, StancePhase.EASED, since=0.0, most=1.0)
     command = eased
     for k in range(25):  # half a second
         command = avoid_slip(resting(command, 0.5 + 0.02 * k), ON_STONES, REQUEST)
@@ -165,17 +166,23 @@ def test_an_eased_foot_that_rests_takes_more_again_slowly_and_keeps_its_load():
     assert command.F_n == eased.F_n
 
 
+def test_an_eased_foot_that_will_be_done_in_time_takes_no_more():
+    eased = StanceCommand(2.0, 5.5, StancePhase.EASED, since=0.0, most=2.0)
+
+    assert avoid_slip(resting(eased, 0.5), ON_STONES, REQUEST).F_t == 2.0
+
+
 def test_an_eased_foot_never_takes_more_than_the_peak():
     eased = StanceCommand(5.99, 5.5, StancePhase.EASED, since=0.0, most=5.99)
 
-    assert avoid_slip(resting(eased, 0.6), ON_STONES, REQUEST).F_t == REQUEST.peak
+    assert avoid_slip(resting(eased, 2.9), ON_STONES, REQUEST).F_t == REQUEST.peak
 
 
 def test_an_eased_foot_is_eased_again_where_the_ground_gives_again():
     eased = StanceCommand(4.0, 5.5, StancePhase.EASED, since=0.0, most=4.0)
     sample = replace(resting(eased, 1.0), v_t=0.01)
 
-    assert avoid_slip(sample, ON_STONES, REQUEST).F_t == pytest.approx(3.2)
+    assert avoid_slip(sample, ON_STONES, REQUEST).F_t == pytest.approx(3.6)
 
 
 def test_a_foot_that_slipped_pushes_again_once_it_rests():
@@ -189,7 +196,7 @@ def test_a_foot_that_slipped_pushes_again_once_it_rests():
 
 
 def test_a_foot_that_slipped_pushes_at_once_with_what_is_left_and_then_with_more():
-    again = StanceCommand(0.0, 5.0, StancePhase.EASED, since=0.8, most=2.0, x0=0.02)
+    again = StanceCommand(0.0, 5.0, StancePhase.EASED, since=0.8, most=1.0, x0=0.02)
     command = again
     forces = []
     for k in range(1, 26):
@@ -197,8 +204,8 @@ def test_a_foot_that_slipped_pushes_at_once_with_what_is_left_and_then_with_more
         command = avoid_slip(sample, ON_STONES, REQUEST)
         forces.append(command.F_t)
 
-    assert forces[5] == pytest.approx(2.0, abs=0.15)  # 0.12 s at 20 N/s
-    assert forces[-1] == pytest.approx(2.5)
+    assert forces[4] == pytest.approx(1.1)  # 0.1 s at 20 N/s, and 1 N/s
+    assert forces[-1] == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("phase", [StancePhase.PUSH, StancePhase.EASED])
