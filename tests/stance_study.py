@@ -3,8 +3,9 @@
     python -m tests.stance_study --peak 6 --seed 1 --jobs 2 --out DIR
 
 Prints the table of docs/foresight.md and draws its figure (DIR/stances.png); finished
-cells are kept there, so that a study resumes. 250 stances per terrain and policy,
-10 beds of 25; a terrain that was left out of training is adapted to on 4 beds before.
+cells are kept there, so that a study resumes. --terrain and --policy, each any number
+of times, choose a part of it. 250 stances per terrain and policy, 10 beds of 25; a
+terrain that was left out of training is adapted to on 4 beds before.
 """
 
 import argparse
@@ -200,12 +201,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--terrain", action="append", choices=tuple(GROUNDS))
+    parser.add_argument("--policy", action="append", choices=tuple(POLICIES))
     parser.add_argument("--out", type=Path, default=Path("stances"))
     args = parser.parse_args(arguments)
     args.out.mkdir(parents=True, exist_ok=True)
     finished = args.out / f"cases-{args.peak:g}-{args.seed}.jsonl"
     results = _finished(finished)
-    left = [c for c in cases(args.terrain or list(GROUNDS)) if c not in results]
+    wanted = [
+        case
+        for case in cases(args.terrain or list(GROUNDS))
+        if case.policy in (args.policy or POLICIES)
+    ]
+    left = [case for case in wanted if case not in results]
     if left:
         with get_context("spawn").Pool(args.jobs) as pool:
             lessons = learn(list(GROUNDS), args.seed, pool)

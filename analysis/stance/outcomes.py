@@ -38,6 +38,7 @@ class StanceOutcome:
         risk: foreseen of what was planned; NaN = nothing was.
         scale: by which the ground was taken to bear more.
         load: normal force, mean while the stance lasted [N].
+        borne: normal force, mean until the ground gave [N].
         force: largest traction that was held or reached before the ground gave [N].
         delivered: impulse [N s].
         early: impulse in the first second [N s].
@@ -54,6 +55,7 @@ class StanceOutcome:
     risk: float
     scale: float
     load: float
+    borne: float
     force: float
     delivered: float
     early: float
@@ -75,7 +77,7 @@ class StanceOutcome:
         """The stance as a push that teaches break-away; None = it pushed too little."""
         if self.force < _LEAST_FORCE:
             return None
-        return FootPush(0.0, self.force, self.load, is_held=not self.is_giving)
+        return FootPush(0.0, self.force, self.borne, is_held=not self.is_giving)
 
     def to_dict(self) -> dict[str, float | bool | None]:
         """Return it as plain values, for JSON; None = not known."""
@@ -86,13 +88,16 @@ class StanceOutcome:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "StanceOutcome":
-        """Return the outcome of plain values; earlier ones knew of slips alone.
+        """Return the outcome of plain values; earlier ones knew less.
+
+        They told slips alone, and their load did not change.
 
         Raises:
             KeyError, TypeError, ValueError: they are none.
         """
+        known = {"borne": content["load"], **content}
         numbers = {
-            name: nan if content[name] is None else float(content[name])
+            name: nan if known[name] is None else float(known[name])
             for name in cls.__slots__
             if not name.startswith("is_")
         }
@@ -115,6 +120,7 @@ class StanceWatch:
     _early: float = 0.0
     _seconds: float = 0.0
     _loads: list[float] = field(default_factory=list[float])
+    _borne: list[float] = field(default_factory=list[float])
     _force: float = 0.0
     _moved: float = 0.0
     _fastest: float = 0.0
@@ -134,6 +140,7 @@ class StanceWatch:
             return
         if not self._is_giving:
             self._force = max(self._force, F_t)
+            self._borne.append(F_n)
         is_slip = x - self.x0 > MOVED or v_t > FAST
         self._is_giving |= is_slip or gives_way(x - self.x0, v_t)
         if is_slip:
@@ -147,7 +154,8 @@ class StanceWatch:
             spot=self.spot,
             risk=self.risk,
             scale=self.scale,
-            load=sum(self._loads) / max(len(self._loads), 1),
+            load=_mean(self._loads),
+            borne=_mean(self._borne),
             force=self._force,
             delivered=self.delivered,
             early=self._early,
@@ -236,4 +244,4 @@ def wilson(share: float, n: int) -> tuple[float, float]:
 
 def _mean(values: Iterable[float]) -> float:
     every = list(values)
-    return sum(every) / len(every)
+    return sum(every) / max(len(every), 1)

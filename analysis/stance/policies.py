@@ -4,10 +4,11 @@ avoid-slip chooses the load and the traction by P(slip | F_t, F_n) of the ground
 smallest load at which the peak has half the risk that may be taken, or else all of it;
 on ground where no load buys that, the load beyond which another newton brings less than
 3 %, and the traction at the risk, for as long as the impulse takes. A foot under which
-the ground begins to give - it has crept 6 mm and still moves, or hurries - is eased: a
-tenth less traction every 20 ms until it rests, and no more than that from then on. A
-foot that slips all the same is let go, and pushes again with 0.8 of what failed once it
-rests.
+the ground begins to give - it has crept 6 mm and still moves, or hurries - is eased and
+pressed: a tenth less traction and a tenth more load every 20 ms until it rests. From
+then on its traction grows by 1 N/s, but only where what is left of the impulse would
+not come within 3 s. A foot that slips all the same is let go, and pushes again from 0.8
+of what failed once it rests.
 """
 
 from collections.abc import Mapping
@@ -40,9 +41,13 @@ _OWN_SHARE = 0.5  # of the risk, where load can buy it
 _OF_CAPACITY = 0.75  # that the oracle takes
 _STILL, _REST = 0.01, 0.15  # m/s, s: a foot that slipped rests
 _LESS = 0.8  # of what failed
-_EASED = 0.9  # of the traction, every 20 ms until the foot rests
-_LET_GO = 3.0  # times as fast as the force asked for falls, where that may be chosen
+# Of traction and load, every 20 ms until the foot rests. More load bears more on a
+# plate that was taken for better ground; on stones it does little good or harm.
+_EASED, _PRESSED = 0.9, 1.1
+_GROWTH = 0.02  # N, every 20 ms: of an eased foot that would not be done in 3 s
+_LET_GO = 100.0  # N/s: as fast as the law of the sole lets go
 _SETTLED = 0.06  # s after what was asked for, until the force is gone
+_PUSHING = StancePhase.PUSH, StancePhase.EASED
 
 
 def no_policy(
@@ -77,10 +82,9 @@ def avoid_slip(
         return replace(
             last, F_t=0.0, phase=StancePhase.BACK_OFF, since=t, most=_LESS * last.most
         )
-    if last.phase is StancePhase.PUSH and gives_way(sample.x - last.x0, sample.v_t):
-        most = _EASED * min(last.F_t, last.most)
-        return replace(last, F_t=most, most=most)
-    return _pushing(sample, request, _LET_GO * request.rate)
+    if last.phase in _PUSHING and gives_way(sample.x - last.x0, sample.v_t):
+        return _easing(last)
+    return _pushing(sample, request, _LET_GO)
 
 
 def oracle(
@@ -89,7 +93,7 @@ def oracle(
     """Take three quarters of what the ground truly bears; only a simulation tells."""
     command = avoid_slip(sample, _told(foresight), request)
     most = min(request.peak, _OF_CAPACITY * foresight.capacity)
-    if command.phase is not StancePhase.PUSH:
+    if command.phase not in _PUSHING:
         return replace(command, F_n=MOST_F_N)
     return replace(command, F_n=MOST_F_N, F_t=min(command.F_t, most), most=most)
 
@@ -168,8 +172,11 @@ def _pushing(
 ) -> StanceCommand:
     """Push until what is left of the impulse comes by letting go at `fall` [N/s]."""
     last, rate = sample.last, request.rate
-    if last.phase is StancePhase.PUSH:
-        left = request.impulse - sample.impulse
+    left = request.impulse - sample.impulse
+    is_late = last.most * (LONGEST - sample.t) < left
+    if last.phase is StancePhase.EASED and is_late:
+        last = replace(last, most=min(last.most + _GROWTH, request.peak))
+    if last.phase in _PUSHING:
         if last.F_t**2 < 2.0 * fall * left:
             force = min(rate * (sample.t - last.since), last.most)
             return replace(last, F_t=force)
@@ -183,6 +190,13 @@ def _pushing(
     return replace(last, F_t=max(force, 0.0), phase=phase)
 
 
+def _easing(last: StanceCommand) -> StanceCommand:
+    """Take less traction and press harder."""
+    most = _EASED * min(last.F_t, last.most)
+    load = min(_PRESSED * last.F_n, MOST_F_N)
+    return replace(last, F_t=most, F_n=load, phase=StancePhase.EASED, most=most)
+
+
 def _backing_off(sample: StanceSample) -> StanceCommand:
     """Wait until the foot rests, then push anew from where it is."""
     last, t = sample.last, sample.t
@@ -190,4 +204,4 @@ def _backing_off(sample: StanceSample) -> StanceCommand:
         return replace(last, F_t=0.0, since=t)
     if t - last.since < _REST:
         return replace(last, F_t=0.0)
-    return replace(last, phase=StancePhase.PUSH, since=t, x0=sample.x, F_t=0.0)
+    return replace(last, phase=StancePhase.EASED, since=t, x0=sample.x, F_t=0.0)

@@ -84,6 +84,7 @@ class StancePhase(Enum):
 
     LOAD = "load"
     PUSH = "push"
+    EASED = "eased"
     RELEASE = "release"
     BACK_OFF = "back off"
     DONE = "done"

@@ -59,9 +59,21 @@ def test_ground_that_gives_is_no_slip_but_teaches_that_it_gave():
 
 def test_a_record_of_earlier_stances_knows_of_slips_alone():
     told = stance(0.03).to_dict()
-    del told["is_giving"]
+    del told["is_giving"], told["borne"]
 
     assert StanceOutcome.from_dict(told) == stance(0.03)
+
+
+def test_ground_that_gave_teaches_of_the_load_it_had_until_then():
+    watch = StanceWatch(spot=0.1, risk=0.1, scale=1.0, x0=0.1)
+    for k in range(50):
+        v_t, F_n = (0.001, 5.0) if k < 20 else (0.04, 5.0) if k < 22 else (0.001, 15.0)
+        watch.push(TICK, 0.1, v_t, 3.0, F_n)
+    gave = watch.outcome(REQUEST)
+
+    assert gave.push is not None
+    assert gave.push.F_n == pytest.approx(5.0)
+    assert gave.load > 10.0
 
 
 def test_too_little_impulse_is_no_success():

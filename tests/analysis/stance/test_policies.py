@@ -130,17 +130,59 @@ def test_a_foot_that_slips_is_let_go_and_tried_with_less(x, v_t):
 def test_a_foot_that_creeps_is_not_let_go(x, v_t):
     command = avoid_slip(pushing(4.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
 
-    assert command.phase is StancePhase.PUSH
+    assert command.phase is not StancePhase.BACK_OFF
+    assert command.F_t >= 3.6
 
 
 @pytest.mark.parametrize(("x", "v_t"), [(0.007, 0.01), (0.001, 0.04)])
-def test_a_foot_under_which_the_ground_begins_to_give_is_eased(x, v_t):
+def test_a_foot_under_which_the_ground_begins_to_give_is_eased_and_pressed(x, v_t):
     command = avoid_slip(pushing(5.0, t=0.5, x=x, v_t=v_t), ON_STONES, REQUEST)
-    after = replace(pushing(5.0, t=0.52, x=x, v_t=0.001), last=command)
 
-    assert command.phase is StancePhase.PUSH
+    assert command.phase is StancePhase.EASED
     assert command.F_t == command.most == pytest.approx(4.5)
-    assert avoid_slip(after, ON_STONES, REQUEST).F_t == command.F_t
+    assert command.F_n == pytest.approx(5.5)
+
+
+def test_a_foot_is_pressed_with_twenty_newtons_at_most():
+    sample = pushing(5.0, t=0.5, x=0.007, v_t=0.01)
+    heavy = replace(sample, last=replace(sample.last, F_n=19.5))
+
+    assert avoid_slip(heavy, ON_STONES, REQUEST).F_n == 20.0
+
+
+def resting(eased: StanceCommand, t: float) -> StanceSample:
+    return replace(REST, t=t, is_loaded=True, x=0.007, v_t=0.001, last=eased)
+
+
+def test_an_eased_foot_that_would_be_late_takes_more_slowly_and_keeps_its_load():
+    # 4.2 N s are left, and 1 N for 2.5 s would bring 2.5 of them
+    eased = StanceCommand(1.0, 5.5, StancePhase.EASED, since=0.0, most=1.0)
+    command = eased
+    for k in range(25):  # half a second
+        command = avoid_slip(resting(command, 0.5 + 0.02 * k), ON_STONES, REQUEST)
+
+    assert command.phase is StancePhase.EASED
+    assert command.F_t == pytest.approx(eased.F_t + 0.5)
+    assert command.F_n == eased.F_n
+
+
+def test_an_eased_foot_that_will_be_done_in_time_takes_no_more():
+    eased = StanceCommand(2.0, 5.5, StancePhase.EASED, since=0.0, most=2.0)
+
+    assert avoid_slip(resting(eased, 0.5), ON_STONES, REQUEST).F_t == 2.0
+
+
+def test_an_eased_foot_never_takes_more_than_the_peak():
+    eased = StanceCommand(5.99, 5.5, StancePhase.EASED, since=0.0, most=5.99)
+
+    assert avoid_slip(resting(eased, 2.9), ON_STONES, REQUEST).F_t == REQUEST.peak
+
+
+def test_an_eased_foot_is_eased_again_where_the_ground_gives_again():
+    eased = StanceCommand(4.0, 5.5, StancePhase.EASED, since=0.0, most=4.0)
+    sample = replace(resting(eased, 1.0), v_t=0.01)
+
+    assert avoid_slip(sample, ON_STONES, REQUEST).F_t == pytest.approx(3.6)
 
 
 def test_a_foot_that_slipped_pushes_again_once_it_rests():
@@ -150,12 +192,31 @@ def test_a_foot_that_slipped_pushes_again_once_it_rests():
 
     assert avoid_slip(moving, ON_STONES, REQUEST).phase is StancePhase.BACK_OFF
     again = avoid_slip(resting, ON_STONES, REQUEST)
-    assert (again.phase, again.x0) == (StancePhase.PUSH, 0.02)
+    assert (again.phase, again.x0) == (StancePhase.EASED, 0.02)
 
 
-def test_the_impulse_ends_a_stance_and_three_seconds_do():
-    nearly = avoid_slip(pushing(4.0, t=0.8, impulse=4.1), ON_STONES, REQUEST)
-    late = avoid_slip(pushing(4.0, t=3.0, impulse=1.0), ON_STONES, REQUEST)
+def test_a_foot_that_slipped_pushes_at_once_with_what_is_left_and_then_with_more():
+    again = StanceCommand(0.0, 5.0, StancePhase.EASED, since=0.8, most=1.0, x0=0.02)
+    command = again
+    forces = []
+    for k in range(1, 26):
+        sample = replace(resting(command, 0.8 + 0.02 * k), x=0.021)
+        command = avoid_slip(sample, ON_STONES, REQUEST)
+        forces.append(command.F_t)
+
+    assert forces[4] == pytest.approx(1.1)  # 0.1 s at 20 N/s, and 1 N/s
+    assert forces[-1] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("phase", [StancePhase.PUSH, StancePhase.EASED])
+def test_the_impulse_ends_a_stance_and_three_seconds_do(phase):
+    # 4.2 N s are asked for; 4 N let go at 100 N/s bring 0.08 of them
+    nearly, late = pushing(4.0, t=0.8, impulse=4.15), pushing(4.0, t=3.0, impulse=1.0)
+    last = replace(nearly.last, phase=phase)
+    nearly, late = (
+        avoid_slip(replace(sample, last=last), ON_STONES, REQUEST)
+        for sample in (nearly, late)
+    )
 
     assert nearly.phase is StancePhase.RELEASE
     assert (late.phase, late.F_t) == (StancePhase.DONE, 0.0)
