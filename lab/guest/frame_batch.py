@@ -39,6 +39,13 @@ class _Message(ctypes.Structure):
     ]
 
 
+def open_can(channel: str) -> socket.socket:
+    """Return a socket on an interface such as "can1"; raises OSError."""
+    opened = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    opened.bind((channel,))
+    return opened
+
+
 class FrameBatch:
     """A raw CAN socket whose frames lie in shared memory.
 
@@ -46,11 +53,12 @@ class FrameBatch:
         lost: frames that the bus did not take, as on a wire without an acknowledgement.
     """
 
-    def __init__(self, channel: str, memory: ctypes.Array[ctypes.c_char]) -> None:
-        """Open an interface such as "can1"; raises OSError if it cannot be."""
+    def __init__(
+        self, opened: socket.socket, memory: ctypes.Array[ctypes.c_char]
+    ) -> None:
+        """Take over a bound socket, or one of datagrams that carries can_frames."""
         self.lost = 0
-        self._socket = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-        self._socket.bind((channel,))
+        self._socket = opened
         self._memory = memory  # outlives the addresses
         self._arriving = _messages(ctypes.addressof(memory) + FRAMES_IN_AT)
         self._leaving = _messages(ctypes.addressof(memory) + FRAMES_OUT_AT)

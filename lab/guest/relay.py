@@ -25,7 +25,7 @@ from lab.calls import (
     Call,
     Exchange,
 )
-from lab.guest.frame_batch import FrameBatch
+from lab.guest.frame_batch import FrameBatch, open_can
 
 _DEVICES = Path("/sys/bus/pci/devices")
 _SHARED_MEMORY = (0x1AF4, 0x1110)  # vendor and device of ivshmem
@@ -98,7 +98,9 @@ class Relay:
     def __init__(self, options: argparse.Namespace) -> None:
         self._clock = SystemClock()
         self._far = far = FarSide()
-        self._can = FrameBatch(options.can, far.memory) if options.can else None
+        self._can: FrameBatch | None = None
+        if options.can:
+            self._can = FrameBatch(open_can(options.can), far.memory)
         self._line = Line(options.line) if options.line else None
         self._stdin = sys.stdin.fileno()
         self._lines = Lines(self._stdin)
