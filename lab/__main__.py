@@ -19,7 +19,6 @@ from lab.machine import (
     SLOWNESS,
     Machine,
     Sockets,
-    command,
     emulator_version,
     processor_name,
 )
@@ -177,18 +176,19 @@ def run_machine(
         is_shown: the machine's own output is printed, too.
     """
     kernel = fetch_kernel(cache)
-    names = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
+    words = " ".join(shlex.quote(scenario.name) for scenario in scenarios)
     if is_shown:
-        names += " --echo"
-    job = _JOB.format(root=ROOT, python=sys.executable, names=names)
+        words += " --echo"
+    job = _JOB.format(root=ROOT, python=sys.executable, names=words)
     with tempfile.TemporaryDirectory(prefix="lab") as place:
         folder = Path(place)
         first_root = folder / "initramfs"
         busybox = Path(program("busybox"))
         first_root.write_bytes(initramfs.build(busybox, kernel.modules, job))
-        sockets = Sockets(folder / "line", folder / "monitor", folder / "debug")
+        names = ("line", "monitor", "debug", "memory")
+        sockets = Sockets(*(folder / name for name in names))
         addresses = known_timer(kernel)
-        machine = Machine(command(kernel, first_root, sockets))
+        machine = Machine(kernel, first_root, sockets)
         try:
             if addresses is not None:
                 wait_for(sockets.debugger)

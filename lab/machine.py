@@ -1,20 +1,23 @@
-"""The emulated machine: its command line, its console, a limit on its time."""
+"""The emulated machine: its command line, its console, its processes."""
 
+import contextlib
 import os
 import queue
+import socket
 import subprocess
+import sys
 import threading
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import NS_PER_S, SystemClock
+from lab.calls import MEMORY_SIZE
 from lab.kernel import Kernel
 from lab.requirements import program
 
 # With -icount an instruction takes 1 ns. The kernel is given a time stamp counter of
 # six times the true rate, so its time passes six times slower than the processor's,
-# consistently: driver and simulated arm then fit into one cycle.
+# consistently: driver, recorder and console then fit into one cycle.
 SLOWNESS = 6
 _APPEND = (
     "console=ttyS0 quiet panic=-1 mitigations=off nokaslr random.trust_cpu=on "
@@ -29,24 +32,27 @@ _CLOCK = SystemClock()
 
 @dataclass(frozen=True, slots=True)
 class Sockets:
-    """Unix sockets of one machine, below a short path.
+    """Unix sockets of one machine, and memory, below a short path.
 
     Attributes:
         line: the far end of the serial adapter.
         monitor: QEMU's, to plug devices in and out.
         debugger: for `timer_rate`.
+        memory: a file that guest and simulated arm share.
     """
 
     line: Path
     monitor: Path
     debugger: Path
+    memory: Path
 
 
-def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
+def command(kernel: Kernel, initramfs: Path, sockets: Sockets, proxy: int) -> list[str]:
     """Return the command line of the machine.
 
     Both ends of the serial adapter and of QEMU's monitor are in the guest: each socket
     is joined to a port of its own, so a simulated sensor runs on guest time, too.
+    `proxy` is the descriptor of the socket behind which the simulated arm answers.
     """
     options = (
         f"-accel tcg -cpu {_PROCESSOR} -smp 1 -nodefaults -no-reboot -display none "
@@ -58,13 +64,14 @@ def command(kernel: Kernel, initramfs: Path, sockets: Sockets) -> list[str]:
     return [
         program("qemu-system-x86_64"),
         *options.split(),
-        *("-m", str(MEMORY_MB)),
+        *_memory(),
         *("-kernel", str(kernel.image), "-initrd", str(initramfs)),
         *("-append", _APPEND),
         *_host_files(),
         *_can_cards(),
         *_serial_adapter(sockets.line),
         *_monitor(sockets.monitor),
+        *_far_side(sockets.memory, proxy),
         *("-chardev", f"socket,id=debug,path={sockets.debugger},server=on,wait=off"),
         *("-gdb", "chardev:debug"),
         *(["-S"] if kernel.timer.exists() else []),  # it waits for its timer's rate
@@ -127,17 +134,44 @@ def _monitor(socket: Path) -> list[str]:
     ]
 
 
-class Machine:
-    """A running machine whose console is read line by line."""
+def _memory() -> list[str]:
+    """Memory that has a descriptor: the proxy device sends it to its other end."""
+    return [
+        *("-m", str(MEMORY_MB), "-machine", "memory-backend=ram"),
+        *("-object", f"memory-backend-memfd,id=ram,size={MEMORY_MB}M,share=on"),
+    ]
 
-    def __init__(self, arguments: list[str]) -> None:
-        self._process = subprocess.Popen(
-            arguments,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
-        self._taken = 0.0
+
+def _far_side(memory: Path, proxy: int) -> list[str]:
+    """Memory shared with the simulated arm, and the device that it is called by."""
+    size = f"share=on,mem-path={memory},size={MEMORY_SIZE}"
+    return [
+        *("-object", f"memory-backend-file,id=shared,{size}"),
+        *("-device", "ivshmem-plain,memdev=shared"),
+        *("-device", f"x-pci-proxy-dev,fd={proxy}"),
+    ]
+
+
+class Machine:
+    """A running machine and its simulated arm; its console is read line by line."""
+
+    def __init__(self, kernel: Kernel, initramfs: Path, sockets: Sockets) -> None:
+        sockets.memory.write_bytes(bytes(MEMORY_SIZE))
+        here, there = socket.socketpair()
+        with here, there:
+            self._far_side = subprocess.Popen(
+                far_command(sockets.memory, there.fileno()),
+                stdin=subprocess.DEVNULL,
+                pass_fds=(there.fileno(),),
+            )
+            self._process = subprocess.Popen(
+                command(kernel, initramfs, sockets, here.fileno()),
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                pass_fds=(here.fileno(),),
+            )
+        self._taken = [0.0, 0.0]
         self._lines: queue.Queue[str | None] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
@@ -158,27 +192,43 @@ class Machine:
             raise TimeoutError from None
 
     def processor_seconds(self) -> float:
-        """Return the processor time that it has taken so far [s]."""
-        try:
-            stat = Path(f"/proc/{self._process.pid}/stat").read_text(encoding="ascii")
-        except OSError:
-            return self._taken
-        # The name in parentheses may hold anything.
-        user, system = stat.rpartition(")")[2].split()[11:13]
-        self._taken = (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")
-        return self._taken
+        """Return the processor time that both processes have taken so far [s]."""
+        for number, process in enumerate((self._process, self._far_side)):
+            with contextlib.suppress(OSError):  # it has ended
+                self._taken[number] = _taken_by(process.pid)
+        return sum(self._taken)
 
     def close(self) -> None:
         """Switch it off; safe to repeat."""
-        self._process.kill()
-        self._process.wait()
+        for process in (self._process, self._far_side):
+            process.kill()
+            process.wait()
         self._reader.join()
         if self._process.stdout is not None:
             self._process.stdout.close()
 
     def _read(self) -> None:
         assert self._process.stdout is not None
-        with closing(self._process.stdout) as stream:
+        with contextlib.closing(self._process.stdout) as stream:
             for line in stream:
                 self._lines.put(line.decode(errors="replace").rstrip())
         self._lines.put(None)
+
+
+def far_command(memory: Path, link: int) -> list[str]:
+    """Return the command of the process that simulates the arm.
+
+    Args:
+        memory: shared with the guest.
+        link: descriptor of its end of the proxy device's socket.
+    """
+    options = ["--link", str(link), "--memory", str(memory)]
+    return [sys.executable, "-m", "lab.far", *options]
+
+
+def _taken_by(pid: int) -> float:
+    """Return the processor time of a process [s]; raises OSError once it has ended."""
+    stat = Path(f"/proc/{pid}/stat").read_text(encoding="ascii")
+    # The name in parentheses may hold anything.
+    user, system = stat.rpartition(")")[2].split()[11:13]
+    return (int(user) + int(system)) / os.sysconf("SC_CLK_TCK")

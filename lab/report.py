@@ -12,7 +12,9 @@ unmodified program in an emulated machine: Debian's kernel, its `kvaser_pci` (SJ
 and `ftdi_sio` drivers, `can0` and `/dev/ttyUSB0` as on the rig; the simulated arm is on
 `can1`, the simulated sensor at the far end of the serial adapter. All times are guest
 time: the machine's clock follows the instructions it executes, so a busy host changes
-none of them. `processor s` is what the emulation of a scenario took of the host.
+none of them. `processor s` is what a scenario took of the host. Arm and sensor are
+simulated by a process of the host; a relay in the machine carries their frames and
+bytes. The machine stands still while that process computes, so no time passes in it.
 
 | scenario | verdict | guest s | processor s | figures |
 |---|---|---|---|---|
@@ -35,7 +37,9 @@ _NOT_SHOWN = """
 - The time that an adapter on USB needs: both cards are PCI cards without a delay.
 - Hardware time stamps: `kvaser_pci` has software time stamps only.
 - Replies one by one in a session: what its simulated arm says within 0.55 ms leaves
-  together. In "home arm" they come one by one.
+  together, and the arm computes in no time at all. In "home arm", "link down at start",
+  "second host" and "full queue" `traction fake` serves the arm inside the machine:
+  replies come one by one, after the time that it needs.
 - The start of a process: programs begin forked, their libraries loaded, but for the
   `check` of "home arm", which is executed. The preflight tests the loop for 0.5 s
   (`[loop] test_time`), there for 2 s.

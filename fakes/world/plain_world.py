@@ -60,8 +60,7 @@ def simulated_rig(
     Args:
         fields: scene, tool, share of friction, pace, cables; "body" of a twin, which
             has centres of mass of links and, unless None, friction of motors;
-            "is_brief" of one that waits for no compiler; "substeps" of a cycle where
-            they are not as many as usual.
+            "is_brief" of one that waits for no compiler.
         constants: of the arm by its drawings.
         clock: of the world.
     """
@@ -74,7 +73,5 @@ def simulated_rig(
         cables=fields.get("cables"),
         dynamics=PINOCCHIO if fields.get("is_brief") else None,
     )
-    if "substeps" in fields:
-        options = replace(options, substeps=fields["substeps"])
     rig = FakeRig(scene, constants, tool_of(fields["tool"]), clock, options)
     return LocalSimulation(rig, PACES[fields["pace"]])

@@ -10,7 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from experiments.__main__ import main as traction
-from lab.guest import far_sensor, pushed_arm
+from lab.guest import relay
 from lab.guest.commands import Program, ScenarioError, Shell, read_text
 from lab.guest.warm_start import Run
 
@@ -138,18 +138,16 @@ class MachineRoom:
         return server
 
     def serve_pushed_arm(self, *options: str) -> Program:
-        """Return a server of an arm with hand and ground, above the container."""
-        where = ("--bus", f"socketcan:{FAR_CAN}")
-        command = ("pushed_arm", *self._config_option(), *where, *options)
-        server = self.start(*command, run=pushed_arm.main)
-        server.expect("ready", _ARM_PATIENCE)
-        return server
+        """Return the relay to an arm with hand and ground, above the container."""
+        return self._relay("--can", FAR_CAN, *options)
 
     def serve_far_sensor(self) -> Program:
-        """Return a server of the configured serial sensor behind the adapter."""
-        where = ("--line", str(line_port()))
-        command = ("far_sensor", *self._config_option(), *where)
-        server = self.start(*command, run=far_sensor.main)
+        """Return the relay to the configured serial sensor behind the adapter."""
+        return self._relay("--line", str(line_port()))
+
+    def _relay(self, *options: str) -> Program:
+        command = ("relay", *self._config_option(), *options)
+        server = self.start(*command, run=relay.main)
         server.expect("ready", _ARM_PATIENCE)
         return server
 

@@ -75,9 +75,9 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
     monkeypatch, tmp_path
 ):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
-    sockets = Sockets(tmp_path / "a", tmp_path / "b", tmp_path / "c")
+    sockets = Sockets(*(tmp_path / name for name in "abcd"))
     kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
-    words = command(kernel, tmp_path / "initramfs", sockets)
+    words = command(kernel, tmp_path / "initramfs", sockets, 9)
     assert any("path=/," in word and "readonly=on" in word for word in words)
     cards = [word for word in words if word.startswith("kvaser_pci")]
     assert len(cards) == 2
@@ -87,14 +87,14 @@ def test_the_machine_has_read_only_files_and_two_cards_on_one_bus(
 
 def test_a_machine_whose_timer_is_known_waits_for_its_rate(monkeypatch, tmp_path):
     monkeypatch.setattr("lab.machine.program", lambda name: f"/usr/bin/{name}")
-    sockets = Sockets(tmp_path / "a", tmp_path / "b", tmp_path / "c")
+    sockets = Sockets(*(tmp_path / name for name in "abcd"))
     kernel = Kernel(tmp_path / "vmlinux", (), "6.1", tmp_path / "timer")
     assert program.known_timer(kernel) is None
-    assert "-S" not in command(kernel, tmp_path / "initramfs", sockets)
+    assert "-S" not in command(kernel, tmp_path / "initramfs", sockets, 9)
     addresses = TimerAddresses(1, 2, 3, 4)
     kernel.timer.write_text(to_line(addresses))
     assert program.known_timer(kernel) == addresses
-    assert "-S" in command(kernel, tmp_path / "initramfs", sockets)
+    assert "-S" in command(kernel, tmp_path / "initramfs", sockets, 9)
 
 
 def test_a_timer_of_another_version_is_measured_again(tmp_path):

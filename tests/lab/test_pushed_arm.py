@@ -1,74 +1,137 @@
-"""The laboratory's served arm, on stepped time and a bus of this test."""
+"""The laboratory's served arm, called as by the guest's relay, without an emulator."""
 
-import argparse
+import json
 
 import pytest
 
 from acquisition import PERIOD_NS
-from lab.guest import machine_room, pushed_arm
+from lab.calls import (
+    DONE,
+    FRAME,
+    FRAMES_IN_AT,
+    FRAMES_OUT_AT,
+    MEMORY_SIZE,
+    MOST_FRAMES,
+    Call,
+    Exchange,
+)
+from lab.far.__main__ import FarSide
+from lab.guest.machine_room import MachineRoom
 from wam.bus import Device, Group, encode_get, group_id, property_number
 
 _ASKED_NS = 60_000  # into a cycle
+_START_NS = PERIOD_NS * 1000
 _CYCLES = 20
 
 
-class Bus:
-    """A clock, and a host that asks for positions in every cycle."""
+class Caller:
+    """A relay whose host asks for positions in every cycle."""
 
     def __init__(self):
-        self.t_ns = PERIOD_NS * 1000
-        self.wakes = 0
-        self.asked_ns = self.t_ns + _ASKED_NS
-        self.sent: list[tuple[int, int]] = []
-        self.number = property_number(Device.MOTOR, "P", 200)
+        self.memory = bytearray(MEMORY_SIZE)
+        self.exchange = Exchange(self.memory)
+        self.far = FarSide(self.exchange)
+        self.t_ns = self.wake_ns = _START_NS
+        self.calls = 0
+        self.asked_ns = _START_NS + _ASKED_NS
+        self.sent = []
 
-    def now_ns(self):
-        return self.t_ns
+    def say(self, call, text):
+        self.exchange.ask(self.t_ns, 0, b"")
+        self.exchange.say(text)
+        return self.far.call(call)
 
-    def wait(self, _, deadline_ns):
-        self.wakes += 1
-        self.t_ns = max(self.t_ns, min(self.asked_ns, deadline_ns))
-
-    def receive(self):
-        if self.t_ns < self.asked_ns:
-            return []
-        self.asked_ns += PERIOD_NS
-        return [(group_id(Group.ARM), encode_get(self.number))]
-
-    def send(self, can_id, _):
-        self.sent.append((self.t_ns, can_id))
+    def step(self):
+        """Sleep until a frame comes or the answer said; make one call."""
+        self.calls += 1
+        self.t_ns = max(self.t_ns, min(self.asked_ns, self.wake_ns))
+        count = int(self.t_ns >= self.asked_ns)
+        if count:
+            number = property_number(Device.MOTOR, "P", 200)
+            data = encode_get(number)
+            frame = FRAME.pack(group_id(Group.ARM), len(data), data)
+            self.memory[FRAMES_IN_AT : FRAMES_IN_AT + FRAME.size] = frame
+            self.asked_ns += PERIOD_NS
+        self.exchange.ask(self.t_ns, count, b"")
+        assert self.far.call(Call.ADVANCE) == DONE
+        self.wake_ns, sent, _ = self.exchange.answered()
+        end = FRAMES_OUT_AT + sent * FRAME.size
+        rows = FRAME.iter_unpack(self.memory[FRAMES_OUT_AT:end])
+        self.sent += [(self.t_ns, can_id) for can_id, _, _ in rows]
 
 
 @pytest.fixture
-def bus(monkeypatch):
-    bus = Bus()
-    monkeypatch.setattr(pushed_arm, "SystemClock", lambda: bus)
-    monkeypatch.setattr(pushed_arm, "open_can_port", lambda *_: bus)
-    monkeypatch.setenv("TRACTION_DYNAMICS", "pinocchio")
-    return bus
-
-
-@pytest.fixture
-def arm(bus, tmp_path):
-    room = machine_room.MachineRoom("test")
+def files(tmp_path):
+    room = MachineRoom("test")
     room.folder = tmp_path
     room.write_bus_config()
-    options = argparse.Namespace(
-        config=room.config, row="TF", seed=1, bus="socketcan:can1", line=None
-    )
-    return pushed_arm.PushedArm(options)
+    return {
+        "rig": room.config.read_text(),
+        "matrix": (tmp_path / "matrix.toml").read_text(),
+    }
 
 
-def test_seven_positions_leave_together_within_a_cycle(arm, bus):
-    arm.do("lift")
-    first_ns = bus.asked_ns
-    end_ns = bus.t_ns + _CYCLES * PERIOD_NS
-    while bus.t_ns < end_ns:
-        arm.step()
-    assert len(bus.sent) == 7 * _CYCLES
+@pytest.fixture
+def caller(files):
+    caller = Caller()
+    wanted = {**files, "row": "TF", "seed": "1", "line": ""}
+    assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE
+    return caller
+
+
+def test_seven_positions_leave_together_within_a_cycle(caller):
+    assert caller.say(Call.DO, "lift") == DONE
+    first_ns = caller.asked_ns
+    while caller.t_ns < _START_NS + _CYCLES * PERIOD_NS:
+        caller.step()
+    assert len(caller.sent) == 7 * _CYCLES
     for cycle in range(_CYCLES):
-        times, _ = zip(*bus.sent[7 * cycle : 7 * cycle + 7], strict=True)
+        times, _ = zip(*caller.sent[7 * cycle : 7 * cycle + 7], strict=True)
         assert len(set(times)) == 1
         # as long as the wire needs, before the loop looks for them
         assert 500_000 < times[0] - first_ns - cycle * PERIOD_NS < 700_000
-    assert bus.wakes <= 3 * _CYCLES + 1
+    assert caller.calls <= 3 * _CYCLES + 2  # the first comes at once
+
+
+@pytest.mark.parametrize("line", ["nonsense", "prepare a trial", "break nothing"])
+def test_a_line_that_is_not_known_is_refused_in_words(caller, line):
+    assert caller.say(Call.DO, line) != DONE
+    assert "Error" in caller.exchange.said()
+    assert caller.say(Call.DO, "lift") == DONE
+
+
+def test_a_call_of_an_offset_that_means_nothing_is_refused(caller):
+    assert caller.far.call(4) != DONE
+    assert "4 is not a valid Call" in caller.exchange.said()
+
+
+def test_a_call_with_more_frames_than_there_is_room_for_is_refused(caller):
+    caller.exchange.ask(caller.t_ns, MOST_FRAMES + 1, b"")
+    assert caller.far.call(Call.ADVANCE) != DONE
+    assert f"{MOST_FRAMES + 1} frames" in caller.exchange.said()
+
+
+def test_a_call_before_anything_is_served_is_refused():
+    caller = Caller()
+    assert caller.say(Call.DO, "lift") != DONE
+    assert "nothing is served" in caller.exchange.said()
+
+
+def test_a_sensor_alone_says_what_is_due(files):
+    caller = Caller()
+    rig = files["rig"].replace('kind = "barrett" ', 'kind = "bota" ')
+    rig = rig.replace("[ft_sensor]", '[ft_sensor]\nport = "/dev/ttyUSB0"\nsinc = 64')
+    wanted = {**files, "rig": rig, "row": "", "seed": "1", "line": "a port"}
+    assert caller.say(Call.SERVE, json.dumps(wanted)) == DONE, caller.exchange.said()
+    said = b""
+    for _ in range(500):
+        caller.t_ns += PERIOD_NS
+        caller.exchange.ask(caller.t_ns, 0, b"")
+        assert caller.far.call(Call.ADVANCE) == DONE
+        said += caller.exchange.answered()[2]
+    assert len(said) > 500
+    assert caller.say(Call.DO, "off") == DONE
+    caller.t_ns += PERIOD_NS
+    caller.exchange.ask(caller.t_ns, 0, b"")
+    caller.far.call(Call.ADVANCE)
+    assert caller.exchange.answered()[2] == b""

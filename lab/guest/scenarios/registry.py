@@ -26,7 +26,8 @@ class Scenario:
         name: as `--only` takes it and the table shows it.
         run: does it, returns figures, raises ScenarioError.
         is_short: it is part of the short form, too.
-        weight: how long it takes beside others; machines get even shares.
+        weight: processor time beside others, about 10 s each; machines get even
+            shares.
         expected: why it fails for now; empty = it has to pass.
     """
 
@@ -43,23 +44,23 @@ class Scenario:
 
 
 ALL = (
-    Scenario("home arm", bus.home_arm, is_short=True, weight=4),
+    Scenario("home arm", bus.home_arm, is_short=True, weight=11),
     Scenario("link down at start", bus.link_down_at_start, is_short=True),
     Scenario("second host", bus.second_host),
     Scenario("full queue", bus.full_queue),
-    Scenario("slow and lossy adapter", recording.bad_adapter, weight=5),
+    Scenario("slow and lossy adapter", recording.bad_adapter, weight=10),
     Scenario("serial low latency", serial_line.low_latency, is_short=True),
     Scenario("serial makes", serial_line.three_makes),
-    Scenario("serial no rights", serial_line.no_rights, weight=2),
+    Scenario("serial no rights", serial_line.no_rights, weight=4),
     Scenario("serial unplugged", serial_line.unplugged),
     Scenario("serial check", serial_line.check_with_serial_sensor),
-    Scenario("session", recording.three_trials, weight=5),
-    Scenario("second screen", second_screen.beside_a_session, weight=6),
-    Scenario("foresight", foresight.beside_a_recording, weight=5),
-    Scenario("link down in every phase", losses.link_down_in_every_phase, weight=8),
-    Scenario("lost in a trial", losses.lost_in_a_trial, weight=6),
-    Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=7),
-    Scenario("calibrate gravity", calibration.gravity, weight=10),
+    Scenario("session", recording.three_trials, weight=10),
+    Scenario("second screen", second_screen.beside_a_session, weight=14),
+    Scenario("foresight", foresight.beside_a_recording, weight=13),
+    Scenario("link down in every phase", losses.link_down_in_every_phase, weight=18),
+    Scenario("lost in a trial", losses.lost_in_a_trial, weight=16),
+    Scenario("sensor lost and back", sensor_losses.lost_and_back, weight=15),
+    Scenario("calibrate gravity", calibration.gravity, weight=25),
 )
 
 

@@ -27,8 +27,8 @@ def _second_screen(room: MachineRoom) -> tuple[Program, Program]:
 def beside_a_session(room: MachineRoom) -> Figures:
     """Watch a session from a second screen: its loop may be 3 us later (p99), no more.
 
-    The machine has one processor, which loop, recorder, simulated arm, server and
-    viewer share. Before the last window the server is killed with -9.
+    The machine has one processor, which loop, recorder, server, viewer and the relay to
+    the simulated arm share. Before the last window the server is killed with -9.
     """
     session = begin(room, served_arm(room), 1)
     session.await_ready()

@@ -1,0 +1,111 @@
+"""Serves arms and sensors to one machine: python -m lab.far --link FD --memory FILE."""
+
+import argparse
+import json
+import mmap
+import socket
+import sys
+import tempfile
+import traceback
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition import Readable
+from experiments.settings import Settings, load_settings
+from lab.calls import DONE, MEMORY_SIZE, Call, Exchange
+from lab.far.line_sensor import LineSensor, Served
+from lab.far.proxy_device import ProxyDevice
+from lab.far.pushed_arm import PushedArm
+
+_FAILED = 0
+
+
+class GuestClock:
+    """Implements acquisition.clock.Clock: the guest's time, as its calls tell it.
+
+    Attributes:
+        t_ns: time of the last call [ns].
+    """
+
+    def __init__(self) -> None:
+        self.t_ns = 0
+
+    def now_ns(self) -> int:
+        """Return the guest's monotonic time [ns]."""
+        return self.t_ns
+
+    def utc_ns(self) -> int:
+        """Return the same: nothing here has a date."""
+        return self.t_ns
+
+    def sleep_until(self, t_ns: int) -> None:
+        """Raise: nothing here waits."""
+        raise NotImplementedError
+
+    def wait(self, link: Readable, deadline_ns: int) -> bool:
+        """Raise: nothing here waits."""
+        raise NotImplementedError
+
+
+class FarSide:
+    """Does what calls ask for."""
+
+    def __init__(self, exchange: Exchange) -> None:
+        self._exchange = exchange
+        self._clock = GuestClock()
+        self._served: Served | None = None
+
+    def call(self, offset: int) -> int:
+        """Return DONE, or another value and a text with what went wrong."""
+        try:
+            self._do(Call(offset))
+        except Exception:  # told to the guest, where the scenario fails
+            self._exchange.say(traceback.format_exc())
+            return _FAILED
+        return DONE
+
+    def _do(self, call: Call) -> None:
+        t_ns, frames, data = self._exchange.asked()
+        self._clock.t_ns = t_ns
+        if call is Call.SERVE:
+            self._served = self._made(json.loads(self._exchange.said()))
+        elif self._served is None:
+            raise ValueError("nothing is served yet.")
+        elif call is Call.DO:
+            self._served.do(self._exchange.said())
+        else:
+            left_ns, sent, said = self._served.advance(frames, data)
+            self._exchange.answer(t_ns + left_ns, sent, said)
+
+    def _made(self, wanted: dict[str, str]) -> Served:
+        settings = _settings(wanted["rig"], wanted["matrix"])
+        if not wanted["row"]:
+            return LineSensor(settings, self._clock)
+        has_line = wanted["line"] != ""
+        seed = int(wanted["seed"])
+        return PushedArm(settings, wanted["row"], seed, self._clock, has_line=has_line)
+
+
+def _settings(rig: str, matrix: str) -> Settings:
+    """Return the settings from the text of two files."""
+    with tempfile.TemporaryDirectory(prefix="lab") as place:
+        folder = Path(place)
+        (folder / "rig.toml").write_text(rig, encoding="utf-8")
+        (folder / "matrix.toml").write_text(matrix, encoding="utf-8")
+        return load_settings(folder / "rig.toml")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Serve until the emulator ends."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--link", type=int, required=True, metavar="FD")
+    options.add_argument("--memory", type=Path, required=True, metavar="FILE")
+    given = options.parse_args(arguments)
+    with given.memory.open("r+b") as file:
+        memory = mmap.mmap(file.fileno(), MEMORY_SIZE)
+    with socket.socket(fileno=given.link) as link:
+        ProxyDevice(link, FarSide(Exchange(memory)).call).serve()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,84 @@
+"""A serial sensor at the far end of the adapter, below an arm or without one."""
+
+from typing import Protocol
+
+import numpy as np
+
+from acquisition import Clock
+from experiments.rig import build_tool
+from experiments.rig.fake import sensor_metadata
+from experiments.settings import Settings
+from fakes.sensor import SensorChoice, SensorErrors, SensorStream, make_stream
+from fakes.serving import hanging_load
+from fakes.world_clock import TICK_NS, WorldClock
+from lab.calls import Frame
+
+Turn = tuple[int, list[Frame], bytes]  # time until the next [ns], frames, bytes
+
+
+class Served(Protocol):
+    """What the relay serves."""
+
+    def advance(self, frames: list[Frame], data: bytes) -> Turn:
+        """Let the world go on up to now.
+
+        Args:
+            frames: of hosts on the bus.
+            data: of the host on the serial line.
+
+        Returns:
+            how long nothing will happen by itself [ns], and what is sent now.
+        """
+        ...
+
+    def do(self, line: str) -> None:
+        """Do what a person does, in a line; raises KeyError if it is not known."""
+        ...
+
+
+class FarEnd:
+    """A sensor with its power switch, at the end of a serial line."""
+
+    def __init__(self, stream: SensorStream, t_ns: int) -> None:
+        self._stream = stream
+        self._is_on = True
+        stream.due(t_ns)
+        stream.port_opened(t_ns)
+
+    def switch(self, t_ns: int, *, is_on: bool) -> None:
+        """Take the sensor's power away, or give it back: it starts anew."""
+        self._is_on = is_on
+        self._stream.due(t_ns)
+        if is_on:
+            self._stream.reset(t_ns)
+
+    def advance(self, t_ns: int, data: bytes) -> bytes:
+        """Take bytes of the host; return the sensor's up to `t_ns`."""
+        if not self._is_on:
+            return b""
+        if data:
+            self._stream.receive(t_ns, data)
+        return b"".join(part for _, part in self._stream.due(t_ns))
+
+
+class LineSensor:
+    """Implements Served: a sensor with a foot below it and no arm."""
+
+    def __init__(self, settings: Settings, clock: Clock) -> None:
+        self._clock = WorldClock(clock)
+        rig, t_ns = settings.rig, self._clock.now_ns()
+        tool = build_tool(rig, settings.matrix.terrains[0].foot)
+        choice = SensorChoice(**sensor_metadata(rig.ft_sensor))
+        errors = SensorErrors(np.random.default_rng(1))
+        stream = make_stream(choice, hanging_load(tool), errors, t_ns)
+        self._end = FarEnd(stream, t_ns)
+
+    def advance(self, frames: list[Frame], data: bytes) -> Turn:
+        """Let the sensor go on up to now."""
+        del frames
+        return TICK_NS, [], self._end.advance(self._clock.go_on(), data)
+
+    def do(self, line: str) -> None:
+        """Switch its power: on, off."""
+        is_on = {"on": True, "off": False}[line]
+        self._end.switch(self._clock.now_ns(), is_on=is_on)

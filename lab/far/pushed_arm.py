@@ -1,0 +1,87 @@
+"""An arm with ground and hand at the far end of a CAN bus.
+
+Lines move the hand and press the pendant, as a person would do: prepare TRIAL, lift,
+put_down, push, rest, let_go, activate, idle, estop, break FAULT, mend, sensor_off,
+sensor_on.
+"""
+
+from collections.abc import Callable
+
+from acquisition import Clock
+from experiments.rig.fake import SimulatedRig
+from experiments.settings import Settings
+from fakes.pucks import WiredNetwork
+from fakes.world import simulated_rig
+from fakes.world_clock import TICK_NS, WorldClock
+from lab.calls import Frame
+from lab.far.line_sensor import FarEnd, Turn
+from wam.model import load_constants
+
+# What the arm says within this time leaves together, as through an adapter that
+# collects frames: seven positions, the last of which starts 0.53 ms after the question.
+_TOGETHER_NS = 550_000
+_HIGHEST_ID = 0x7FF  # of a data frame
+_FRICTION = 0.02  # share of what was identified on another arm
+
+
+class PushedArm:
+    """Implements Served: a simulated rig on a bus, and what a person does with it."""
+
+    def __init__(
+        self, settings: Settings, row: str, seed: int, clock: Clock, *, has_line: bool
+    ) -> None:
+        """Put the arm above the container of a row of the matrix.
+
+        `has_line`: its sensor is on the serial line.
+        """
+        world = SimulatedRig(
+            settings.rig, settings.row(row), seed, _FRICTION, "steady", is_brief=True
+        )
+        self._clock = WorldClock(clock)
+        simulation = simulated_rig(world.metadata(), load_constants(), self._clock)
+        self._simulation, rig = simulation, simulation.rig
+        self._plant = rig.plant
+        self._wired = WiredNetwork(rig.network, is_far=True)
+        self._line: FarEnd | None = None
+        if has_line:
+            self._line = FarEnd(rig.stream, self._clock.now_ns())
+        self._actions: dict[str, Callable[[], None]] = {
+            "lift": simulation.lift,
+            "put_down": simulation.put_down,
+            "push": simulation.push,
+            "rest": simulation.rest,
+            "let_go": simulation.let_go,
+            "mend": simulation.clear_faults,
+            "activate": lambda: simulation.pendant("activate"),
+            "idle": lambda: simulation.pendant("idle"),
+            "estop": lambda: simulation.pendant("estop"),
+            "sensor_off": lambda: self._switch(is_on=False),
+            "sensor_on": lambda: self._switch(is_on=True),
+        }
+
+    def do(self, line: str) -> None:
+        """Do what a person does; raises KeyError where the line is not known."""
+        word, _, operand = line.partition(" ")
+        if word == "prepare":
+            self._simulation.prepare(int(operand))
+        elif word == "break":
+            self._simulation.inject(operand)
+        else:
+            self._actions[word]()
+
+    def advance(self, frames: list[Frame], data: bytes) -> Turn:
+        """Let bus, arm and sensor go on up to now."""
+        now_ns, wired = self._clock.go_on(), self._wired
+        for can_id, payload in frames:
+            if can_id <= _HIGHEST_ID:
+                wired.send(now_ns, can_id, payload)
+        sent = [(can_id, payload) for _, can_id, payload in wired.advance(now_ns)]
+        self._plant.advance(now_ns)
+        said = b"" if self._line is None else self._line.advance(now_ns, data)
+        event_ns = wired.next_event_ns()
+        left = TICK_NS if event_ns is None else max(event_ns - now_ns, _TOGETHER_NS)
+        return min(left, TICK_NS), sent, said
+
+    def _switch(self, *, is_on: bool) -> None:
+        if self._line is not None:
+            self._line.switch(self._clock.now_ns(), is_on=is_on)

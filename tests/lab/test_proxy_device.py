@@ -1,0 +1,102 @@
+"""The proxy device's answers to messages as QEMU 7.2 sends them."""
+
+import os
+import socket
+import struct
+import threading
+
+import pytest
+
+from lab.calls import PCI_ID, REGISTERS_SIZE
+from lab.far.proxy_device import ProxyDevice
+
+_HEAD = struct.Struct("<iiQ")
+_MEMORY, _CONFIG_WRITE, _CONFIG_READ, _READ, _RESET = 0, 2, 3, 5, 7
+_BASE = 0xC000_3000
+
+
+class Emulator:
+    """The emulator's end of the socket; the device answers in a thread."""
+
+    def __init__(self):
+        self.read = []
+        self.link, there = socket.socketpair()
+        self.link.settimeout(10.0)
+        self._device = ProxyDevice(there, self._value)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self.error = None
+        self._there = there
+        self._thread.start()
+
+    def _serve(self):
+        try:
+            self._device.serve()
+        except ValueError as error:
+            self.error = error
+        self._there.close()
+
+    def _value(self, offset):
+        self.read.append(offset)
+        return 2**64 - 1 - offset
+
+    def ask(self, command, body=b"", piece=None):
+        data = _HEAD.pack(command, 0, len(body)) + body
+        for start in range(0, len(data), piece or len(data)):
+            self.link.sendall(data[start : start + (piece or len(data))])
+        answer = self.link.recv(24, socket.MSG_WAITALL)
+        head = _HEAD.unpack_from(answer)
+        assert head == (1, 0, 8)
+        return int.from_bytes(answer[16:], "little")
+
+    def config(self, offset, length, value=None):
+        command = _CONFIG_READ if value is None else _CONFIG_WRITE
+        return self.ask(command, struct.pack("<IIi", offset, value or 0, length))
+
+    def word(self, offset, piece=None):
+        body = struct.pack("<QQI?3x", _BASE + offset, 0, 8, True)
+        return self.ask(_READ, body, piece)
+
+    def end(self):
+        self.link.close()
+        self._thread.join(10.0)
+        assert not self._thread.is_alive()
+
+
+@pytest.fixture
+def emulator():
+    emulator = Emulator()
+    yield emulator
+    emulator.end()
+
+
+def test_the_device_has_a_name_and_one_page_of_registers(emulator):
+    assert (emulator.config(0, 2), emulator.config(2, 2)) == PCI_ID
+    for offset in (0x10, 0x14, 0x18, 0x1C, 0x20, 0x24, 0x30):
+        emulator.config(offset, 4, 0xFFFF_FFFF)
+    assert emulator.config(0x10, 4) == 2**32 - REGISTERS_SIZE
+    assert {emulator.config(o, 4) for o in (0x14, 0x18, 0x1C, 0x20, 0x24, 0x30)} == {0}
+
+
+@pytest.mark.parametrize("piece", [None, 1, 7])
+def test_a_word_is_read_at_its_offset_in_any_pieces(emulator, piece):
+    emulator.config(0x10, 4, _BASE)
+    assert emulator.word(8, piece) == 2**64 - 9
+    assert emulator.read == [8]
+
+
+def test_descriptors_of_memory_are_closed_and_not_answered(emulator):
+    mine, theirs = os.pipe()
+    data = _HEAD.pack(_MEMORY, 0, 192) + bytes(192)
+    socket.send_fds(emulator.link, [data], [theirs])
+    assert emulator.ask(_RESET) == 0  # the next answer is the next message's
+    os.close(theirs)
+    assert os.read(mine, 1) == b""  # nobody has the other end
+    os.close(mine)
+
+
+def test_a_message_of_another_protocol_ends_it():
+    emulator = Emulator()
+    emulator.link.sendall(_HEAD.pack(_READ, 0, 1 << 20))
+    assert emulator.link.recv(1) == b""
+    emulator.end()
+    assert "1048576 bytes" in str(emulator.error)
