@@ -41,6 +41,7 @@ from wam.bus import (
     position_reply_id,
     property_number,
 )
+from wam.bus.datagrams import system_call
 from wam.bus.kernel_door import KernelDoor
 
 GOAL_US = 45.0  # of the kernel's socket, per cycle
@@ -110,7 +111,8 @@ class Ends:
 def kernel_ends() -> Ends:
     """Return our door onto the kernel's socket."""
     near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    return Ends(near, KernelDoor(near, "loopback", SystemClock()))
+    door = KernelDoor(near, "loopback", SystemClock(), system_call())
+    return Ends(near, door)
 
 
 def library_ends() -> Ends:

@@ -10,6 +10,7 @@ from typing import Final
 import can
 
 from acquisition import NS_PER_S, Clock, LinkError
+from wam.bus.datagrams import system_call
 from wam.bus.error_frames import ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG
 from wam.bus.kernel_door import (
     KernelDoor,
@@ -23,7 +24,7 @@ from wam.bus.link import (
     Frame,
     broken_link,
     error_number,
-    is_plausible,
+    plausible_times,
 )
 
 CanBus = can.BusABC
@@ -65,7 +66,7 @@ def open_door(interface: str, channel: str, bitrate: int, clock: Clock) -> Door:
         return PythonCanDoor(open_bus(interface, channel, bitrate), clock)
     try:
         _require_up(channel)
-        return KernelDoor(open_socket(channel), channel, clock)
+        return KernelDoor(open_socket(channel), channel, clock, system_call())
     except OSError as error:
         raise _cannot_open(interface, channel, bitrate, error) from error
 
@@ -146,9 +147,10 @@ class PythonCanDoor:
             can_id |= REMOTE_FLAG
         stamp = message.timestamp
         t_ns = round(stamp * NS_PER_S) if stamp else 0
-        if t_ns and not is_plausible(t_ns, now_ns):
+        earliest_ns, latest_ns = plausible_times(now_ns)
+        if t_ns and not earliest_ns < t_ns <= latest_ns:
             t_ns -= self._clock.utc_ns() - now_ns
-            if not is_plausible(t_ns, now_ns):
+            if not earliest_ns < t_ns <= latest_ns:
                 t_ns = 0
         return Frame(can_id, bytes(message.data), t_ns)
 

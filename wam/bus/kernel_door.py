@@ -9,28 +9,33 @@ import errno
 import fcntl
 import socket
 import struct
+from collections.abc import Iterable
+from functools import partial
 from typing import NamedTuple
 
 from acquisition import NS_PER_S, Clock
+from wam.bus.datagrams import AT_ONCE, DatagramBatch, ReceiveMany
 from wam.bus.error_frames import ERROR_MASK
-from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link, is_plausible
+from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link, plausible_times
 
 LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
 _RESTART_MS = 100
 _FRAME = struct.Struct("=IB3x8s")  # struct can_frame
+_DATA_BYTES = 8  # at most
 _ERROR_FILTER = 2  # of SOL_CAN_RAW
 _TIMESTAMPING, _LOST, _MEMORY = 37, 40, 55  # of SOL_SOCKET: also SO_RXQ_OVFL, MEMINFO
 _STAMPS_WANTED = 0x04 | 0x08 | 0x10 | 0x40  # of hardware and software, received
 _STAMPS = struct.Struct("@qqqqqq")  # software, unused, hardware: seconds, nanoseconds
+_STAMPED = struct.Struct("@Nii6q")  # nearly all ancillary data: stamps and nothing else
+_SLOT = struct.Struct(f"{_STAMPED.format}{DatagramBatch.control_room - _STAMPED.size}x")
 _TOTAL = struct.Struct("=I")
 _MEMORY_BYTES, _WAITING_AT = 36, 8
-_ANCILLARY = 128  # bytes
 _RECEIVE_BUFFER = 1 << 21  # bytes; the kernel grants what it may
 _GET_FLAGS, _GET_QUEUE = 0x8913, 0x8942
 _REQUEST = struct.Struct("@16sI20x")  # struct ifreq
 _NAME_AT_MOST = 15  # characters
 _UP, _RUNNING = 0x1, 0x40
-_as_frame = Frame._make  # without the words of a call
+_as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a call
 
 
 class InterfaceState(NamedTuple):
@@ -104,20 +109,26 @@ class KernelDoor:
         lost: frames that the socket had no room for.
     """
 
-    def __init__(self, opened: socket.socket, channel: str, clock: Clock) -> None:
+    def __init__(
+        self,
+        opened: socket.socket,
+        channel: str,
+        clock: Clock,
+        receive_many: ReceiveMany,
+    ) -> None:
         """Take over a bound socket; times are of `clock`.
 
         Args:
             opened: raw CAN socket, or one of datagrams that carries can_frames.
             channel: its interface, for messages.
             clock: which the times of frames are of.
+            receive_many: recvmmsg(2), as `system_call` returns it.
         """
         self.name = "kernel socket"
         self.lost = 0
         self._socket, self._channel, self._clock = opened, channel, clock
         self._adapter = AdapterClock()
-        self._buffer = bytearray(_FRAME.size)
-        self._targets = [self._buffer]
+        self._batch = DatagramBatch(_FRAME.size, receive_many)
         self._error: OSError | None = None  # it came behind frames
         opened.setblocking(False)
         for option, value in (
@@ -153,26 +164,9 @@ class KernelDoor:
             error, self._error = self._error, None
             raise broken_link(self._channel, error) from error
         frames: list[Frame] = []
-        receive, targets = self._socket.recvmsg_into, self._targets
-        unpack, buffer = _FRAME.unpack_from, self._buffer
-        now_ns = offset_ns = 0
         try:
-            for _ in range(DRAIN_AT_MOST):
-                size, ancillary, _, _ = receive(targets, _ANCILLARY)
-                if size != _FRAME.size:
-                    continue
-                can_id, length, data = unpack(buffer)
-                if length < 8:
-                    data = data[:length]
-                if not frames:
-                    now_ns = self._clock.now_ns()
-                    offset_ns = self._clock.utc_ns() - now_ns
-                t_ns = self._utc_ns(ancillary) - offset_ns if ancillary else 0
-                if t_ns and not is_plausible(t_ns, now_ns):
-                    t_ns = 0
-                frames.append(_as_frame((can_id, data, t_ns)))
-        except BlockingIOError:
-            pass
+            while len(frames) < DRAIN_AT_MOST and self._take(frames) == AT_ONCE:
+                pass
         except OSError as error:
             if not frames:
                 raise broken_link(self._channel, error) from error
@@ -183,10 +177,45 @@ class KernelDoor:
         """Close the socket; what is queued leaves all the same."""
         self._socket.close()
 
-    def _utc_ns(self, ancillary: list[tuple[int, int, bytes]]) -> int:
-        """Return when a frame was on the bus [ns], 0 = not known."""
+    def _take(self, frames: list[Frame]) -> int:
+        """Append what one call of the kernel brings; return how many datagrams."""
+        batch = self._batch
+        arrived = batch.receive(self._socket.fileno())
+        if not arrived:
+            return 0
+        now_ns = self._clock.now_ns()
+        offset_ns = self._clock.utc_ns() - now_ns
+        earliest_ns, latest_ns = plausible_times(now_ns)
+        for number, (control_size, size), (can_id, length, room), stamped in zip(
+            range(len(arrived)),
+            arrived,
+            _FRAME.iter_unpack(batch.payload),
+            _SLOT.iter_unpack(batch.control),
+            strict=False,  # the memory has room for more
+        ):
+            if size != _FRAME.size:
+                continue
+            data = room if length >= _DATA_BYTES else room[:length]
+            _, _, kind, seconds, rest, _, _, own_seconds, own_rest = stamped
+            is_plain = kind == _TIMESTAMPING and not (own_seconds or own_rest)
+            if control_size == _STAMPED.size and is_plain:
+                utc_ns = seconds * NS_PER_S + rest
+            else:
+                utc_ns = self._utc_ns(batch.ancillary(number, control_size))
+            t_ns = utc_ns - offset_ns
+            if not earliest_ns < t_ns <= latest_ns:
+                t_ns = 0
+            frames.append(_as_frame((can_id, data, t_ns)))
+        return len(arrived)
+
+    def _utc_ns(self, parts: Iterable[tuple[int, bytes]]) -> int:
+        """Return when a frame was on the bus [ns], 0 = not known.
+
+        Args:
+            parts: kind and data of each part of its ancillary data.
+        """
         utc_ns = 0
-        for _, kind, data in ancillary:
+        for kind, data in parts:
             if kind == _TIMESTAMPING and len(data) == _STAMPS.size:
                 seconds, rest, _, _, own_seconds, own_rest = _STAMPS.unpack(data)
                 utc_ns = seconds * NS_PER_S + rest

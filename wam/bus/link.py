@@ -237,9 +237,12 @@ class CanLink:
             self._tap(arrived)
 
 
-def is_plausible(t_ns: int, now_ns: int) -> bool:
-    """Return whether a frame that is at hand now can be of `t_ns` [monotonic ns]."""
-    return -_AHEAD_NS <= now_ns - t_ns < _PLAUSIBLE_NS
+def plausible_times(now_ns: int) -> tuple[int, int]:
+    """Return between which times a frame that is at hand at `now_ns` was on the bus.
+
+    The earliest, which is no such time any more, and the latest [monotonic ns].
+    """
+    return now_ns - _PLAUSIBLE_NS, now_ns + _AHEAD_NS
 
 
 def broken_link(channel: str, error: Exception) -> LinkError:

@@ -1,3 +1,5 @@
+import contextlib
+import ctypes
 import errno
 import socket
 import struct
@@ -9,7 +11,8 @@ import pytest
 from acquisition.errors import LinkError, LinkFullError
 from tests.fakes.stepped import SteppedClock
 from tests.wam.bus.test_link import ScriptedBus, message
-from wam.bus import doors
+from wam.bus import datagrams, doors
+from wam.bus.datagrams import AT_ONCE, system_call
 from wam.bus.doors import PythonCanDoor, open_door
 from wam.bus.kernel_door import (
     AdapterClock,
@@ -39,27 +42,70 @@ class Apart(SteppedClock):
 def pair():
     """A door, and the far end of the datagrams that it takes for a bus."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-    door = KernelDoor(near, "can0", SteppedClock())
+    door = KernelDoor(near, "can0", SteppedClock(), system_call())
     yield door, far
     door.close()
     far.close()
 
 
+def ancillary(kind, data, level=socket.SOL_SOCKET):
+    part = struct.pack("@Nii", 16 + len(data), level, kind) + data
+    return part + bytes(-len(part) % 8)
+
+
 def stamps(software_ns=0, hardware_ns=0):
     parts = (*divmod(software_ns, NS_PER_S), 0, 0, *divmod(hardware_ns, NS_PER_S))
-    return socket.SOL_SOCKET, 37, struct.pack("@6q", *parts)
+    return ancillary(37, struct.pack("@6q", *parts))
 
 
 def lost(total):
-    return socket.SOL_SOCKET, 40, struct.pack("=I", total)
+    return ancillary(40, struct.pack("=I", total))
 
 
-class ScriptedSocket:
-    """Gives out (frame, ancillary data) and raises what stands between them."""
+class ScriptedCalls:
+    """recvmmsg(2) of a script: (frame, ancillary bytes), errors between them.
+
+    It writes what it gives out into the caller's memory, as the kernel does.
+    """
 
     def __init__(self, *script):
         self.script = list(script)
-        self.waiting = 0
+        self.calls = 0
+
+    def __call__(self, descriptor, headers, room, flags, timeout):
+        assert flags == socket.MSG_DONTWAIT
+        assert timeout is None
+        self.calls += 1
+        given = 0
+        while self.script and given < room:
+            if isinstance(self.script[0], Exception):
+                break
+            self._give(headers.value + 64 * given, *self.script.pop(0))
+            given += 1
+        if given:
+            return given
+        error = self.script.pop(0) if self.script else BlockingIOError(errno.EAGAIN)
+        ctypes.set_errno(error.errno or error.args[0])
+        return -1
+
+    @staticmethod
+    def _give(header, frame, ancillary):
+        fields = struct.unpack("@PIPNPNi0P", ctypes.string_at(header, 56))
+        _, _, places, _, control, control_room, _ = fields
+        assert control_room == 128  # the last call's sizes are gone
+        place, room = struct.unpack("@PN", ctypes.string_at(places, 16))
+        size = min(len(frame), room)
+        ctypes.memmove(place, frame, size)
+        ctypes.memmove(control, ancillary, len(ancillary))
+        ctypes.memmove(header + 40, struct.pack("@N", len(ancillary)), 8)
+        ctypes.memmove(header + 56, struct.pack("@I", size), 4)
+
+
+class OldSocket:
+    """A socket without options."""
+
+    def fileno(self):
+        return -1
 
     def setblocking(self, flag):
         pass
@@ -70,19 +116,10 @@ class ScriptedSocket:
     def getsockopt(self, *option):
         raise OSError(errno.ENOPROTOOPT, "of an old kernel")
 
-    def recvmsg_into(self, buffers, room):
-        if not self.script:
-            raise BlockingIOError(errno.EAGAIN, "nothing")
-        step = self.script.pop(0)
-        if isinstance(step, Exception):
-            raise step
-        frame, ancillary = step
-        buffers[0][: len(frame)] = frame
-        return len(frame), ancillary, 0, ("can0",)
-
 
 def scripted(*script, clock=None):
-    return KernelDoor(ScriptedSocket(*script), "can0", clock or Apart())
+    calls = ScriptedCalls(*script)
+    return KernelDoor(OldSocket(), "can0", clock or Apart(), calls)
 
 
 def test_what_is_sent_is_a_can_frame_of_linux(pair):
@@ -133,8 +170,8 @@ def test_a_link_sorts_what_the_kernel_hands_out(pair):
 
 def test_a_flood_of_error_frames_is_sorted_once_and_hides_no_frame():
     heard = []
-    flood = [(can_frame(0x20000088, bytes(8)), [])] * 200
-    link = CanLink(scripted(*flood, (can_frame(0x426, b"\x07"), [])), heard.append)
+    flood = [(can_frame(0x20000088, bytes(8)), b"")] * 200
+    link = CanLink(scripted(*flood, (can_frame(0x426, b"\x07"), b"")), heard.append)
     assert [frame.can_id for frame in link.receive()] == [0x426]
     assert link.errors.frames == 200
     assert [[can_id for can_id, _, _ in frames] for frames in heard] == [[0x426]]
@@ -183,7 +220,7 @@ def flood(door):
 
 
 def test_a_flood_does_not_hold_the_reader():
-    arrived = (can_frame(0x426, b"\x07"), [])
+    arrived = (can_frame(0x426, b"\x07"), b"")
     door = scripted(*[arrived] * 2000)
     assert 0 < len(door.receive()) < 1000
 
@@ -192,7 +229,7 @@ def test_a_flood_does_not_hold_the_reader():
 def test_what_came_before_an_error_is_not_lost_and_the_error_neither(make):
     if make == "kernel":
         down = OSError(errno.ENETDOWN, "Network is down")
-        door = scripted((can_frame(0x426, b"\x07"), []), down)
+        door = scripted((can_frame(0x426, b"\x07"), b""), down)
     else:
         bus = ScriptedBus([message(0x426)])
         down = can.CanOperationError("Network is down", errno.ENETDOWN)
@@ -214,7 +251,7 @@ def breaking(bus, error):
 
 
 def test_frames_lost_on_the_socket_are_counted():
-    door = scripted((can_frame(1), []), (can_frame(2), [lost(7)]), (can_frame(3), []))
+    door = scripted((can_frame(1), b""), (can_frame(2), lost(7)), (can_frame(3), b""))
     assert door.lost == 0
     door.receive()
     assert door.lost == 7
@@ -224,16 +261,91 @@ def test_frames_lost_on_the_socket_are_counted():
 def test_the_kernels_stamp_is_of_the_hosts_clock():
     clock = Apart()
     door = scripted(
-        (can_frame(1), [stamps(clock.utc_ns() - 3 * MS)]),
-        (can_frame(2), []),
-        (can_frame(3), [stamps()]),
-        (can_frame(4), [(1, 37, b"short")]),
-        (can_frame(5), [stamps(clock.utc_ns() + NS_PER_S)]),  # the future
-        (can_frame(6), [stamps(clock.utc_ns() - 60 * NS_PER_S)]),
+        (can_frame(1), stamps(clock.utc_ns() - 3 * MS)),
+        (can_frame(2), b""),
+        (can_frame(3), stamps()),
+        (can_frame(4), ancillary(37, b"short")),
+        (can_frame(5), stamps(clock.utc_ns() + NS_PER_S)),  # the future
+        (can_frame(6), stamps(clock.utc_ns() - 60 * NS_PER_S)),
         clock=clock,
     )
     assert [f.t_ns for f in door.receive()] == [clock.t_ns - 3 * MS, 0, 0, 0, 0, 0]
     assert door.name == "kernel socket"
+
+
+def test_a_stamp_and_a_count_of_lost_frames_come_together():
+    clock = Apart()
+    door = scripted(
+        (can_frame(1), stamps(clock.utc_ns() - 3 * MS) + lost(9)),
+        (can_frame(2), lost(11) + stamps(clock.utc_ns() - 2 * MS)),
+        clock=clock,
+    )
+    ages = [clock.t_ns - frame.t_ns for frame in door.receive()]
+    assert (ages, door.lost) == ([3 * MS, 2 * MS], 11)
+
+
+@pytest.mark.parametrize(
+    "damaged",
+    [
+        struct.pack("@Nii", 0, socket.SOL_SOCKET, 37) + bytes(48),
+        struct.pack("@Nii", 2**63, socket.SOL_SOCKET, 40) + bytes(48),
+        struct.pack("@Nii", 100, socket.SOL_SOCKET, 40) + bytes(8),
+        ancillary(40, bytes(4), level=socket.IPPROTO_UDP),
+        ancillary(40, bytes(3)),
+        bytes(7),
+        bytes(128),
+    ],
+)
+def test_ancillary_data_of_another_kind_says_nothing(damaged):
+    door = scripted((can_frame(1, b"\x07"), damaged), (can_frame(2), b""))
+    frames = [(f.can_id, f.data, f.t_ns) for f in door.receive()]
+    assert frames == [(1, b"\x07", 0), (2, b"", 0)]
+    assert door.lost == 0
+
+
+def test_more_frames_than_one_call_takes_keep_their_order(pair):
+    door, far = pair
+    far.setblocking(False)
+    sent = []
+    with contextlib.suppress(BlockingIOError):  # where few may wait
+        for number in range(100):
+            far.send(can_frame(0x426, bytes([number])))
+            sent.append(number)
+    arrived = []
+    while frames := door.receive():
+        arrived += [frame.data[0] for frame in frames]
+    assert arrived == sent
+
+
+def test_an_error_behind_a_full_call_is_not_lost():
+    down = OSError(errno.ENETDOWN, "Network is down")
+    frames = [(can_frame(i), b"") for i in range(AT_ONCE)]
+    door = scripted(*frames, down, (can_frame(77), b""))
+    assert [frame.can_id for frame in door.receive()] == list(range(AT_ONCE))
+    with pytest.raises(LinkError, match="Network is down"):
+        door.receive()
+    assert [frame.can_id for frame in door.receive()] == [77]
+
+
+def test_a_call_that_took_all_there_is_is_not_followed_by_another():
+    calls = ScriptedCalls(*[(can_frame(i), b"") for i in range(9)])
+    door = KernelDoor(OldSocket(), "can0", Apart(), calls)
+    assert len(door.receive()) == 9
+    assert calls.calls == 1
+
+
+def test_a_door_that_is_closed_reads_nobody_elses_socket(pair):
+    door, far = pair
+    far.send(can_frame(0x426))
+    door.close()
+    with pytest.raises(LinkError):
+        door.receive()
+
+
+def test_a_c_library_without_the_call_is_told(monkeypatch):
+    monkeypatch.setattr(datagrams.ctypes, "CDLL", lambda *_, **__: object())
+    with pytest.raises(OSError, match="recvmmsg"):
+        system_call()
 
 
 def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
@@ -241,7 +353,7 @@ def test_the_adapters_own_stamps_keep_the_distances_of_the_frames():
     utc_ns, own_ns = clock.utc_ns() - 10 * MS, 77 * MS  # it counts from its start
     delays = (900_000, 200_000, 1_500_000, 200_000)
     rows = [
-        (can_frame(i), [stamps(utc_ns + i * MS + delay, own_ns + i * MS)])
+        (can_frame(i), stamps(utc_ns + i * MS + delay, own_ns + i * MS))
         for i, delay in enumerate(delays)
     ]
     door = scripted(*rows, clock=clock)
