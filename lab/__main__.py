@@ -8,11 +8,12 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 from acquisition import NS_PER_S, SystemClock
 from lab import initramfs, report, timer_rate
-from lab.follower import Follower
+from lab.follower import PANICKED, Follower
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import Kernel, fetch_kernel
 from lab.machine import (
@@ -168,7 +169,41 @@ def run_machines(
 def run_machine(
     scenarios: Sequence[Scenario], cache: Path, *, is_shown: bool
 ) -> list[ScenarioResult]:
-    """Boot, run scenarios in turn and return their results.
+    """Run scenarios in turn and return their results; boot again after a panic.
+
+    No program of a user can make a kernel panic; the emulator does so now and then.
+    The scenario that it panics in is repeated once, and its result says so.
+
+    Args:
+        scenarios: what to run.
+        cache: where the kernel is kept.
+        is_shown: the machine's own output is printed, too.
+    """
+    results: list[ScenarioResult] = []
+    repeated: set[str] = set()
+    left = list(scenarios)
+    while left:
+        came = boot(left, cache, is_shown=is_shown)
+        lost = came[-1]
+        if lost.reason != PANICKED or lost.name in repeated:
+            results += came
+            break
+        repeated.add(lost.name)
+        results += came[:-1]
+        done = {result.name for result in results}
+        left = [scenario for scenario in left if scenario.name not in done]
+    return [
+        replace(result, figures={**result.figures, "repeated": PANICKED})
+        if result.name in repeated
+        else result
+        for result in results
+    ]
+
+
+def boot(
+    scenarios: Sequence[Scenario], cache: Path, *, is_shown: bool
+) -> list[ScenarioResult]:
+    """Boot, run scenarios in turn and return their results, at least one.
 
     Args:
         scenarios: what to run.

@@ -22,6 +22,8 @@ from lab.results import (
 # begins, and for each. A machine that a busy host gives less of it does not hang.
 BOOT_LIMIT = 300.0
 LIMIT = 1500.0
+PANICKED = "the machine's kernel panicked in it"
+_LAST_WORDS = 100  # lines of a machine that is lost; an oops has 60
 _STANDS_STILL = 0.02  # share of the time, below which a machine does nothing at all
 _CLOCK = SystemClock()
 
@@ -67,8 +69,9 @@ class Follower:
             self._own.append("[the time limit ended the machine]")
         done = {result.name for result in self._results}
         if not (self._is_over and done >= set(names)):
-            words = "\n".join(self._own[-40:])
-            reason = "the machine ended or hung in it"
+            words = "\n".join(self._own[-_LAST_WORDS:])
+            has_panicked = "Kernel panic" in words
+            reason = PANICKED if has_panicked else "the machine ended or hung in it"
             lost = ScenarioResult(self._running, Verdict.HUNG, 0.0, {}, reason, words)
             self._add(lost)
         return self._results

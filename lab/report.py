@@ -26,7 +26,8 @@ _FIGURES = """
 how many of 100 exchanges were incomplete. `cycles`, `missed`, `gap`: cycles of the kept
 trials, those whose time passed without one, the longest time between two. A trial is
 counted only where `traction verify` accepts it. Where a fault of docs/faults.md is
-raised, the exit code is the one that this page promises for the phase.
+raised, the exit code is the one that this page promises for the phase. `repeated`: the
+emulated kernel had panicked in the scenario, which was then run once more.
 """
 _NOT_SHOWN = """
 ## Not covered

@@ -3,11 +3,12 @@
 import pytest
 
 from lab import __main__ as program
+from lab.follower import PANICKED
 from lab.guest.scenarios.registry import ALL, Scenario, chosen
 from lab.kernel import Kernel, image_package
 from lab.machine import SLOWNESS, Sockets, command
 from lab.requirements import LabError, install_line, missing_packages
-from lab.results import TimerAddresses, to_line
+from lab.results import ScenarioResult, TimerAddresses, Verdict, to_line
 
 
 def test_what_is_missing_is_named_once_as_a_package():
@@ -126,3 +127,62 @@ def test_machines_take_equal_weights():
     parts = program.shares(weighed(1, 7, 2, 4, 6), 2)
     assert sorted(sum(one.weight for one in part) for part in parts) == [10, 10]
     assert parts[0][0].weight == 7
+
+
+class Boots:
+    """Stands for `boot`: one list of (name, verdict, reason) for each start."""
+
+    def __init__(self, *starts):
+        self._starts = list(starts)
+        self.asked = []
+
+    def __call__(self, scenarios, cache, *, is_shown):
+        self.asked.append([scenario.name for scenario in scenarios])
+        return [
+            ScenarioResult(name, verdict, 1.0, {}, reason)
+            for name, verdict, reason in self._starts.pop(0)
+        ]
+
+
+def fine(name):
+    return name, Verdict.PASSED, ""
+
+
+def panicked(name):
+    return name, Verdict.HUNG, PANICKED
+
+
+def run(monkeypatch, boots, count=3):
+    monkeypatch.setattr(program, "boot", boots)
+    return program.run_machine(ALL[:count], program.CACHE, is_shown=False)
+
+
+def test_a_machine_that_panics_boots_again_for_what_is_left(monkeypatch):
+    first, second, third = (scenario.name for scenario in ALL[:3])
+    boots = Boots([fine(first), panicked(second)], [fine(second), fine(third)])
+    results = run(monkeypatch, boots)
+    assert boots.asked == [[first, second, third], [second, third]]
+    assert [result.name for result in results] == [first, second, third]
+    assert [result.verdict for result in results] == [Verdict.PASSED] * 3
+    assert [result.figures for result in results] == [{}, {"repeated": PANICKED}, {}]
+
+
+def test_a_panic_that_comes_again_is_a_failure(monkeypatch):
+    first, second = (scenario.name for scenario in ALL[:2])
+    boots = Boots([fine(first), panicked(second)], [panicked(second)])
+    results = run(monkeypatch, boots)
+    assert [result.verdict for result in results] == [Verdict.PASSED, Verdict.HUNG]
+
+
+def test_a_machine_that_hangs_without_a_panic_does_not_boot_again(monkeypatch):
+    first, second, _ = (scenario.name for scenario in ALL[:3])
+    boots = Boots([fine(first), (second, Verdict.HUNG, "the machine hung")])
+    assert len(run(monkeypatch, boots)) == 2
+    assert len(boots.asked) == 1
+
+
+def test_a_panic_while_it_boots_is_repeated_once(monkeypatch):
+    boots = Boots([panicked("boot")], [panicked("boot")])
+    (lost,) = run(monkeypatch, boots)
+    assert lost.verdict is Verdict.HUNG
+    assert len(boots.asked) == 2

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from lab.follower import LIMIT, Follower
+from lab.follower import LIMIT, PANICKED, Follower
 from lab.results import (
     Begun,
     Finished,
@@ -65,7 +65,7 @@ def test_the_scenario_in_which_a_machine_is_lost_is_named(is_hanging):
 def test_a_machine_that_never_boots_is_lost_in_its_boot():
     (lost,) = follow(Tape("Kernel panic"), "bench")
     assert (lost.name, lost.verdict) == ("boot", Verdict.HUNG)
-    assert "panic" in lost.output
+    assert (lost.reason, lost.output) == (PANICKED, "Kernel panic")
 
 
 def test_a_machine_that_leaves_scenarios_out_is_not_taken_for_complete():
