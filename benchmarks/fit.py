@@ -1,7 +1,8 @@
 """What fits cost, beside scikit-learn and 20-start least squares in the same run.
 
 Equal numbers of starts, one linear-algebra thread each, parts alternating, so that
-whatever else the machine does meets all of them. Medians over rounds.
+whatever else the machine does meets all of them. Medians over rounds. All sides keep
+memory between fits, as a study's workers do.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
+from analysis.study.jobs import keep_memory
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks import beside_gpy, beside_tinygp
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs
@@ -165,6 +167,7 @@ def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
 
 def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
+    keep_memory()
     with threadpool_limits(1):
         found = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
         rivals = [
@@ -228,6 +231,7 @@ def main() -> None:
         help="share of the folds that scikit-learn fits too, drawn at random",
     )
     arguments = parser.parse_args()
+    keep_memory()
     with threadpool_limits(1):
         found = [part.measured() for part in parts(arguments.rounds)]
         found.append(
