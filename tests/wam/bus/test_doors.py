@@ -107,6 +107,9 @@ class OldSocket:
     def fileno(self):
         return -1
 
+    def send(self, frame):
+        raise OSError(errno.EBADF, "no descriptor")
+
     def setblocking(self, flag):
         pass
 
