@@ -55,7 +55,7 @@ def recording_screen(
     """Return what draws trial `trial`, whose `outcome` is kept up to date."""
     loop_client, limits = rig.backend.loop_client, rig.settings.rig.limits
     scales = LiveScales(limits.foot_speed, limits.contact_force)
-    missed_before = loop_client.loop.skipped + loop_client.loop.late
+    skipped_before = loop_client.loop.skipped
 
     def lines(width: int) -> list[str]:
         records = loop_client.last(HISTORY)
@@ -69,7 +69,7 @@ def recording_screen(
             displacement=outcome.displacement,
             travel=rig.frame.travel,
             rate=(len(last_second) - 1) / span if span > 0 else 0.0,
-            missed=loop_client.loop.skipped + loop_client.loop.late - missed_before,
+            missed=loop_client.loop.skipped - skipped_before,
             is_arm_fine=flags & _ALL_MOTORS == _ALL_MOTORS,
             is_sensor_fine=is_sensor_fine,
             traction=np.array(records["traction"]),
