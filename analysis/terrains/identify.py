@@ -36,6 +36,7 @@ from analysis.terrains.verdict import WindowLimits
 from analysis.terrains.windows import WINDOWS
 
 KEPT_PER_SECOND = 100  # kept samples of a second of motion
+_SCORES_HERE = 200  # of a trial by an expert, 12 ms each; processes need 2 s to start
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +267,9 @@ def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEviden
         if name in experts.get(k, {}) and len(experts[k]) > 1 and trial.kept
     ]
     scored: dict[str, list[TrialEvidence]] = {}
-    done = run_tasks(run_score, tasks, study.options.n_jobs)
+    scores = sum(len(task.experts) for task in tasks)
+    workers = study.options.n_jobs if scores > _SCORES_HERE else 1
+    done = run_tasks(run_score, tasks, workers)
     for task, evidence in zip(tasks, done, strict=True):
         scored.setdefault(task.trial.terrain, []).append(evidence)
     return StudyEvidence(scored, groups_of(study.kinds)["surface"])
