@@ -53,9 +53,9 @@ class Moments(NamedTuple):
         log_v = problem.log_v
         width = max(_BIN, float(np.ptp(log_v)) / _MOST_BINS)
         index = np.floor((log_v - log_v.min()) / width).astype(np.intp)
-        used, index = np.unique(index, return_inverse=True)
-        static = problem.F_n if problem.is_proportional else np.ones(log_v.size)
-        columns = (problem.F_n, static, problem.v_t, problem.F_t)
+        filled = np.bincount(index) > 0
+        used, index = np.flatnonzero(filled), (np.cumsum(filled) - 1)[index]
+        columns = (problem.F_n, problem.static, problem.v_t, problem.F_t)
         trial = np.repeat(np.arange(len(lengths)), lengths)
         place, size = trial * used.size + index, len(lengths) * used.size
         sums = [
@@ -90,8 +90,8 @@ def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Arr
         gram[part] = _gram(sums if sums.ndim == 2 else sums[part], v, q[part])
     G, c, yy = gram[:, :3, :3], gram[:, :3, 3], gram[:, 3, 3]
     p = solve_in_box(G, c, box.lower, box.upper)
-    quadratic = np.einsum("gi,gij,gj->g", p, G, p)
-    return p, yy - 2.0 * np.einsum("gi,gi->g", c, p) + quadratic
+    G_p = (G @ p[:, :, None])[:, :, 0]
+    return p, yy + (p * (G_p - 2.0 * c)).sum(axis=1)
 
 
 def _gram(sums: Array, v: Array, q: Array) -> Array:
@@ -165,12 +165,11 @@ def _profile(
     return float(inside.min()), float(inside.max())
 
 
-def search(problem: Problem) -> list[Point]:
+def search(problem: Problem, moments: Moments) -> list[Point]:
     """Return the local optima that the best cells of a grid lead to, best first.
 
     The grid is refined by the moments; the samples polish what is apart by then.
     """
-    moments = Moments.of(problem, (problem.F_t.size,))
     box, sums = problem.box, moments.sums[0]
     low, high = box.logarithmic.T
 
@@ -209,14 +208,14 @@ _MAD_TO_SD = 1.4826  # of a normal
 _ROUNDS = 5
 
 
-def search_robustly(problem: Problem, loss: Loss) -> tuple[Problem, list[Point]]:
-    """Return the reweighted problem and its optima, best first.
+def weighted(problem: Problem, loss: Loss) -> Problem:
+    """Return the problem with the weights of a robust loss.
 
     The scale is 1.4826 times the median absolute residual. Every round refreshes scale
-    and weights and polishes from the last optimum; the last round searches the whole
-    grid again, so that the optimum is one of the weighted problem.
+    and weights and polishes from the last optimum. The result is to be searched as a
+    whole again, so that its optimum is one of the weighted problem.
     """
-    point = search(problem)[0]
+    point = search(problem, Moments.of(problem, (problem.F_t.size,)))[0]
     for _ in range(_ROUNDS):
         residual = problem.residual(point)
         scale = _MAD_TO_SD * float(np.median(np.abs(residual)))
@@ -224,7 +223,7 @@ def search_robustly(problem: Problem, loss: Loss) -> tuple[Problem, list[Point]]
             break
         problem = problem.reweighted(weigh(residual / scale, loss))
         point = polish(problem, point.q)
-    return problem, search(problem)
+    return problem
 
 
 def weigh(z: Array, loss: Loss) -> Array:
