@@ -28,7 +28,7 @@ _MOST_BINS = 300
 _CHI2_95 = 3.841458820694124  # of one degree of freedom
 _GRID = (16, 14)  # points over log v_s and log delta_s
 _POLISHED = 4  # starting cells, no two of them neighbours
-_BLOCK = 64  # points at a time: what belongs to them stays in the cache
+_BLOCK = 128  # points at a time: what belongs to them stays in the cache
 _ZOOMS = 8  # every one halves the step
 _STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
 _APART = 0.05  # of q, below which two points lead to the same optimum
@@ -70,6 +70,9 @@ class Moments(NamedTuple):
 
 # (0, 0) is F_n F_n, (0, 3) F_n F_t and so on
 _PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
+_PLACES = np.array(  # of the products in a symmetric matrix
+    [[_PAIRS.index((min(a, b), max(a, b))) for b in range(4)] for a in range(4)]
+)
 
 
 def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Array]:
@@ -90,28 +93,36 @@ def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Arr
         gram[part] = _gram(sums if sums.ndim == 2 else sums[part], v, q[part])
     G, c, yy = gram[:, :3, :3], gram[:, :3, 3], gram[:, 3, 3]
     p = solve_in_box(G, c, box.lower, box.upper)
-    G_p = (G @ p[:, :, None])[:, :, 0]
-    return p, yy + (p * (G_p - 2.0 * c)).sum(axis=1)
+    quadratic = np.einsum("gij,gj->gi", G, p)
+    return p, yy + np.einsum("gi,gi->g", p, quadratic - 2.0 * c)
 
 
 def _gram(sums: Array, v: Array, q: Array) -> Array:
     """Return the products of columns and output at every q, shape (g, 4, 4)."""
-    power = np.exp(q[:, 1:]) * (np.log(v) - q[:, :1])
-    e = np.exp(-np.exp(np.minimum(power, LARGEST_LOG_POWER)))
+    e = np.log(v) - q[:, :1]
+    e *= np.exp(q[:, 1:])
+    e = np.exp(np.minimum(e, LARGEST_LOG_POWER, out=e), out=e)
+    e = np.exp(np.negative(e, out=e), out=e)
     rest = 1.0 - e
-    weights = {(0, 0): rest * rest, (0, 1): rest * e, (1, 1): e * e}
-    weights |= {(0, 2): rest, (0, 3): rest, (1, 2): e, (1, 3): e}
-    gram = np.empty((q.shape[0], 4, 4))
-    for k, (a, b) in enumerate(_PAIRS):
-        column, weight = sums[..., k], weights.get((a, b))
-        if weight is None:
-            value = column.sum(axis=-1)
-        elif sums.ndim == 2:
-            value = weight @ column
-        else:
-            value = np.einsum("gk,gk->g", weight, column)
-        gram[:, a, b] = gram[:, b, a] = value
-    return gram
+    parts = [
+        (rest * rest, slice(0, 1)),
+        (rest * e, slice(1, 2)),
+        (rest, slice(2, 4)),
+        (e * e, slice(4, 5)),
+        (e, slice(5, 7)),
+    ]
+    products = np.empty((q.shape[0], len(_PAIRS)))
+    for weight, columns in parts:
+        products[:, columns] = _weighted(weight, sums[..., columns])
+    products[:, 7:] = sums[..., 7:].sum(axis=-2)
+    return products[:, _PLACES]
+
+
+def _weighted(weight: Array, columns: Array) -> Array:
+    """Return columns of moments summed over the bins, weight (g, k), shape (g, m)."""
+    if columns.ndim == 2:
+        return weight @ columns
+    return (weight[:, None, :] @ columns)[:, 0]
 
 
 def zoom(
@@ -191,8 +202,8 @@ def search(problem: Problem, moments: Moments) -> list[Point]:
 def _promising(grid: Array, sse: Array) -> Array:
     """Return the best cells of a grid that are not neighbours, shape (4, 2)."""
     taken: list[tuple[int, int]] = []
-    for flat in np.argsort(sse, axis=None):
-        i, j = (int(k) for k in np.unravel_index(flat, sse.shape))
+    for flat in np.argsort(sse, axis=None).tolist():
+        i, j = divmod(flat, sse.shape[1])
         if all(max(abs(i - a), abs(j - b)) > 1 for a, b in taken):
             taken.append((i, j))
         if len(taken) == _POLISHED:

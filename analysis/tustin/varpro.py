@@ -7,6 +7,7 @@ exact first and second derivatives. `moments` finds where to begin.
 """
 
 from collections.abc import Sequence
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -196,8 +197,9 @@ def _step(around: Expansion, bounds: Array, reach: float) -> tuple[Array, float]
     Where the SSE is not bent upwards, the parabola is bent up just enough.
     """
     slope, q = around.slope, around.point.q
-    bends = np.linalg.eigvalsh(around.bend)
-    lift = max(0.0, _FLAT * float(np.abs(bends).max()) - float(bends[0]))
+    (first, mixed), (_, second) = around.bend.tolist()
+    middle, spread = 0.5 * (first + second), hypot(0.5 * (first - second), mixed)
+    lift = max(0.0, _FLAT * (abs(middle) + spread) - (middle - spread))
     G = np.eye(3)  # the third parameter is at 0 and stays there
     G[:2, :2] = 0.5 * (around.bend + lift * np.eye(2))
     low, high = np.zeros((2, 3))
