@@ -31,6 +31,7 @@ _POLISHED = 4  # starting cells, no two of them neighbours
 _BLOCK = 128  # points at a time: what belongs to them stays in the cache
 _ZOOMS = 8  # every one halves the step
 _STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
+_STEEP = 100  # points along the largest exponent
 _APART = 0.05  # of q, below which two points lead to the same optimum
 _POINTS, _ACROSS = 25, 24  # of a profile: along it, and minimised over
 
@@ -179,7 +180,8 @@ def _profile(
 def search(problem: Problem, moments: Moments) -> list[Point]:
     """Return the local optima that the best cells of a grid lead to, best first.
 
-    The grid is refined by the moments; the samples polish what is apart by then.
+    A further start is the best of the steepest curves. Starts are refined by the
+    moments; the samples polish what is apart by then.
     """
     box, sums = problem.box, moments.sums[0]
     low, high = box.logarithmic.T
@@ -191,12 +193,26 @@ def search(problem: Problem, moments: Moments) -> list[Point]:
     axes = [np.linspace(*ends) for ends in zip(low, high, _GRID, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     step = (high - low) / (np.array(_GRID) - 1.0)
-    refined = zoom(sse, _promising(grid, sse(grid)), 0.5 * step, box.logarithmic)
+    steep = _steepest(moments.v, box)
+    starts = [*_promising(grid, sse(grid)), steep[np.argmin(sse(steep))]]
+    refined = zoom(sse, np.array(starts), 0.5 * step, box.logarithmic)
     optima: list[Point] = []
     for q in refined:
         if all(np.abs(q - known.q).max() > _APART for known in optima):
             optima.append(polish(problem, q, optima))
     return sorted(optima, key=lambda point: point.sse)
+
+
+def _steepest(v: Array, box: Box) -> Array:
+    """Return points of the largest exponent, closer than a grid's, shape (100, 2).
+
+    Curves that are almost a step have optima narrower than the cells of a grid, and
+    only where there are samples.
+    """
+    (low, high), (_, top) = box.logarithmic
+    first, last = np.clip(np.log(v[[0, -1]]), low, high)
+    along = np.linspace(first, last, _STEEP)
+    return np.column_stack([along, np.full(_STEEP, top)])
 
 
 def _promising(grid: Array, sse: Array) -> Array:

@@ -162,8 +162,7 @@ def _second(lever: Array, z: Array, log_z: Array, delta: float) -> Array:
 def polish(problem: Problem, start: Array, known: Sequence[Point] = ()) -> Point:
     """Return the local optimum reached from `start` = (log v_s, log delta_s).
 
-    Newton's method; a step ends at the box or where the last ones kept what they
-    promised.
+    Newton's method; steps are as long as the last ones kept what they promised.
 
     Args:
         problem: samples and box.
@@ -183,7 +182,8 @@ def polish(problem: Problem, start: Array, known: Sequence[Point] = ()) -> Point
         gain = here.point.sse - there.point.sse
         length = float(np.abs(step).max())
         if gain < _POOR * promised:
-            reach = _POOR * length
+            reach = 0.5 * length
+            here = _taught(here, step, there.slope)
         elif gain > _GOOD * promised:
             reach = max(reach, 2.0 * length)
         if gain > 0.0:
@@ -208,6 +208,19 @@ def _step(around: Expansion, bounds: Array, reach: float) -> tuple[Array, float]
     c = np.array([-0.5 * slope[0], -0.5 * slope[1], 0.0])
     step = solve_in_box(G, c, low, high)
     return step[:2], float(2.0 * c @ step - step @ G @ step)
+
+
+def _taught(here: Expansion, step: Array, slope: Array) -> Expansion:
+    """Return an expansion with the slope that was met at the end of a poor step.
+
+    Where a p comes to its bound the second derivatives jump; those of one side alone
+    lead across again and again. Symmetric update of rank one.
+    """
+    missing = slope - here.slope - here.bend @ step
+    along = float(missing @ step)
+    if abs(along) < _FLAT * float(np.abs(missing).max() * np.abs(step).max()):
+        return here
+    return here._replace(bend=here.bend + np.outer(missing, missing) / along)
 
 
 def _is_known(point: Point, known: Sequence[Point]) -> bool:

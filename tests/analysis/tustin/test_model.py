@@ -156,6 +156,18 @@ def test_no_start_of_an_independent_solver_does_better(stones):
     assert ours <= best * (1 + 1e-6)
 
 
+def test_no_step_at_another_velocity_does_better():
+    rng = np.random.default_rng(119)
+    F_n, v = rng.uniform(2, 10, 60), np.exp(rng.uniform(-5.3, -1.6, 60))
+    step = TustinParameters(mu=0.6, F_s=9.0, v_s=0.04, delta_s=20.0, b=6.0)
+    F_t = predict(step, F_n, v) + rng.normal(0, 2.0, 60)
+    problem = Problem((F_n, v, F_t), TustinBounds().box())
+    # an optimum is 1/20 wide, a cell of the grid 0.46
+    steps = [np.array([x, np.log(20.0)]) for x in np.linspace(-5.3, -1.6, 400)]
+    best = min(problem.project(q).point.sse for q in steps)
+    assert fit_tustin(F_n, v, F_t).sse <= best
+
+
 def test_flags_say_that_a_parameter_lies_on_its_bound(stones):
     box = TustinBounds(v_s=(0.05, 1.0))
     fit = fit_tustin(stones.F_n, stones.v_t, stones.F_t, box)
