@@ -2,20 +2,24 @@
 
 With Gram matrix G = A'A and c = A'y the sum of squares is y'y - 2 c'p + p'Gp, a convex
 quadratic. Where its stationary point lies in the box, that is the minimum. Otherwise
-every parameter is free, at its lower or at its upper bound: 27 cases, each a 3x3 linear
-system. Every case is solved, clipped into the box and scored; the best score is the
-minimum, because the true one is among the cases and none can be below it.
+the minimum lies on one of the bounds that the stationary point violates: from a point
+inside all of those the cost would still fall on the way to the stationary point. With
+one parameter held at such a bound the same holds of the two others. So one of the six
+orders in which parameters are held, each where its violated bound is, leads to the
+minimum; every order gives a point of the box, and the best of them is taken.
 """
 
-from itertools import product
+from itertools import permutations
 
 import numpy as np
 
 from analysis.data import Array
 
-RIDGE = 1e-12  # relative; keeps collinear columns solvable
-_FREE = 0
-_CASES = np.array(list(product((_FREE, -1, 1), repeat=3)))  # (27, 3)
+# relative; keeps collinear columns solvable. The tiny part does that for zero ones
+_RIDGE = 1.0 + 1e-12 * np.eye(3)
+_TINY = np.finfo(np.float64).tiny * np.eye(3)
+_ORDERS = np.array(list(permutations(range(3))))  # (6, 3)
+_PLACES = np.argsort(_ORDERS, axis=1)  # where each parameter is in an order
 
 
 def solve_in_box(G: Array, c: Array, lower: Array, upper: Array) -> Array:
@@ -30,46 +34,55 @@ def solve_in_box(G: Array, c: Array, lower: Array, upper: Array) -> Array:
     Returns:
         Parameters, shape (..., 3).
     """
-    scale = np.sqrt(np.einsum("...ii->...i", G))
-    scale = np.where(scale > 0, scale, 1.0)
-    scaled = G / (scale[..., :, None] * scale[..., None, :]) + RIDGE * np.eye(3)
-    right = c / scale
-    free = np.linalg.solve(scaled, right[..., None])[..., 0] / scale
-    is_outside = ((free < lower) | (free > upper)).any(axis=-1)
-    # the cost is convex: a stationary point inside the box is its minimum
+    ridged = G * _RIDGE + _TINY
+    p = _stationary(ridged, c)
+    is_outside = ((p < lower) | (p > upper)).any(axis=-1)
     if is_outside.any():
-        free[is_outside] = _on_the_edge(
-            (G[is_outside], c[is_outside]),
-            (scaled[is_outside], right[is_outside]),
-            scale[is_outside],
-            (lower, upper),
+        held = np.minimum(np.maximum(p[is_outside], lower), upper)
+        p[is_outside] = _on_a_bound(
+            ridged[is_outside], c[is_outside], held, (lower, upper)
         )
-    return free
+    return p
 
 
-def _on_the_edge(
-    plain: tuple[Array, Array],
-    scaled: tuple[Array, Array],
-    scale: Array,
-    box: tuple[Array, Array],
-) -> Array:
-    """Return the best of all 27 cases, shape (..., 3)."""
-    (G, c), (lower, upper) = plain, box
-    candidates = _solve_cases(*scaled, scale, box) / scale[..., None, :]
-    candidates = np.clip(candidates, lower, upper)
-    cost = np.einsum("...ki,...ij,...kj->...k", candidates, G, candidates)
-    cost -= 2.0 * np.einsum("...ki,...i->...k", candidates, c)
-    best = np.argmin(cost, axis=-1)[..., None, None]
-    return np.take_along_axis(candidates, best, axis=-2)[..., 0, :]
+def _stationary(G: Array, c: Array) -> Array:
+    """Return the solution of G p = c, shape (..., 3), by elimination without pivots."""
+    a, b, d = G[..., 0, 0], G[..., 0, 1], G[..., 0, 2]
+    first, second = b / a, d / a
+    e = G[..., 1, 1] - first * b
+    f = G[..., 1, 2] - first * d
+    third = f / e
+    y = c[..., 1] - first * c[..., 0]
+    z = c[..., 2] - second * c[..., 0] - third * y
+    p = np.empty(c.shape)
+    p[..., 2] = r = z / (G[..., 2, 2] - second * d - third * f)
+    p[..., 1] = q = (y - f * r) / e
+    p[..., 0] = (c[..., 0] - b * q - d * r) / a
+    return p
 
 
-def _solve_cases(G: Array, c: Array, scale: Array, box: tuple[Array, Array]) -> Array:
-    """Return the stationary point of every case in scaled units, shape (..., 27, 3).
+def _on_a_bound(G: Array, c: Array, held: Array, box: tuple[Array, Array]) -> Array:
+    """Return the minimum where the stationary point is outside, shape (m, 3).
 
-    A parameter at a bound has its equation replaced by p_i = bound.
+    Args:
+        G: Gram matrices, shape (m, 3, 3).
+        c: right-hand sides, shape (m, 3).
+        held: stationary points clipped into the box, shape (m, 3).
+        box: lower and upper bounds.
     """
-    is_free = _CASES == _FREE
-    bound = np.where(_CASES < 0, box[0], box[1]) * scale[..., None, :]
-    system = np.where(is_free[:, :, None], G[..., None, :, :], np.eye(3))
-    right = np.where(is_free, c[..., None, :], bound)
-    return np.linalg.solve(system, right[..., None])[..., 0]
+    i, j, k = _ORDERS.T
+    low, high = box
+    G_jj, G_jk, G_kk = G[:, j, j], G[:, j, k], G[:, k, k]
+    p_i = held[:, i]
+    c_j, c_k = c[:, j] - G[:, i, j] * p_i, c[:, k] - G[:, i, k] * p_i
+    ratio = G_jk / G_kk
+    p_j = (c_j - ratio * c_k) / (G_jj - ratio * G_jk)
+    p_j = np.minimum(np.maximum(p_j, low[j]), high[j])
+    p_k = (c_k - G_jk * p_j) / G_kk
+    p_k = np.minimum(np.maximum(p_k, low[k]), high[k])
+    cost = p_i * (G[:, i, i] * p_i - 2.0 * c[:, i])
+    cost += p_j * (G_jj * p_j + 2.0 * (G_jk * p_k - c_j))
+    cost += p_k * (G_kk * p_k - 2.0 * c_k)
+    best, rows = np.argmin(cost, axis=1), np.arange(c.shape[0])
+    ordered = np.stack([p_i, p_j, p_k], axis=-1)[rows, best]
+    return np.take_along_axis(ordered, _PLACES[best], axis=1)

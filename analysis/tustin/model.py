@@ -19,7 +19,7 @@ from analysis.tustin.moments import (
     Moments,
     profiles,
     search,
-    search_robustly,
+    weighted,
 )
 from analysis.tustin.varpro import Box, Point, Problem, stribeck_power
 
@@ -221,13 +221,12 @@ def fit_tustin(
     problem = Problem(
         (F_n, v_t, F_t), bounds.box(), is_proportional=form.is_proportional
     )
-    if form.loss == "squares":
-        optima = search(problem)
-    else:
-        problem, optima = search_robustly(problem, form.loss)
+    if form.loss != "squares":
+        problem = weighted(problem, form.loss)
+    moments = Moments.of(problem, (F_n.size,))
+    optima = search(problem, moments)
     parameters = parameters_at(optima[0])
     residual = problem.residual(optima[0])
-    moments = Moments.of(problem, (F_n.size,))
     open_intervals = profiles(moments, bounds.box(), optima[0], residual)
     return TustinFit(
         parameters=parameters,

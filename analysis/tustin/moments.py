@@ -28,9 +28,10 @@ _MOST_BINS = 300
 _CHI2_95 = 3.841458820694124  # of one degree of freedom
 _GRID = (16, 14)  # points over log v_s and log delta_s
 _POLISHED = 4  # starting cells, no two of them neighbours
-_BLOCK = 64  # points at a time: what belongs to them stays in the cache
+_BLOCK = 128  # points at a time: what belongs to them stays in the cache
 _ZOOMS = 8  # every one halves the step
 _STAR = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], dtype=float)
+_STEEP = 100  # points along the largest exponent
 _APART = 0.05  # of q, below which two points lead to the same optimum
 _POINTS, _ACROSS = 25, 24  # of a profile: along it, and minimised over
 
@@ -53,9 +54,9 @@ class Moments(NamedTuple):
         log_v = problem.log_v
         width = max(_BIN, float(np.ptp(log_v)) / _MOST_BINS)
         index = np.floor((log_v - log_v.min()) / width).astype(np.intp)
-        used, index = np.unique(index, return_inverse=True)
-        static = problem.F_n if problem.is_proportional else np.ones(log_v.size)
-        columns = (problem.F_n, static, problem.v_t, problem.F_t)
+        filled = np.bincount(index) > 0
+        used, index = np.flatnonzero(filled), (np.cumsum(filled) - 1)[index]
+        columns = (problem.F_n, problem.static, problem.v_t, problem.F_t)
         trial = np.repeat(np.arange(len(lengths)), lengths)
         place, size = trial * used.size + index, len(lengths) * used.size
         sums = [
@@ -70,6 +71,9 @@ class Moments(NamedTuple):
 
 # (0, 0) is F_n F_n, (0, 3) F_n F_t and so on
 _PAIRS = [(a, b) for a in range(4) for b in range(a, 4)]
+_PLACES = np.array(  # of the products in a symmetric matrix
+    [[_PAIRS.index((min(a, b), max(a, b))) for b in range(4)] for a in range(4)]
+)
 
 
 def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Array]:
@@ -90,28 +94,36 @@ def solve_moments(sums: Array, v: Array, q: Array, box: Box) -> tuple[Array, Arr
         gram[part] = _gram(sums if sums.ndim == 2 else sums[part], v, q[part])
     G, c, yy = gram[:, :3, :3], gram[:, :3, 3], gram[:, 3, 3]
     p = solve_in_box(G, c, box.lower, box.upper)
-    quadratic = np.einsum("gi,gij,gj->g", p, G, p)
-    return p, yy - 2.0 * np.einsum("gi,gi->g", c, p) + quadratic
+    quadratic = np.einsum("gij,gj->gi", G, p)
+    return p, yy + np.einsum("gi,gi->g", p, quadratic - 2.0 * c)
 
 
 def _gram(sums: Array, v: Array, q: Array) -> Array:
     """Return the products of columns and output at every q, shape (g, 4, 4)."""
-    power = np.exp(q[:, 1:]) * (np.log(v) - q[:, :1])
-    e = np.exp(-np.exp(np.minimum(power, LARGEST_LOG_POWER)))
+    e = np.log(v) - q[:, :1]
+    e *= np.exp(q[:, 1:])
+    e = np.exp(np.minimum(e, LARGEST_LOG_POWER, out=e), out=e)
+    e = np.exp(np.negative(e, out=e), out=e)
     rest = 1.0 - e
-    weights = {(0, 0): rest * rest, (0, 1): rest * e, (1, 1): e * e}
-    weights |= {(0, 2): rest, (0, 3): rest, (1, 2): e, (1, 3): e}
-    gram = np.empty((q.shape[0], 4, 4))
-    for k, (a, b) in enumerate(_PAIRS):
-        column, weight = sums[..., k], weights.get((a, b))
-        if weight is None:
-            value = column.sum(axis=-1)
-        elif sums.ndim == 2:
-            value = weight @ column
-        else:
-            value = np.einsum("gk,gk->g", weight, column)
-        gram[:, a, b] = gram[:, b, a] = value
-    return gram
+    parts = [
+        (rest * rest, slice(0, 1)),
+        (rest * e, slice(1, 2)),
+        (rest, slice(2, 4)),
+        (e * e, slice(4, 5)),
+        (e, slice(5, 7)),
+    ]
+    products = np.empty((q.shape[0], len(_PAIRS)))
+    for weight, columns in parts:
+        products[:, columns] = _weighted(weight, sums[..., columns])
+    products[:, 7:] = sums[..., 7:].sum(axis=-2)
+    return products[:, _PLACES]
+
+
+def _weighted(weight: Array, columns: Array) -> Array:
+    """Return columns of moments summed over the bins, weight (g, k), shape (g, m)."""
+    if columns.ndim == 2:
+        return weight @ columns
+    return (weight[:, None, :] @ columns)[:, 0]
 
 
 def zoom(
@@ -165,12 +177,12 @@ def _profile(
     return float(inside.min()), float(inside.max())
 
 
-def search(problem: Problem) -> list[Point]:
+def search(problem: Problem, moments: Moments) -> list[Point]:
     """Return the local optima that the best cells of a grid lead to, best first.
 
-    The grid is refined by the moments; the samples polish what is apart by then.
+    A further start is the best of the steepest curves. Starts are refined by the
+    moments; the samples polish what is apart by then.
     """
-    moments = Moments.of(problem, (problem.F_t.size,))
     box, sums = problem.box, moments.sums[0]
     low, high = box.logarithmic.T
 
@@ -181,7 +193,9 @@ def search(problem: Problem) -> list[Point]:
     axes = [np.linspace(*ends) for ends in zip(low, high, _GRID, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     step = (high - low) / (np.array(_GRID) - 1.0)
-    refined = zoom(sse, _promising(grid, sse(grid)), 0.5 * step, box.logarithmic)
+    steep = _steepest(moments.v, box)
+    starts = [*_promising(grid, sse(grid)), steep[np.argmin(sse(steep))]]
+    refined = zoom(sse, np.array(starts), 0.5 * step, box.logarithmic)
     optima: list[Point] = []
     for q in refined:
         if all(np.abs(q - known.q).max() > _APART for known in optima):
@@ -189,11 +203,23 @@ def search(problem: Problem) -> list[Point]:
     return sorted(optima, key=lambda point: point.sse)
 
 
+def _steepest(v: Array, box: Box) -> Array:
+    """Return points of the largest exponent, closer than a grid's, shape (100, 2).
+
+    Curves that are almost a step have optima narrower than the cells of a grid, and
+    only where there are samples.
+    """
+    (low, high), (_, top) = box.logarithmic
+    first, last = np.clip(np.log(v[[0, -1]]), low, high)
+    along = np.linspace(first, last, _STEEP)
+    return np.column_stack([along, np.full(_STEEP, top)])
+
+
 def _promising(grid: Array, sse: Array) -> Array:
     """Return the best cells of a grid that are not neighbours, shape (4, 2)."""
     taken: list[tuple[int, int]] = []
-    for flat in np.argsort(sse, axis=None):
-        i, j = (int(k) for k in np.unravel_index(flat, sse.shape))
+    for flat in np.argsort(sse, axis=None).tolist():
+        i, j = divmod(flat, sse.shape[1])
         if all(max(abs(i - a), abs(j - b)) > 1 for a, b in taken):
             taken.append((i, j))
         if len(taken) == _POLISHED:
@@ -209,14 +235,14 @@ _MAD_TO_SD = 1.4826  # of a normal
 _ROUNDS = 5
 
 
-def search_robustly(problem: Problem, loss: Loss) -> tuple[Problem, list[Point]]:
-    """Return the reweighted problem and its optima, best first.
+def weighted(problem: Problem, loss: Loss) -> Problem:
+    """Return the problem with the weights of a robust loss.
 
     The scale is 1.4826 times the median absolute residual. Every round refreshes scale
-    and weights and polishes from the last optimum; the last round searches the whole
-    grid again, so that the optimum is one of the weighted problem.
+    and weights and polishes from the last optimum. The result is to be searched as a
+    whole again, so that its optimum is one of the weighted problem.
     """
-    point = search(problem)[0]
+    point = search(problem, Moments.of(problem, (problem.F_t.size,)))[0]
     for _ in range(_ROUNDS):
         residual = problem.residual(point)
         scale = _MAD_TO_SD * float(np.median(np.abs(residual)))
@@ -224,7 +250,7 @@ def search_robustly(problem: Problem, loss: Loss) -> tuple[Problem, list[Point]]
             break
         problem = problem.reweighted(weigh(residual / scale, loss))
         point = polish(problem, point.q)
-    return problem, search(problem)
+    return problem
 
 
 def weigh(z: Array, loss: Loss) -> Array:

@@ -79,7 +79,7 @@ def test_sticking_holds_the_larger_of_static_and_sliding_force():
 def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
     case = vectors["tustin"]["profile_at"]
     problem = Problem(samples, TustinBounds().box())
-    point, _ = problem.project(np.log([case["v_s"], case["delta"]]))
+    point = problem.project(np.log([case["v_s"], case["delta"]])).point
     np.testing.assert_allclose(point.p, case["mu_Fs_b"], rtol=1e-8)
     assert point.sse == pytest.approx(case["sse"], rel=1e-12)
 
@@ -88,11 +88,26 @@ def test_linear_parameters_and_error_at_a_given_shape(vectors, samples):
 def test_slope_of_the_search_agrees_with_differences(samples, b_upper):
     problem = Problem(samples, TustinBounds(b=(-200.0, b_upper)).box())
     q, h = np.log([0.05, 1.5]), 1e-5
-    _, slope = problem.project(q)
+    slope = problem.project(q).slope
     for k, step in enumerate(h * np.eye(2)):
-        ahead, behind = problem.project(q + step)[0], problem.project(q - step)[0]
+        ahead, behind = (problem.project(q + s).point for s in (step, -step))
         # central difference: error of order h^2, rounding 1e-15/h
         assert slope[k] == pytest.approx((ahead.sse - behind.sse) / (2 * h), rel=1e-6)
+
+
+@pytest.mark.parametrize("is_proportional", [False, True])
+@pytest.mark.parametrize("b_upper", [200.0, 3.0])
+def test_second_derivatives_agree_with_differences(samples, b_upper, is_proportional):
+    box = TustinBounds(b=(-200.0, b_upper)).box()
+    weights = np.linspace(0.5, 2.0, samples[0].size)
+    problem = Problem(samples, box, is_proportional=is_proportional, weights=weights)
+    q, h = np.log([0.05, 1.5]), 1e-5
+    around = problem.project(q)
+    assert bool(around.point.p[2] == b_upper) is (b_upper == 3.0)
+    for k, step in enumerate(h * np.eye(2)):
+        ahead, behind = (problem.project(q + s).slope for s in (step, -step))
+        difference = (ahead - behind) / (2 * h)
+        np.testing.assert_allclose(around.bend[k], difference, rtol=1e-5)
 
 
 def test_fit_reaches_the_reference_optimum(vectors, samples):
@@ -139,6 +154,18 @@ def test_no_start_of_an_independent_solver_does_better(stones):
     )
     ours = fit_tustin(rows.F_n, rows.v_t, rows.F_t).sse
     assert ours <= best * (1 + 1e-6)
+
+
+def test_no_step_at_another_velocity_does_better():
+    rng = np.random.default_rng(119)
+    F_n, v = rng.uniform(2, 10, 60), np.exp(rng.uniform(-5.3, -1.6, 60))
+    step = TustinParameters(mu=0.6, F_s=9.0, v_s=0.04, delta_s=20.0, b=6.0)
+    F_t = predict(step, F_n, v) + rng.normal(0, 2.0, 60)
+    problem = Problem((F_n, v, F_t), TustinBounds().box())
+    # an optimum is 1/20 wide, a cell of the grid 0.46
+    steps = [np.array([x, np.log(20.0)]) for x in np.linspace(-5.3, -1.6, 400)]
+    best = min(problem.project(q).point.sse for q in steps)
+    assert fit_tustin(F_n, v, F_t).sse <= best
 
 
 def test_flags_say_that_a_parameter_lies_on_its_bound(stones):
@@ -228,7 +255,7 @@ def test_binned_sums_give_the_error_of_the_samples(stones):
     moments = Moments.of(problem, (stones.count,))
     q = np.log([[0.001, 0.44], [0.05, 1.5], [0.3, 10.0]])
     _, sse = solve_moments(moments.sums[0], moments.v, q, problem.box)
-    exact = [problem.project(point)[0].sse for point in q]
+    exact = [problem.project(point).point.sse for point in q]
     # bins of 2 % of velocity
     np.testing.assert_allclose(sse, exact, rtol=1e-3)
 
@@ -250,7 +277,7 @@ def test_ever_smaller_steps_lead_to_the_bottom_of_a_bowl():
 
 def test_a_start_just_above_a_known_optimum_is_left_there(stones):
     problem = Problem((stones.F_n, stones.v_t, stones.F_t), TustinBounds().box())
-    best = search(problem)[0]
+    best = search(problem, Moments.of(problem, (stones.count,)))[0]
     start = np.add(best.q, 0.3)
     alone, left = polish(problem, start), polish(problem, start, [best])
     assert alone.sse == pytest.approx(best.sse, rel=1e-9)
