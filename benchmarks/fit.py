@@ -1,8 +1,7 @@
 """What fits cost, beside scikit-learn and 20-start least squares in the same run.
 
 Equal numbers of starts, one linear-algebra thread each, parts alternating, so that
-whatever else the machine does meets all of them. Medians over rounds. All sides keep
-memory between fits, as a study's workers do.
+whatever else the machine does meets all of them. Medians over rounds.
 """
 
 import argparse
@@ -167,7 +166,6 @@ def evaluation(X: np.ndarray, y: np.ndarray, rounds: int) -> SpeedComparison:
 
 def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
-    keep_memory()
     with threadpool_limits(1):
         found = {str(part["part"]): part for part in (p.measured() for p in parts(3))}
         rivals = [
@@ -218,6 +216,11 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--json", action="store_true")
     parser.add_argument(
+        "--keep-memory",
+        action="store_true",
+        help="all sides keep memory between fits, as a study's workers do",
+    )
+    parser.add_argument(
         "--whole",
         type=Path,
         metavar="FILE",
@@ -231,7 +234,8 @@ def main() -> None:
         help="share of the folds that scikit-learn fits too, drawn at random",
     )
     arguments = parser.parse_args()
-    keep_memory()
+    if arguments.keep_memory:
+        keep_memory()
     with threadpool_limits(1):
         found = [part.measured() for part in parts(arguments.rounds)]
         found.append(
