@@ -59,10 +59,12 @@ def in_c(program: Path, core: int, seconds: float, bus: str = "") -> Window:
 def settings_with_bus_sensor() -> Settings:
     """Return the shipped settings with the wrist sensor on the arm's bus."""
     settings = load_settings(None)
-    sensor = settings.rig.ft_sensor.model_copy(update={"kind": "barrett"})
-    return dataclasses.replace(
-        settings, rig=settings.rig.model_copy(update={"ft_sensor": sensor})
-    )
+    values = settings.rig.model_dump()
+    shared = ("mass", "height", "angle_deg", "sign")  # by all makes
+    sensor = {name: values["ft_sensor"][name] for name in shared}
+    values["ft_sensor"] = {**sensor, "kind": "barrett"}
+    rig = type(settings.rig).model_validate(values)
+    return dataclasses.replace(settings, rig=rig)
 
 
 def alternate(rig: Rig, windows: int, seconds: float, program: Path) -> RawRecord:
