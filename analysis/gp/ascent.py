@@ -40,7 +40,7 @@ _FAIR, GOOD = ((0.1, 5.0), (0.1, 5.0), (0.1, 5.0)), (0.1, 0.3)
 _DIFFERENCE = 1e-4  # of theta, for second derivatives
 _FLAT = 1e-2  # smallest second derivative that counts
 _FURTHEST = 0.3  # that a parabola is believed
-_ROUGH, _FINE, _PRECISE = 1e-6, 1e-8, 2e-9  # relative changes that end a climb
+_ROUGH, _FINE, _PRECISE = 1e-6, 1e-8, 5e-10  # relative changes that end a climb
 _LOST = (1.0, 3, 0.05)  # below the best top, steps, and their share of what is missing
 _KEPT = 0.3  # share of the promised gain below which an approximation is given up
 
