@@ -13,6 +13,9 @@ from acquisition import BusCondition, PreflightError, SafetyMode
 from acquisition.control_loop import CircuitCauses, Fault, GuardVerdict, ReplySilence
 from experiments.operator import AFTER_FAULT, Prompt
 
+RESUME = "traction resume"
+REPORT = "traction report"
+
 
 @dataclass(frozen=True, slots=True)
 class Message:
@@ -45,6 +48,7 @@ class Message:
     def sample(self) -> tuple[str, str]:
         """Return what happened and what to do, numbers and names left open."""
         do = self.do.replace("{then}", AFTER_FAULT[Prompt.READY])
+        do = do.replace("{command}", RESUME)
         return _left_open(self.example or self.what), _left_open(do)
 
 
@@ -167,6 +171,7 @@ class FaultContext:
         seconds: since the start of the recording [s], None outside of one.
         bus: what is known of the CAN bus.
         prompt: what is asked for after it; None = it ends the session.
+        command: with which the work goes on once it has ended.
         load: of a computer that simulates on the wall clock; None = it does not, or a
             fault was asked for.
     """
@@ -175,6 +180,7 @@ class FaultContext:
     seconds: float | None = None
     bus: BusCondition = BusCondition.SOUND
     prompt: Prompt | None = Prompt.READY
+    command: str = RESUME
     load: ComputerLoad | None = None
 
 
@@ -203,7 +209,8 @@ def fault_text(verdict: GuardVerdict, context: FaultContext, saved: str = "") ->
         "seconds": context.seconds or 0.0,
         "when": "" if context.seconds is None else f" at {context.seconds:.2f} s",
         "pucks": _who(silent),
-        "then": AFTER_FAULT[context.prompt],
+        "then": AFTER_FAULT[context.prompt].format(command=context.command),
+        "command": context.command,
     }
     values |= {**asdict(detail), "causes": causes}
     message = CATALOGUE[name]

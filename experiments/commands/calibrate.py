@@ -91,7 +91,10 @@ def run(args: argparse.Namespace) -> int:
         run_preflight(rig, Path(args.data), console)
         hand = SimulatedHand(rig.simulation) if rig.simulation else None
         console_loop = ConsoleLoop(rig, console, operator, stop, hand)
-        return guided(console_loop, lambda: _WORK[args.what](console_loop, args, out))
+        command = f"traction calibrate {args.what}"
+        return guided(
+            console_loop, lambda: _WORK[args.what](console_loop, args, out), command
+        )
 
 
 def _gravity(console_loop: ConsoleLoop, args: argparse.Namespace, out: Path) -> None:

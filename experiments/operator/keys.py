@@ -142,9 +142,10 @@ KEYS: Mapping[Prompt, tuple[OperatorKey, ...]] = {
         OperatorKey("q", KeyAction.QUIT, "quit", word="quit"),
     ),
 }
-# How a session goes on after a fault, by what is asked for then; None: it has ended.
+# How a session goes on after a fault, by what is asked for then; None: it has ended,
+# and a command goes on.
 AFTER_FAULT: Mapping[Prompt | None, str] = {
-    None: "run: traction resume",
+    None: "run: {command}",
     Prompt.READY: "lift the foot for the tare; [space] records again",
     Prompt.PAUSED: "[space] goes on",
     Prompt.REVIEW: "give the verdict: [k]eep, or [r]edo and the digit of a reason",

@@ -7,7 +7,7 @@ from acquisition import TractionError
 from acquisition.control_loop import ArmState, GuardVerdict
 from acquisition.ipc import LoopClient
 from analysis.next_push import Aim
-from experiments.messages import ComputerLoad, FaultContext, fault_text
+from experiments.messages import REPORT, ComputerLoad, FaultContext, fault_text
 from experiments.operator import (
     Console,
     FootKeys,
@@ -161,6 +161,9 @@ class RunContext:
         is_rehearsed = faults is not None and faults.are_any
         load = busy_load(self.rig, is_rehearsed=is_rehearsed)
         context = replace(self.fault_context, bus=bus, load=load)
+        if self.journal.state.is_complete:  # neither a trial nor `resume` follows
+            prompt = None if context.prompt is Prompt.READY else context.prompt
+            context = replace(context, prompt=prompt, command=REPORT)
         return fault_text(verdict, context, self.journal.saved())
 
     def clear_faults(self, fault: ArmFaultError) -> None:

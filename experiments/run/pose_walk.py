@@ -30,11 +30,11 @@ class MoveStoppedError(ArmFaultError):
     """The guard stopped the arm in a move that it made by itself."""
 
 
-def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
+def guided(console_loop: ConsoleLoop, work: Callable[[], None], command: str) -> int:
     """Do `work` and return the exit code; an error is shown on the console.
 
     Every way out leaves the arm idle: after a stop it holds first, or damps when the
-    stop was asked for twice.
+    stop was asked for twice. The message of a fault names `command` to start again.
     """
     console = console_loop.console
     try:
@@ -45,9 +45,8 @@ def guided(console_loop: ConsoleLoop, work: Callable[[], None]) -> int:
         console.say(f"Stopped as asked. {_NOTHING}")
         return INTERRUPTED
     except ArmFaultError as fault:
-        place = FaultContext(
-            "The calibration", bus=console_loop.loop_client.loop.bus_condition
-        )
+        bus = console_loop.loop_client.loop.bus_condition
+        place = FaultContext("The calibration", bus=bus, prompt=None, command=command)
         was_moving = isinstance(fault, MoveStoppedError)
         result = f"{_STOPPED} {_NOTHING}" if was_moving else _NOTHING
         console.problem(fault_text(fault.verdict, place, result))

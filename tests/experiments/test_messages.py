@@ -92,6 +92,18 @@ def test_the_numbers_of_a_fault_fill_its_message(fault):
     assert CATALOGUE[fault.value].arm in text or fault is Fault.CAN_SILENCE
 
 
+@pytest.mark.parametrize("fault", Fault)
+def test_a_fault_that_ends_what_is_done_names_the_command_that_goes_on(fault):
+    detail = FAULTS[fault].detail
+    numbers = () if detail is CircuitCauses else (7 for _ in fields(detail))
+    place = FaultContext(prompt=None, command="traction zero")
+    text = fault_text(verdict_for(fault, detail(*numbers)), place)
+    assert "{" not in text
+    assert "resume" not in text
+    do = CATALOGUE[fault.value].do
+    assert ("traction zero" in text) is ("{then}" in do or "{command}" in do)
+
+
 LOAD = ComputerLoad(8.7, 2)
 SILENCE = verdict_for(Fault.CAN_SILENCE, ReplySilence(10.0, 0x7F))
 

@@ -79,3 +79,9 @@ def test_whoever_asked_for_the_move_hears_that_it_was_stopped_and_why(frozen):
     assert "move was stopped" in done.err
     assert done.out.rstrip().endswith("ARM: idle, braked.")
     assert console.built.rigs[-1].network.safety_mode is SafetyMode.IDLE
+
+
+def test_the_calibration_is_what_goes_on_and_no_session(frozen):
+    _, done = frozen
+    assert "run: traction calibrate gravity." in done.err
+    assert "resume" not in done.err

@@ -161,6 +161,25 @@ def test_a_crash_of_the_program_brakes_the_arm_and_says_where_the_log_is(
     assert seen.rig.network.safety_mode is SafetyMode.IDLE
 
 
+def test_a_fault_after_the_last_trial_names_the_report_and_nothing_to_resume(
+    tmp_path, config
+):
+    judged = []
+
+    def press(asked, rig):
+        if asked.prompt is Prompt.REVIEW:
+            judged.append(asked.trial)
+        elif asked.prompt is Prompt.LIFT and judged:
+            rig.network.pendant("estop")
+        return short_trial(asked)
+
+    seen = run_watched(config, tmp_path, 1, press=press)
+    assert seen.done.code == 0
+    assert "▲ No tare at the end: Stop pressed" in seen.done.out
+    assert "zero the arm, then: traction report." in seen.done.out
+    assert "resume" not in seen.done.err + seen.done.out
+
+
 class Hands:
     """A clock that a test moves."""
 
