@@ -77,7 +77,8 @@ def write_new(path: Path, content: bytes) -> None:
     """
     with writing(path), open_folder(path.parent) as folder:
         _write_new(folder, path.name, content)
-        os.fsync(folder)
+        with _removed_at_error(folder, path.name):
+            os.fsync(folder)
 
 
 def move_file(source: Path, target: Path) -> None:
@@ -156,10 +157,21 @@ def _is_same(target: Path, source: Path) -> bool:
 
 def _write_new(folder: int, name: str, content: bytes) -> None:
     descriptor = os.open(name, _NEW | os.O_CLOEXEC, 0o644, dir_fd=folder)
-    with os.fdopen(descriptor, "wb") as file:
+    with _removed_at_error(folder, name), os.fdopen(descriptor, "wb") as file:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+@contextmanager
+def _removed_at_error(folder: int, name: str) -> Generator[None, None, None]:
+    """Take the new file `name` away if it does not reach the disk."""
+    try:
+        yield
+    except OSError:
+        with suppress(OSError):
+            os.unlink(name, dir_fd=folder)
+        raise
 
 
 def _finite(text: str) -> float:

@@ -3,6 +3,7 @@
 import fcntl
 import os
 import re
+import shutil
 from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -203,6 +204,7 @@ def create_session(
         SettingsError: `data` cannot be written.
     """
     sessions = data / "sessions"
+    made: Path | None = None
     try:
         make_directories(sessions)
         with _locked(sessions / ".lock"):
@@ -212,11 +214,14 @@ def create_session(
             suffix = ".fake" if is_simulated else ""
             path = sessions / f"{date}_S{number:03d}_{terrain}{suffix}"
             path.mkdir()
+            made = path
         for name in ("trials", "rejected", "faults"):
             (path / name).mkdir()
         sync_directory(path)
         sync_directory(sessions)
     except OSError as error:
+        if made is not None:  # by this call, and empty but for folders
+            shutil.rmtree(made, ignore_errors=True)
         raise SettingsError(
             f"{data} cannot be written ({error.strerror}).",
             hint="Name another folder with --data. Nothing was started.",

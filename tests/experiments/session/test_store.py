@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 
@@ -8,7 +9,12 @@ from hypothesis import strategies as st
 from acquisition.errors import SettingsError, TrialFileError
 from experiments.operator.console import Console
 from experiments.session import store
-from experiments.session.data_files import move_file, read_json, write_json
+from experiments.session.data_files import (
+    move_file,
+    read_json,
+    write_json,
+    write_new_text,
+)
 from experiments.session.sidecar import TrialName
 from experiments.session.store import (
     create_session,
@@ -157,3 +163,32 @@ def test_a_console_that_nobody_reads_any_more_is_noticed(monkeypatch):
     console.say("anybody?")
     assert console.is_lost
     console.say("nobody")
+
+
+def refuse(_):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_session_for_which_there_is_no_room_leaves_no_folder(tmp_path, monkeypatch):
+    create(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", refuse)
+        with pytest.raises(SettingsError, match="cannot be written"):
+            create(tmp_path)
+    assert [folder.id for folder in list_sessions(tmp_path)] == ["S001"]
+    assert create(tmp_path).id == "S002"
+
+
+def test_a_new_file_that_does_not_reach_the_disk_is_not_in_the_way(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "gravity.toml"
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", refuse)
+        with pytest.raises(TrialFileError, match="cannot be written"):
+            write_new_text(path, "a")
+    assert not path.exists()
+    write_new_text(path, "a")
+    with pytest.raises(TrialFileError, match="cannot be written"):
+        write_new_text(path, "b")
+    assert path.read_text() == "a"
