@@ -53,6 +53,23 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="fail instead of skipping where ../shared/data is not there",
     )
+    parser.addoption(
+        "--share",
+        metavar="HEX/N",
+        help="run every Nth test only, from the one on that the hexadecimal HEX names",
+    )
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(
+    config: pytest.Config, items: list[pytest.Item]
+) -> None:
+    """Leave what is not of the share that was asked for out."""
+    if (share := config.getoption("--share")) is not None:
+        number, _, parts = share.partition("/")
+        kept = items[int(number, 16) % int(parts) :: int(parts)]
+        config.hook.pytest_deselected(items=[i for i in items if i not in kept])
+        items[:] = kept
 
 
 @pytest.fixture(scope="session")

@@ -148,7 +148,8 @@ class BodyFaults:
         self._plant.disturbance[_JOINT_7] = 0.0
 
     def _hit(self) -> None:
-        self._plant.qd[_JOINT_6] = _BLOW
+        if not self._plant.is_held:  # brakes do not give way to a blow
+            self._plant.qd[_JOINT_6] = _BLOW
 
     def _touch(self) -> None:
         self._plant.finger = _FINGER

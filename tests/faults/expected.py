@@ -22,6 +22,7 @@ class End(Enum):
     ENDED = "session ends, resumed"
     SOMEHOW = "stopped; the session goes on or ends"
     UNMEASURED = "the arm stops, nothing is written"
+    UNSTARTED = "nothing is created"
     UNWRITTEN = "session ends, what is on the disk stays"
     STOPPED = "unfinished on purpose, resumed"
     INTERRUPTED = "ends at once"
@@ -162,16 +163,16 @@ def _lost_sensor(waits: str, preflight: Cell) -> Row:
     )
 
 
-def _limit(text: str, why: str, preflight: Cell = NO_LOOP) -> Row:
+def _limit(text: str, why: str, **others: Cell) -> Row:
     """Return the row of a limit of the guard on the arm's motion."""
     told = Cell(End.TOLD, text, arm=_DAMPED)
-    return _row(
-        told,
-        preflight=preflight,
-        idle=Cell(End.ENDED, text, why="found when the arm becomes active"),
-        recording=replace(told, end=End.REDONE, rejected=(f"interrupted: {why}",)),
-        end=OK,
-    )
+    phases = {
+        "preflight": NO_LOOP,
+        "idle": Cell(End.ENDED, text, why="found when the arm becomes active"),
+        "recording": replace(told, end=End.REDONE, rejected=(f"interrupted: {why}",)),
+        "end": OK,
+    }
+    return _row(told, **{**phases, **others})
 
 
 def _creeping(motor: int) -> Row:
@@ -189,15 +190,16 @@ def _disk(word: str) -> Row:
     text = f"cannot be written ({word})"
     lost = Cell(End.UNWRITTEN, text)
     crashed = replace(lost, rejected=("the session ended without closing",))
-    return _row(
-        lost, recording=crashed, preflight=replace(lost, why="nothing to resume")
-    )
+    unstarted = Cell(End.UNSTARTED, f"{text}. Name another folder with --data.")
+    return _row(lost, recording=crashed, preflight=unstarted)
 
 
 _NO_DATA = _refused("No F/T data for 100 ms")
 _NO_FRAME = _refused("No whole F/T frame")
 _FEW = "are too few for a tare"
 _FLAGGED = "F/T samples were flagged during tare"
+_ASKED = "Joint 7 was asked for "
+_STAYS = replace(OK, why="the arm is braked, and stays so")
 _BRAKED = Cell(End.ABSENT, why="joint 7 is braked like the others")
 _SLIP = Cell(
     End.REDONE,
@@ -345,7 +347,13 @@ TABLE: dict[str, Row] = {
         ),
     ),
     "safety-disobedient": _row(OK),
-    **{f"lie-of-motor-{motor}": _row(OK) for motor in range(1, 8)},
+    **{f"lie-of-motor-{motor}": _row(OK) for motor in range(1, 7)},
+    # The lock pushes joint 7 back to where it was, with nearly all that it may have.
+    "lie-of-motor-7": _row(
+        OK,
+        recording=Cell(End.REDONE, _ASKED, ("interrupted: torque-limit",), _DAMPED),
+        review=Cell(End.TOLD, _ASKED, arm=_DAMPED),
+    ),
     **{f"stuck-motor-{motor}": _row(UNSEEN) for motor in range(1, 8)},
     **{f"creep-of-motor-{motor}": _creeping(motor) for motor in range(1, 8)},
     "ft-stale": _sensor(20, _FEW, _NO_DATA),
@@ -383,10 +391,12 @@ TABLE: dict[str, Row] = {
     ),
     "joint-limit": _limit("Joint 6 at ", "joint-limit"),
     "torque-limit": _limit("Joint 2 was asked for ", "torque-limit"),
-    "foot-speed": _limit("The foot moved at ", "foot-speed"),
-    "overspeed": _limit(
-        "Joint 6 ", "overspeed", replace(OK, why="the arm is braked, and stays so")
+    "foot-speed": _limit(
+        "The foot moved at ",
+        "foot-speed",
+        idle=Cell(End.TOLD, "The foot moved at ", why="found when the arm is moved"),
     ),
+    "overspeed": _limit("Joint 6 ", "overspeed", preflight=_STAYS, idle=_STAYS),
     "joint7-slip": _row(
         OK,
         preflight=_BRAKED,

@@ -39,7 +39,7 @@ def _cell(fault: str) -> Cell:
     if fault in _OWN:
         return _OWN[fault]
     still = TABLE[fault][_TARE]
-    if fault.startswith("stuck"):
+    if fault.startswith("stuck") or fault == "lie-of-motor-3":
         return _IN_VAIN
     if fault.startswith("creep"):
         return _ASTRAY

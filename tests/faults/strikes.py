@@ -52,7 +52,8 @@ def _weak(scene: SimulatedScene) -> dict[str, object]:
 
 
 def _swing(scene: SimulatedScene) -> dict[str, object]:
-    scene.rig.plant.qd[_J6] = 8.0
+    if not scene.rig.plant.is_held:
+        scene.rig.plant.qd[_J6] = 8.0
     return {"foot_speed": 0.2}
 
 

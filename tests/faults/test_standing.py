@@ -95,7 +95,9 @@ STOPPED = {
     "foot-speed": {"foot-speed", "overspeed"},
     "overspeed": {"overspeed"},
     **{
-        f"creep-of-motor-{motor}": {"overspeed", "foot-speed", "torque-limit"}
+        f"creep-of-motor-{motor}": {
+            *("overspeed", "foot-speed", "torque-limit", "contact-move")
+        }
         for motor in range(1, 8)
     },
 }

@@ -67,8 +67,10 @@ FALLING = Promise(
 LYING = Promise(
     speed=2.0,
     travel=0.2,
+    drive=100.0,
     why="speed is seen through the encoder that lies: the guard bounds what it "
-    "believes, the driver how fast a lie may grow, so the truth has twice the limit",
+    "believes, the driver how fast a lie may grow, so the truth has twice the limit; "
+    "the dampers brake a speed that is none for the 50 ms until the arm holds",
 )
 TWISTED = Promise(
     speed=2.0,
@@ -147,7 +149,12 @@ class TruthLog:
         begin = max(int(np.searchsorted(t_ns, struck_ns)) - 1, 0)
         rows, after_ns = np.array(self.rows[begin:]), t_ns[begin:] - struck_ns
         q, qd, tau = rows[:, :7], np.abs(rows[:, 7:14]), rows[:, 14:21]
-        calm = qd[after_ns > BLOW_NS] if fault in BLOWS else qd
+        if fault in BLOWS:
+            is_over = after_ns > BLOW_NS
+            hand = rows[is_over, 22:25] if is_over.any() else np.zeros((1, 3))
+            calm = qd[is_over]
+        else:
+            hand, calm = rows[:, 22:25], qd
         shares = calm / SPEED_LIMITS if len(calm) else np.zeros((1, 7))
         joint = int(shares.max(axis=0).argmax())
         model = ArmModel(load_constants(), self.tool)
@@ -159,7 +166,7 @@ class TruthLog:
             joint=joint + 1,
             travel=float(travel),
             drive=_drive(model, q, tau, rows[:, 21] > 0.0),
-            hand=float(np.linalg.norm(rows[:, 22:25], axis=1).max()),
+            hand=float(np.linalg.norm(hand, axis=1).max()),
         )
 
 

@@ -44,7 +44,7 @@ def test_ctrl_c_in_a_running_trial_closes_it_and_keeps_the_earlier_one(
 ):
     with start(config, tmp_path) as process:
         wait_for(process, "trial 2 of 9")
-        wait_for(process, "Wipe, foot at the far end")
+        wait_for(process, "foot at the far end")
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (5, "")
@@ -79,7 +79,7 @@ def test_the_report_of_a_session_is_marked_as_simulated_and_compares_with_the_tr
     done = traction("report", "S001", "--data", recorded.data)
     assert done.code == 0
     page = recorded.folder / "report" / "index.html"
-    assert done.out.splitlines()[-1] == str(page)
+    assert done.out.splitlines()[-1] == f"Open in a browser: {page}"
     text = page.read_text()
     assert "SIMULATED" in text
     assert "Measured against true" in text
