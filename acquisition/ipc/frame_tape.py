@@ -19,13 +19,21 @@ class FrameTape:
     def __init__(self, ring: Ring) -> None:
         self._ring = ring
 
-    def add(self, frames: Iterable[tuple[int, int, int, bytes]]) -> None:
-        """Keep frames; the oldest are forgotten.
+    def add(self, frames: Iterable[tuple[int, bytes, int]], now_ns: int) -> None:
+        """Keep frames, oldest first; the oldest on the tape are forgotten.
 
         Args:
-            frames: monotonic time [ns], identifier, length and data of each.
+            frames: identifier, data and monotonic time [ns] of each, 0 = of now.
+            now_ns: monotonic time [ns].
         """
-        self._ring.pack(_FRAME, frames)
+        ring, pack_into = self._ring, _FRAME.pack_into
+        counter, memory, slots, stride = ring.counter, ring.memory, *ring.places
+        number = counter[0]
+        for can_id, data, t_ns in frames:
+            place = number % slots * stride
+            pack_into(memory, place, t_ns or now_ns, can_id, len(data), data)
+            number += 1
+            counter[0] = number
 
 
 def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:

@@ -22,7 +22,6 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
-_POSITION_SIZES = frozenset({3, 6})  # without and with a joint encoder's
 _POSITION_MODULUS = 1 << 22
 _POSITION_MASK = _POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
@@ -30,6 +29,7 @@ _TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
 _FORCE_PER_N = 256.0
 _TORQUE_PER_NM = 4096.0
 _ACCELERATION_SCALE = 1024.0
+_integer = int.from_bytes
 
 Payload = bytes | bytearray
 
@@ -177,11 +177,12 @@ def decode_position(data: Payload) -> int:
     Raises:
         FrameError: not 3 or 6 bytes.
     """
-    if len(data) not in _POSITION_SIZES:
-        raise FrameError("Not a position reply", data)
+    if len(data) != 3:  # with a joint encoder's behind it
+        if len(data) != 6:
+            raise FrameError("Not a position reply", data)
+        data = data[:3]
     # The two bits above the 22 have no meaning, as for the vendor's library.
-    counts = int.from_bytes(data[:3], "big") & _POSITION_MASK
-    return counts - _POSITION_MODULUS if counts & _POSITION_SIGN else counts
+    return (_integer(data, "big") & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN
 
 
 def decode_joint_encoder(data: Payload) -> int | None:

@@ -214,27 +214,33 @@ class CanLink:
 
     def _sort(self, arrived: list[Frame]) -> None:
         """Show plain frames to the tap and keep those of devices."""
-        is_plain = True
+        kept = [
+            frame
+            for frame in arrived
+            if (can_id := frame[0]) & SENDER_MASK
+            and can_id <= _LARGEST_ID
+            and can_id != MODE_BROADCAST_ID
+        ]
+        self._inbox += kept
+        if len(kept) < len(arrived):
+            self._note_others(arrived)
+            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
+        if self._tap is not None and arrived:
+            self._tap(arrived)
+
+    def _note_others(self, arrived: list[Frame]) -> None:
+        """Note what is no frame of a device: errors, changes of mode, hosts."""
         for frame in arrived:
             can_id = frame[0]
             if can_id > _LARGEST_ID:
-                is_plain = False
                 if can_id & ERROR_FLAG:
                     self.errors.add(can_id, frame[1])
             elif can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1
-            elif can_id & SENDER_MASK:
-                self._inbox.append(frame)
-            else:
+            elif not can_id & SENDER_MASK:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id
-        if self._tap is None:
-            return
-        if not is_plain:
-            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
-        if arrived:
-            self._tap(arrived)
 
 
 def plausible_times(now_ns: int) -> tuple[int, int]:
@@ -278,7 +284,4 @@ class FrameTap:
 
     def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
         """Note frames that were sent or arrived just now, oldest first."""
-        now_ns = self._clock.now_ns()
-        self._tape.add(
-            [(t_ns or now_ns, can_id, len(data), data) for can_id, data, t_ns in frames]
-        )
+        self._tape.add(frames, self._clock.now_ns())

@@ -19,7 +19,7 @@ def ring():
 
 def tape_of(ring, times_ns):
     tape = FrameTape(ring)
-    tape.add((t_ns, 1, 0, b"") for t_ns in times_ns)
+    tape.add(((1, b"", t_ns) for t_ns in times_ns), 0)
 
 
 def times(frames):
@@ -45,9 +45,16 @@ def test_the_tape_does_not_grow(ring):
     assert times(last_frames(ring)) == [45, 46, 47, 48, 49]
 
 
+def test_a_frame_replaces_all_of_the_one_before(ring):
+    for _ in range(6):
+        ring.write(b"\xff" * FRAME_DTYPE.itemsize)
+    FrameTape(ring).add([(0x404, b"\x30", 0)], 7)
+    assert ring.last(1).tobytes() == struct.pack("<QIB3x8s", 7, 0x404, 1, b"\x30")
+
+
 def frames_of(*frames):
     ring = Ring(memoryview(bytearray(Ring.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9)
-    FrameTape(ring).add((*frame[:2], len(frame[2]), frame[2]) for frame in frames)
+    FrameTape(ring).add(((can_id, data, t_ns) for t_ns, can_id, data in frames), 0)
     return ring.last(9)
 
 
