@@ -8,7 +8,7 @@ import can
 
 from acquisition import NS_PER_S, Clock
 from fakes.pucks import OutFrame, PuckNetwork, WiredNetwork
-from wam.bus import DRAIN_AT_MOST, PythonCanDoor
+from wam.bus import DRAIN_AT_MOST, PythonCanDoor, as_frame
 from wam.bus import Frame as DoorFrame
 
 _PATIENCE_NS = NS_PER_S
@@ -195,7 +195,7 @@ class InProcessDoor(PythonCanDoor):
             return []
         if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
             return super().receive()
-        frames = [DoorFrame(can_id, data, t_ns) for t_ns, can_id, data in inbox]
+        frames = [as_frame((can_id, data, t_ns)) for t_ns, can_id, data in inbox]
         inbox.clear()
         return frames
 

@@ -76,11 +76,11 @@ class PuckBank:
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the pucks measure `voltage` [V]."""
         for puck in self._pucks:
-            puck.properties["VBUS"] = round(voltage)
+            puck.define("VBUS", round(voltage))
 
     def set_property(self, node: int, name: str, value: int) -> None:
         """Let a puck measure `value` for a property such as TEMP."""
-        self._pucks[node - 1].properties[name] = value
+        self._pucks[node - 1].define(name, value)
 
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor."""
@@ -102,7 +102,7 @@ class PuckBank:
         """Take a torque frame: its first byte and four torques [puck units]."""
         for puck in self._group(group):
             if puck.t_header == header:
-                puck.take_torque(units[(puck.properties["PIDX"] - 1) & 3])
+                puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
         self._motors.set_torques([puck.torque for puck in self._pucks])
 
@@ -133,15 +133,17 @@ class PuckBank:
     def _report(self, pucks: list[MotorPuck]) -> None:
         """Latch the positions of `pucks` and hand them to the wire."""
         counts = self._encoder_counts()
+        frames: list[tuple[int, bytes]] = []
         reported: dict[int, int] = {}
         for puck in pucks:
             life = puck.life
             if life.power is AWAKE and not life.is_mute:
                 node = puck.node
-                position = wrap_position(counts[node - 1] + puck.offset)
-                self._schedule.emit(puck.position_id, encode_position(position))
-                reported[node] = position
+                position = counts[node - 1] + puck.offset
+                frames.append((puck.position_id, encode_position(position)))
+                reported[node] = wrap_position(position)
         if reported:
+            self._schedule.emit_all(frames)
             self._on_positions(reported)
 
     def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
@@ -156,7 +158,7 @@ class PuckBank:
             puck.take_torque(value)
             self._apply()
         else:
-            puck.properties[name] = value
+            puck.define(name, value)
             self._members.clear()
             if name == "MODE":
                 puck.torque = 0
@@ -182,7 +184,7 @@ class PuckBank:
     def _set_puck_modes(self) -> None:
         for puck in self._pucks:
             if puck.is_awake:
-                puck.properties["MODE"] = puck_mode_in(self._mode)
+                puck.define("MODE", puck_mode_in(self._mode))
             puck.torque = 0
         self._apply()
 

@@ -33,7 +33,7 @@ from .frames import (
     wrap_position,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
-from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link
+from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link, as_frame
 from .log import (
     LONGEST_LINE,
     BusSummary,

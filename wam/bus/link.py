@@ -2,6 +2,7 @@
 
 import errno
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
@@ -32,6 +33,7 @@ class Frame(NamedTuple):
     t_ns: int
 
 
+as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a call
 Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # each like a Frame
 
 
