@@ -1,4 +1,4 @@
-from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, SensorErrors
+from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, ErrorScale, SensorErrors
 from .kinds import SensorChoice, make_stream
 from .port import FakeSerialPort
 from .pty import SerialPty
@@ -8,6 +8,7 @@ __all__ = [
     "FORCE_ERRORS",
     "NO_SHIFT",
     "TORQUE_ERRORS",
+    "ErrorScale",
     "FakeSerialPort",
     "SensorChoice",
     "SensorErrors",
