@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from acquisition.bounds import are_between, are_within
 from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
 from acquisition.control_loop.contact import Contact, ContactState, check_contact
 from acquisition.control_loop.details import (
@@ -28,6 +29,7 @@ from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
+_NOTHING_WRONG = (OK,) * 12  # checks
 _TREMBLE = 1  # counts by which an encoder at rest flickers
 
 Point = tuple[float, float, float]
@@ -140,8 +142,10 @@ def check(
         _check_cadence(limits, state, now),
     )
     worst = OK
+    if verdicts == _NOTHING_WRONG:
+        return state, worst
     for verdict in verdicts:
-        if verdict is not OK and verdict.severity > worst.severity:
+        if verdict.severity > worst.severity:
             worst = verdict
     return state, worst
 
@@ -248,6 +252,8 @@ def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
 def _check_position(
     limits: GuardLimits, state: GuardState, q: list[float]
 ) -> GuardVerdict:
+    if are_between(limits.q_lower, q, limits.q_upper):
+        return OK
     ranges = zip(q, limits.q_lower, limits.q_upper, strict=True)
     for joint, (value, low, high) in enumerate(ranges):
         if not low <= value <= high and state.armed >> joint & 1:
@@ -275,6 +281,8 @@ def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
 
 def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
     """Return the first joint beyond its limit; None if all are within."""
+    if are_within(values, limits):
+        return None
     for joint, (value, limit) in enumerate(zip(values, limits, strict=True)):
         if not -limit <= value <= limit:
             return JointExcess(joint + 1, abs(value), limit)

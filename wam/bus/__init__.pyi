@@ -98,6 +98,7 @@ __all__ = [
     "PuckStatus",
     "PythonCanDoor",
     "Triple",
+    "as_frame",
     "compose_id",
     "decode_force",
     "decode_position",
