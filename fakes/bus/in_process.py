@@ -26,7 +26,7 @@ class FakeCanBus(can.BusABC):
     def __init__(self, network: PuckNetwork, clock: Clock) -> None:
         self.channel_info = "fake bus"
         self.network = network
-        self._faults = network.faults
+        self._faults, self._schedule = network.faults, network.schedule
         self._clock = clock
         self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
@@ -76,8 +76,9 @@ class FakeCanBus(can.BusABC):
 
     def put(self, can_id: int, data: bytes) -> None:
         """Send a data frame as `send` does; only while `is_undisturbed`."""
-        now_ns = self._clock.now_ns()
-        self.advance(now_ns)
+        now_ns, schedule = self._clock.now_ns(), self._schedule
+        if now_ns != self._t_ns or schedule.outbox or schedule.next_ns <= now_ns:
+            self.advance(now_ns)
         self._wired.send(now_ns, can_id, data)
 
     def arrived(self) -> deque[OutFrame]:
@@ -195,9 +196,9 @@ class InProcessDoor(PythonCanDoor):
             return []
         if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
             return super().receive()
-        frames = [as_frame((can_id, data, t_ns)) for t_ns, can_id, data in inbox]
+        times_ns, can_ids, payloads = zip(*inbox, strict=True)
         inbox.clear()
-        return frames
+        return list(map(as_frame, zip(can_ids, payloads, times_ns, strict=True)))
 
 
 class _Inbox:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
+from itertools import repeat
 
 from wam.bus import encode_reply, is_wide, property_reply_id
 
@@ -49,14 +50,13 @@ class EventQueue:
         self.emit = emit
         self._is_intercepted = True
 
-    def emit_all(self, frames: Sequence[tuple[int, bytes]]) -> None:
-        """Send frames of devices now, identifier and data of each, one by one."""
+    def emit_all(self, can_ids: Sequence[int], payloads: Sequence[bytes]) -> None:
+        """Send frames of devices now, in this order."""
         if self._is_intercepted:
-            for can_id, data in frames:
+            for can_id, data in zip(can_ids, payloads, strict=True):
                 self.emit(can_id, data)
         else:
-            now_ns = self.now_ns
-            self.outbox += [(now_ns, can_id, data) for can_id, data in frames]
+            self.outbox.extend(zip(repeat(self.now_ns), can_ids, payloads))
 
     def define_alarm(self, action: Callable[[], None]) -> None:
         """Call `action` when the alarm goes off."""

@@ -112,7 +112,7 @@ class PuckNetwork:
             self._safety.is_mute = is_mute
         elif node == SENSOR_NODE:
             if self._sensor is not None:
-                self._sensor.life.is_mute = is_mute
+                self._sensor.life.cut(is_mute=is_mute)
         else:
             self._bank.silence(node, is_mute=is_mute)
 

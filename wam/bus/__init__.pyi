@@ -15,6 +15,7 @@ from .frames import (
     compose_id,
     decode_force,
     decode_position,
+    decode_positions,
     decode_reply,
     decode_request,
     decode_torque,
@@ -23,6 +24,7 @@ from .frames import (
     encode_force,
     encode_get,
     encode_position,
+    encode_positions,
     encode_reply,
     encode_set,
     encode_torque,
@@ -30,7 +32,7 @@ from .frames import (
     group_id,
     position_reply_id,
     property_reply_id,
-    wrap_position,
+    wrap_positions,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
 from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link, as_frame
@@ -102,6 +104,7 @@ __all__ = [
     "compose_id",
     "decode_force",
     "decode_position",
+    "decode_positions",
     "decode_reply",
     "decode_request",
     "decode_torque",
@@ -112,6 +115,7 @@ __all__ = [
     "encode_force",
     "encode_get",
     "encode_position",
+    "encode_positions",
     "encode_reply",
     "encode_set",
     "encode_torque",
@@ -128,5 +132,5 @@ __all__ = [
     "position_reply_id",
     "property_number",
     "property_reply_id",
-    "wrap_position",
+    "wrap_positions",
 ]

@@ -22,6 +22,7 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
+_USUAL_SIZES = {3}  # of a position reply without a joint encoder
 _POSITION_MODULUS = 1 << 22
 _POSITION_MASK = _POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
@@ -158,14 +159,20 @@ def _checked_number(number: int) -> int:
     return number
 
 
-def wrap_position(counts: int) -> int:
-    """Return a motor position [encoder counts] as 22 bits carry it, signed."""
-    return (counts + _POSITION_SIGN) % _POSITION_MODULUS - _POSITION_SIGN
+def wrap_positions(counts: Sequence[int]) -> list[int]:
+    """Return motor positions [encoder counts] as 22 bits carry them, signed."""
+    half, modulus = _POSITION_SIGN, _POSITION_MODULUS
+    return [(count + half) % modulus - half for count in counts]
 
 
 def encode_position(counts: int) -> bytes:
     """Return the three bytes of a motor position, wrapped at 22 bits as on a puck."""
-    return (counts % _POSITION_MODULUS).to_bytes(3, "big")
+    return encode_positions((counts,))[0]
+
+
+def encode_positions(counts: Sequence[int]) -> list[bytes]:
+    """Return the three bytes of each of some motor positions [encoder counts]."""
+    return [(count % _POSITION_MODULUS).to_bytes(3, "big") for count in counts]
 
 
 def decode_position(data: Payload) -> int:
@@ -183,6 +190,18 @@ def decode_position(data: Payload) -> int:
         data = data[:3]
     # The two bits above the 22 have no meaning, as for the vendor's library.
     return (_integer(data, "big") & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN
+
+
+def decode_positions(replies: Sequence[Payload]) -> list[int] | None:
+    """Return the motor positions [encoder counts] of some position replies.
+
+    None where a reply has another size than the usual three bytes: then each has to be
+    looked at by itself, see `decode_position`.
+    """
+    if set(map(len, replies)) != _USUAL_SIZES:
+        return None
+    words = struct.unpack(f">{len(replies)}I", b"\0" + b"\0".join(replies))
+    return [(word & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN for word in words]
 
 
 def decode_joint_encoder(data: Payload) -> int | None:

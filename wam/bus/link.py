@@ -3,6 +3,7 @@
 import errno
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import itemgetter
 from typing import NamedTuple, Protocol
 
 from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
@@ -16,6 +17,12 @@ DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
 _PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
 _AHEAD_NS = 5_000_000  # frames go on arriving while a bus is drained
 _LARGEST_ID = 0x7FF  # of a frame that a WAM uses
+_OF_DEVICES = frozenset(
+    can_id
+    for can_id in range(_LARGEST_ID + 1)
+    if can_id & SENDER_MASK and can_id != MODE_BROADCAST_ID
+)
+_can_id = itemgetter(0)  # of a frame
 
 
 class Frame(NamedTuple):
@@ -216,15 +223,10 @@ class CanLink:
 
     def _sort(self, arrived: list[Frame]) -> None:
         """Show plain frames to the tap and keep those of devices."""
-        kept = [
-            frame
-            for frame in arrived
-            if (can_id := frame[0]) & SENDER_MASK
-            and can_id <= _LARGEST_ID
-            and can_id != MODE_BROADCAST_ID
-        ]
-        self._inbox += kept
-        if len(kept) < len(arrived):
+        if _OF_DEVICES.issuperset(map(_can_id, arrived)):
+            self._inbox += arrived
+        else:
+            self._inbox += [frame for frame in arrived if frame[0] in _OF_DEVICES]
             self._note_others(arrived)
             arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
         if self._tap is not None and arrived:
