@@ -196,9 +196,9 @@ class InProcessDoor(PythonCanDoor):
             return []
         if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
             return super().receive()
-        times_ns, can_ids, payloads = zip(*inbox, strict=True)
+        frames = [as_frame((can_id, data, t_ns)) for t_ns, can_id, data in inbox]
         inbox.clear()
-        return list(map(as_frame, zip(can_ids, payloads, times_ns, strict=True)))
+        return frames
 
 
 class _Inbox:

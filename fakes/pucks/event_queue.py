@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
-from itertools import repeat
 
 from wam.bus import encode_reply, is_wide, property_reply_id
 
@@ -56,7 +55,9 @@ class EventQueue:
             for can_id, data in zip(can_ids, payloads, strict=True):
                 self.emit(can_id, data)
         else:
-            self.outbox.extend(zip(repeat(self.now_ns), can_ids, payloads))
+            now_ns = self.now_ns
+            frames = zip(can_ids, payloads, strict=True)
+            self.outbox += [(now_ns, can_id, data) for can_id, data in frames]
 
     def define_alarm(self, action: Callable[[], None]) -> None:
         """Call `action` when the alarm goes off."""

@@ -1,7 +1,6 @@
 """The wire between hosts and a puck network: one frame at a time, lowest id first."""
 
 from heapq import heappop, heappush
-from itertools import accumulate
 
 from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
 from fakes.pucks.network import PuckNetwork
@@ -102,15 +101,18 @@ class WiredNetwork:
             return False
         ready_ns = due[0][0]
         t_ns = ready_ns if ready_ns > self._free_ns else self._free_ns
-        _, can_ids, payloads = zip(*due, strict=True)
-        lengths = map(len, payloads)
-        _, *ends_ns = accumulate(map(FRAME_NS.__getitem__, lengths), initial=t_ns)
-        end_ns = ends_ns[-1]
-        is_late = end_ns > until_ns or end_ns >= self._schedule.next_ns
-        if is_late or list(can_ids) != sorted(can_ids):
+        sent: list[OutFrame] = []
+        before = 0
+        for _, can_id, data in due:
+            if can_id < before:
+                return False
+            before = can_id
+            t_ns += FRAME_NS[len(data)]
+            sent.append((t_ns, can_id, data))
+        if t_ns > until_ns or t_ns >= self._schedule.next_ns:
             return False
-        self._sent.extend(zip(ends_ns, can_ids, payloads, strict=True))
-        self._free_ns = end_ns
+        self._sent += sent
+        self._free_ns = t_ns
         return True
 
     def _begin_at(self, ready_ns: int) -> None:

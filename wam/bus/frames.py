@@ -22,7 +22,6 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
-_USUAL_SIZES = {3}  # of a position reply without a joint encoder
 _POSITION_MODULUS = 1 << 22
 _POSITION_MASK = _POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
@@ -190,18 +189,6 @@ def decode_position(data: Payload) -> int:
         data = data[:3]
     # The two bits above the 22 have no meaning, as for the vendor's library.
     return (_integer(data, "big") & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN
-
-
-def decode_positions(replies: Sequence[Payload]) -> list[int] | None:
-    """Return the motor positions [encoder counts] of some position replies.
-
-    None where a reply has another size than the usual three bytes: then each has to be
-    looked at by itself, see `decode_position`.
-    """
-    if set(map(len, replies)) != _USUAL_SIZES:
-        return None
-    words = struct.unpack(f">{len(replies)}I", b"\0" + b"\0".join(replies))
-    return [(word & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN for word in words]
 
 
 def decode_joint_encoder(data: Payload) -> int | None:

@@ -17,12 +17,10 @@ from wam.bus import (
     MODERN,
     MOTOR_NODES,
     Device,
-    Frame,
     Group,
     Link,
     Payload,
     decode_position,
-    decode_positions,
     encode_get,
     encode_torques,
     group_id,
@@ -36,9 +34,7 @@ from wam.driver.transmission import MOTORS
 
 _ARM_ID = group_id(Group.ARM)
 _LOWER_ID, _WRIST_ID = group_id(Group.LOWER_TORQUE), group_id(Group.WRIST_TORQUE)
-_POSITION_IDS: Final = tuple(position_reply_id(n) for n in MOTOR_NODES)
-_POSITION_INDEX: Final = {can_id: i for i, can_id in enumerate(_POSITION_IDS)}
-_NOTHING: Final = [None] * MOTORS
+_POSITION_INDEX: Final = {position_reply_id(n): n - 1 for n in MOTOR_NODES}
 
 
 @dataclass(slots=True)
@@ -246,22 +242,8 @@ class CycleTraffic:
 
     def _collect(self) -> int:
         """Sort what has arrived and return how many positions there were."""
-        frames = self._link.receive()
-        if len(frames) != MOTORS or self.received != _NOTHING:
-            return self._collect_each(frames) if frames else 0
-        # All motors have answered as they usually do, the lowest number first.
-        can_ids, replies, times_ns = zip(*frames, strict=True)
-        counts = decode_positions(replies) if can_ids == _POSITION_IDS else None
-        if counts is None:
-            return self._collect_each(frames)
-        self.received = list[int | None](counts)
-        self.bus_ns = times_ns[-1]
-        return MOTORS
-
-    def _collect_each(self, frames: list[Frame]) -> int:
-        """Sort `frames` one by one and return how many positions there were."""
         arrived, received = 0, self.received
-        for can_id, data, t_ns in frames:
+        for can_id, data, t_ns in self._link.receive():
             index = _POSITION_INDEX.get(can_id)
             try:
                 if index is not None:

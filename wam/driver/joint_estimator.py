@@ -1,17 +1,14 @@
 """Positions and velocities of the joints out of the replies of seven motors."""
 
 from collections.abc import Sequence
-from operator import sub
-from typing import cast
 
 import numpy as np
 
-from acquisition import PositionJump, Vector, are_within
+from acquisition import PositionJump, Vector
 from wam.driver.settings import ArmSettings
 from wam.driver.transmission import MOTORS, Transmission
 
 _LONGEST_GUESS = 0.05  # s; beyond, a silent joint is taken to stand still
-_ALL_FRESH = (1 << MOTORS) - 1
 _STILL = 4  # counts by which a motor at rest may seem to move
 
 
@@ -53,7 +50,7 @@ class JointEstimator:
         self.qd: Vector = np.zeros(MOTORS)
         self.qd7_raw = 0.0
         self.jump: PositionJump | None = None
-        self._positions: list[float] = [float(c) for c in counts]
+        self._positions = [float(c) for c in counts]
         self._rates = [0.0] * MOTORS
         self._times_ns = [t_ns] * MOTORS
         self._t_ns = t_ns
@@ -64,44 +61,8 @@ class JointEstimator:
         if step <= 0.0:
             step = 1e-9  # asked twice at one instant: no time, no velocity
         share = self._pole * step / (1.0 + self._pole * step)
-        self.jump = None
-        fresh = _ALL_FRESH
-        if not self._take_all(t_ns, received, share):
-            fresh = self._take_each(t_ns, received, share)
-        self._advance(t_ns, step)
-        return fresh
-
-    def _take_all(
-        self, t_ns: int, received: Sequence[int | None], share: float
-    ) -> bool:
-        """Take the replies of all motors if they answered the last time as well.
-
-        Returns False, with nothing taken, if one is missing or not to be believed.
-        """
-        elapsed = (t_ns - self._t_ns) * 1e-9
-        if (
-            None in received
-            or elapsed <= 0.0
-            or self._times_ns != [self._t_ns] * MOTORS
-        ):
-            return False
-        counts = cast(list[int], received)
-        moves = list(map(sub, counts, self.counts))
-        farthest = [fastest * elapsed + _STILL for fastest in self._fastest]
-        if not are_within(moves, farthest):
-            return False
-        rates = zip(self._rates, moves, strict=True)
-        self._rates = [rate + share * (move / elapsed - rate) for rate, move in rates]
-        self.counts = list(counts)
-        self._positions = list[float](counts)
-        self._times_ns = [t_ns] * MOTORS
-        return True
-
-    def _take_each(
-        self, t_ns: int, received: Sequence[int | None], share: float
-    ) -> int:
-        """Take each reply by itself; return the bits of the fresh."""
         fresh = 0
+        self.jump = None
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
         known = self.counts
         for i, counts in enumerate(received):
@@ -122,6 +83,7 @@ class JointEstimator:
             positions[i] = counts
             times_ns[i] = t_ns
             fresh |= 1 << i
+        self._advance(t_ns, step)
         return fresh
 
     def _note_jump(self, index: int, counts: int, elapsed: float) -> None:
