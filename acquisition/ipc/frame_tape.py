@@ -17,7 +17,7 @@ class FrameTape:
     """Writes the frames of the bus into a ring that outlives its writer."""
 
     def __init__(self, ring: Ring) -> None:
-        self._ring = ring
+        self._place = (ring.counter, ring.memory, *ring.places, _FRAME.pack_into)
 
     def add(self, frames: Iterable[tuple[int, bytes, int]], now_ns: int) -> None:
         """Keep frames, oldest first; the oldest on the tape are forgotten.
@@ -26,8 +26,7 @@ class FrameTape:
             frames: identifier, data and monotonic time [ns] of each, 0 = of now.
             now_ns: monotonic time [ns].
         """
-        ring, pack_into = self._ring, _FRAME.pack_into
-        counter, memory, slots, stride = ring.counter, ring.memory, *ring.places
+        counter, memory, slots, stride, pack_into = self._place
         number = counter[0]
         for can_id, data, t_ns in frames:
             place = number % slots * stride

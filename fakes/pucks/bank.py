@@ -110,7 +110,7 @@ class PuckBank:
     def receive_torques(self, group: int, header: int, units: Sequence[int]) -> None:
         """Take a torque frame: its first byte and four torques [puck units]."""
         for puck in self._group(group):
-            if puck.t_header == header:
+            if puck.t_header == header and puck.is_driven:
                 puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
         self._motors.set_torques(list(map(_torque, self._pucks)))
