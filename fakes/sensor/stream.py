@@ -155,7 +155,9 @@ class SensorStream:
         if self._schedule is not None and self._sample_ns <= t_ns:
             self._sample_until(t_ns)
         pending = self._pending
-        gone: list[Saying] = []
+        if not pending or pending[0][0] > t_ns:
+            return []
+        gone = [pending.popleft()]
         while pending and pending[0][0] <= t_ns:
             gone.append(pending.popleft())
         return gone

@@ -11,6 +11,7 @@ import struct
 from binascii import crc_hqx
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import partial
 from typing import NamedTuple
 
 from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond, is_measurable
@@ -84,6 +85,10 @@ class BotaFrame(NamedTuple):
     temperature: float
 
 
+# Without the words of a call, which take longer than the frame.
+_as_frame = partial(tuple[int | float | Wrench].__new__, BotaFrame)
+
+
 def crc_x25(data: bytes) -> int:
     """Return the CRC-16/X-25 of `data`.
 
@@ -119,7 +124,7 @@ def decode_frame(data: bytes, start: int = 0) -> BotaFrame | None:
     _, status, fx, fy, fz, tx, ty, tz, device_us, temperature, _ = _FRAME.unpack_from(
         data, start
     )
-    return BotaFrame(status, (fx, fy, fz, tx, ty, tz), device_us, temperature)
+    return _as_frame((status, (fx, fy, fz, tx, ty, tz), device_us, temperature))
 
 
 def scanner(ranges: Wrench) -> FrameScanner[Reading]:

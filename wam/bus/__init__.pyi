@@ -34,7 +34,7 @@ from .frames import (
     wrap_positions,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
-from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link, as_frame
+from .link import DRAIN_AT_MOST, CanLink, Door, Frame, Link, as_frame
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -88,7 +88,6 @@ __all__ = [
     "Door",
     "Frame",
     "FrameError",
-    "FrameTap",
     "Group",
     "Link",
     "Payload",

@@ -6,8 +6,7 @@ from functools import partial
 from operator import itemgetter
 from typing import NamedTuple, Protocol
 
-from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
-from acquisition.ipc import FrameTape
+from acquisition import NS_PER_S, LinkError, LinkFullError
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
@@ -274,18 +273,3 @@ def error_number(error: Exception) -> int | None:
     """Return the system's error number, which python-can keeps in its own field."""
     own = getattr(error, "error_code", None)
     return own if isinstance(own, int) else getattr(error, "errno", None)
-
-
-class FrameTap:
-    """Implements `wam.bus.link.Tap`; times are monotonic [ns].
-
-    What the bus has no time for is of now.
-    """
-
-    def __init__(self, tape: FrameTape, clock: Clock) -> None:
-        self._tape = tape
-        self._clock = clock
-
-    def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
-        """Note frames that were sent or arrived just now, oldest first."""
-        self._tape.add(frames, self._clock.now_ns())
