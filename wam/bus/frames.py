@@ -212,13 +212,15 @@ def encode_torques(units: Sequence[float], number: int = 42) -> bytes:
         units: three or four torques [puck units]; a missing fourth is 0.
         number: property number of T for the pucks' firmware.
     """
-    if min(units) < -TORQUE_LIMIT or max(units) > TORQUE_LIMIT:
-        units = [min(max(value, -TORQUE_LIMIT), TORQUE_LIMIT) for value in units]
-    a, b, c, *rest = map(floor, units)
-    word = (a & 0x3FFF) << 42 | (b & 0x3FFF) << 28 | (c & 0x3FFF) << 14
-    if rest:
-        word |= rest[0] & 0x3FFF
-    return ((0x80 | number) << 56 | word).to_bytes(8, "big")
+    word = 0x80 | number
+    for value in units:
+        clipped = value
+        if not -TORQUE_LIMIT <= value <= TORQUE_LIMIT:
+            clipped = min(max(value, -TORQUE_LIMIT), TORQUE_LIMIT)
+        word = word << 14 | floor(clipped) & 0x3FFF
+    if len(units) == 3:
+        word <<= 14
+    return word.to_bytes(8, "big")
 
 
 def decode_torques(data: Payload) -> tuple[int, int, int, int]:
