@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -91,9 +92,13 @@ def is_compiled_first() -> bool:
 def mark_ready() -> None:
     """Note the files of the machine code by their digests, once it is there."""
     folder = kernel_folder()
-    if folder is None or (folder / _READY).exists():
+    if folder is None:
         return
-    files = {str(p.relative_to(folder)): _digest(p) for p in _kept(folder)}
+    kept = {str(path.relative_to(folder)): path for path in _kept(folder)}
+    with suppress(OSError, ValueError):
+        if json.loads((folder / _READY).read_text()).keys() == kept.keys():
+            return
+    files = {name: _digest(path) for name, path in kept.items()}
     part = folder / f"{_READY}.{os.getpid()}"
     part.write_text(json.dumps(files))
     part.replace(folder / _READY)

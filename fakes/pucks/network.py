@@ -86,7 +86,11 @@ class PuckNetwork:
 
     def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
         """Take a host's frame whose last bit arrived at `t_ns`."""
-        self.schedule.advance(t_ns)
+        schedule = self.schedule
+        if schedule.next_ns <= t_ns:
+            schedule.advance(t_ns)
+        elif schedule.now_ns < t_ns:  # nothing is planned till then
+            schedule.now_ns = t_ns
         if can_id & SENDER_MASK:
             return
         to = can_id & 0x1F

@@ -6,7 +6,7 @@ from struct import Struct
 
 import numpy as np
 
-from fakes.kernels import kernel
+from fakes.kernels import kernel, mark_ready
 from fakes.sensor.errors import FORCE_ERRORS, TORQUE_ERRORS, ErrorScale, SensorErrors
 from ft_sensor import Wrench
 
@@ -69,6 +69,8 @@ class CompiledErrors(SensorErrors):
         self._records = np.frombuffer(self._bytes, _ERRORS)
         self._record = self._records[0]
         self._shown = self._record["shown"]
+        _show(self._records)  # of zeros: it is compiled now, not with the first sample
+        mark_ready()
         super().__init__(rng, force, torque)
         self._record["drifts"] = self._drifts
 

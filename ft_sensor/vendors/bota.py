@@ -14,7 +14,7 @@ from enum import IntFlag
 from functools import partial
 from typing import NamedTuple
 
-from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond, is_measurable
+from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
 from ft_sensor.serial_line import FrameScanner
 
 HEADER = 0xAA
@@ -135,13 +135,12 @@ def scanner(ranges: Wrench) -> FrameScanner[Reading]:
         if frame is None:
             return None
         status, wrench, device_us, _ = frame
-        is_force = is_measurable(wrench, ranges)
         if not status:
-            return Reading(device_us, wrench, 0, is_force, 0)
+            return Reading(device_us, wrench, 0, True, 0)
         beyond = 0
         if status & _OVER_RANGE:  # which axis it is, the device does not say
             beyond = axes_beyond(wrench, ranges) or ALL_AXES
-        is_trusted = is_force and not status & _UNTRUSTED
+        is_trusted = not status & _UNTRUSTED
         return Reading(device_us, wrench, status, is_trusted, beyond)
 
     return FrameScanner(b"\xaa", FRAME_SIZE, read)
