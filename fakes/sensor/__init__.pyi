@@ -1,5 +1,5 @@
-from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, ErrorScale, SensorErrors
-from .kinds import SensorChoice, make_stream
+from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, SensorErrors
+from .kinds import SensorChoice, make_errors, make_stream
 from .port import FakeSerialPort
 from .pty import SerialPty
 from .stream import SensorStream, Source
@@ -8,12 +8,12 @@ __all__ = [
     "FORCE_ERRORS",
     "NO_SHIFT",
     "TORQUE_ERRORS",
-    "ErrorScale",
     "FakeSerialPort",
     "SensorChoice",
     "SensorErrors",
     "SensorStream",
     "SerialPty",
     "Source",
+    "make_errors",
     "make_stream",
 ]

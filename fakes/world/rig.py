@@ -19,13 +19,7 @@ from fakes.pucks import (
     PuckNetwork,
 )
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.sensor import (
-    ErrorScale,
-    FakeSerialPort,
-    SensorChoice,
-    SensorErrors,
-    make_stream,
-)
+from fakes.sensor import FakeSerialPort, SensorChoice, make_errors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
@@ -123,7 +117,9 @@ class FakeRig:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
-        self.errors = self._make_errors(*kind)
+        self.errors = make_errors(
+            self.random.sensor, *kind, is_compiled=self.plant.is_compiled
+        )
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
@@ -133,14 +129,6 @@ class FakeRig:
         )
         self._port: FakeSerialPort | None = None
         self._cable: Cable | None = None
-
-    def _make_errors(self, *kind: ErrorScale) -> SensorErrors:
-        """Return the errors of the sensor, of the usual kind unless one is given."""
-        if not self.plant.is_compiled:
-            return SensorErrors(self.random.sensor, *kind)
-        from fakes.sensor.compiled import CompiledErrors
-
-        return CompiledErrors(self.random.sensor, *kind)
 
     def open_port(self) -> FakeSerialPort:
         """Return the sensor's serial port, opened now."""

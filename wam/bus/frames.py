@@ -29,7 +29,6 @@ _TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
 _FORCE_PER_N = 256.0
 _TORQUE_PER_NM = 4096.0
 _ACCELERATION_SCALE = 1024.0
-_integer = int.from_bytes
 
 Payload = bytes | bytearray
 
@@ -160,17 +159,17 @@ def _checked_number(number: int) -> int:
 
 def wrap_positions(counts: Sequence[int]) -> list[int]:
     """Return motor positions [encoder counts] as 22 bits carry them, signed."""
-    half, modulus = _POSITION_SIGN, _POSITION_MODULUS
-    return [(count + half) % modulus - half for count in counts]
+    half = _POSITION_SIGN
+    return [(count + half) % _POSITION_MODULUS - half for count in counts]
 
 
 def encode_position(counts: int) -> bytes:
-    """Return the three bytes of a motor position, wrapped at 22 bits as on a puck."""
+    """Return the three bytes of one of `encode_positions`."""
     return encode_positions((counts,))[0]
 
 
 def encode_positions(counts: Sequence[int]) -> list[bytes]:
-    """Return the three bytes of each of some motor positions [encoder counts]."""
+    """Return three bytes for each motor position, wrapped at 22 bits as on a puck."""
     return [(count % _POSITION_MODULUS).to_bytes(3, "big") for count in counts]
 
 
@@ -183,12 +182,11 @@ def decode_position(data: Payload) -> int:
     Raises:
         FrameError: not 3 or 6 bytes.
     """
-    if len(data) != 3:  # with a joint encoder's behind it
-        if len(data) != 6:
-            raise FrameError("Not a position reply", data)
-        data = data[:3]
+    if len(data) not in (3, 6):
+        raise FrameError("Not a position reply", data)
     # The two bits above the 22 have no meaning, as for the vendor's library.
-    return (_integer(data, "big") & _POSITION_MASK ^ _POSITION_SIGN) - _POSITION_SIGN
+    counts = int.from_bytes(data[:3], "big") & _POSITION_MASK
+    return (counts ^ _POSITION_SIGN) - _POSITION_SIGN
 
 
 def decode_joint_encoder(data: Payload) -> int | None:
