@@ -29,7 +29,6 @@ from acquisition.devices import ArmReading, SafetyMode, Vector
 
 _BRAKED = frozenset({SafetyMode.E_STOP, SafetyMode.IDLE})
 _NO_LOAD = ContactState()
-_NOTHING_WRONG = (OK,) * 12  # checks
 _TREMBLE = 1  # counts by which an encoder at rest flickers
 
 Point = tuple[float, float, float]
@@ -141,13 +140,9 @@ def check(
         load,
         _check_cadence(limits, state, now),
     )
-    worst = OK
-    if verdicts == _NOTHING_WRONG:
-        return state, worst
-    for verdict in verdicts:
-        if verdict.severity > worst.severity:
-            worst = verdict
-    return state, worst
+    if verdicts.count(OK) == len(verdicts):
+        return state, OK
+    return state, max((OK, *verdicts), key=lambda verdict: verdict.severity)
 
 
 def _remember(
@@ -199,8 +194,7 @@ def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
         return verdict_for(Fault.SAFETY_SILENT, detail, is_lasting=is_lasting)
     if seen.safety not in _BRAKED:
         return OK
-    is_stopped = seen.safety is SafetyMode.E_STOP
-    fault = Fault.E_STOP if is_stopped else Fault.PENDANT_IDLE
+    fault = Fault.E_STOP if seen.safety is SafetyMode.E_STOP else Fault.PENDANT_IDLE
     return verdict_for(fault, CircuitCauses())
 
 
@@ -252,13 +246,12 @@ def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
 def _check_position(
     limits: GuardLimits, state: GuardState, q: list[float]
 ) -> GuardVerdict:
-    if are_between(limits.q_lower, q, limits.q_upper):
-        return OK
-    ranges = zip(q, limits.q_lower, limits.q_upper, strict=True)
-    for joint, (value, low, high) in enumerate(ranges):
-        if not low <= value <= high and state.armed >> joint & 1:
-            limit = low if value < low else high
-            return verdict_for(Fault.JOINT_LIMIT, JointExcess(joint + 1, value, limit))
+    lower, upper = limits.q_lower, limits.q_upper
+    if not are_between(lower, q, upper):
+        for i, (value, low, high) in enumerate(zip(q, lower, upper, strict=True)):
+            if not low <= value <= high and state.armed >> i & 1:
+                limit = low if value < low else high
+                return verdict_for(Fault.JOINT_LIMIT, JointExcess(i + 1, value, limit))
     return OK
 
 
@@ -281,11 +274,10 @@ def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
 
 def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
     """Return the first joint beyond its limit; None if all are within."""
-    if are_within(values, limits):
-        return None
-    for joint, (value, limit) in enumerate(zip(values, limits, strict=True)):
-        if not -limit <= value <= limit:
-            return JointExcess(joint + 1, abs(value), limit)
+    if not are_within(values, limits):
+        for i, (value, limit) in enumerate(zip(values, limits, strict=True)):
+            if not -limit <= value <= limit:
+                return JointExcess(i + 1, abs(value), limit)
     return None
 
 

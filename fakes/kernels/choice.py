@@ -3,7 +3,6 @@
 import hashlib
 import json
 import os
-from contextlib import suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -92,13 +91,9 @@ def is_compiled_first() -> bool:
 def mark_ready() -> None:
     """Note the files of the machine code by their digests, once it is there."""
     folder = kernel_folder()
-    if folder is None:
+    if folder is None or (folder / _READY).exists():
         return
-    kept = {str(path.relative_to(folder)): path for path in _kept(folder)}
-    with suppress(OSError, ValueError):
-        if json.loads((folder / _READY).read_text()).keys() == kept.keys():
-            return
-    files = {name: _digest(path) for name, path in kept.items()}
+    files = {str(p.relative_to(folder)): _digest(p) for p in _kept(folder)}
     part = folder / f"{_READY}.{os.getpid()}"
     part.write_text(json.dumps(files))
     part.replace(folder / _READY)
@@ -144,7 +139,7 @@ def _places() -> list[Path]:
 def _source_digest() -> str:
     """Return a digest of the sources that the machine code is made of."""
     digest = hashlib.sha256()
-    for name in ("ground", "kernels", "plant", "sensor"):
+    for name in ("ground", "kernels", "plant"):
         for path in sorted((_FAKES / name).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

@@ -1,5 +1,5 @@
 from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, SensorErrors
-from .kinds import SensorChoice, make_errors, make_stream
+from .kinds import SensorChoice, make_stream
 from .port import FakeSerialPort
 from .pty import SerialPty
 from .stream import SensorStream, Source
@@ -14,6 +14,5 @@ __all__ = [
     "SensorStream",
     "SerialPty",
     "Source",
-    "make_errors",
     "make_stream",
 ]

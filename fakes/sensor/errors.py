@@ -112,7 +112,12 @@ class SensorErrors:
 
     def apply(self, t_ns: int, wrench: Sequence[float]) -> Wrench:
         """Return what is shown at `t_ns` under `wrench` [N, N m], shape (6,)."""
-        self._go_on(t_ns, wrench)
+        before_ns, self._t_ns = self._t_ns, t_ns
+        step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
+        if step_ns != self._step_ns:  # samples come at an almost even pace
+            self._pace_drifts(step_ns)
+        if self._slow_ns is None or t_ns - self._slow_ns >= _SLOW_NS:
+            self._update_slow(t_ns, wrench)
         next_normal = self._normals.next
         shown: list[float] = []
         drifts: list[float] = []
@@ -125,15 +130,6 @@ class SensorErrors:
         self._drifts = drifts
         fx, fy, fz, tx, ty, tz = shown
         return fx, fy, fz, tx, ty, tz
-
-    def _go_on(self, t_ns: int, wrench: Sequence[float]) -> None:
-        """Let what is slower than a sample go on to `t_ns`."""
-        before_ns, self._t_ns = self._t_ns, t_ns
-        step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
-        if step_ns != self._step_ns:  # samples come at an almost even pace
-            self._pace_drifts(step_ns)
-        if self._slow_ns is None or t_ns - self._slow_ns >= _SLOW_NS:
-            self._update_slow(t_ns, wrench)
 
     def _pace_drifts(self, step_ns: int) -> None:
         """Let the drifts step by `step_ns` from now on."""

@@ -3,10 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from fakes.sensor.bota import BotaOptions, bota_stream
-from fakes.sensor.errors import ErrorScale, SensorErrors
+from fakes.sensor.errors import SensorErrors
 from fakes.sensor.optoforce import (
     SENSITIVITY,
     SERIAL_NUMBER,
@@ -100,20 +98,3 @@ _MAKERS: dict[str, _Maker] = {
     "optoforce": _optoforce,
 }
 SERIAL_KINDS = tuple(_MAKERS)
-
-
-def make_errors(
-    rng: np.random.Generator, *kind: ErrorScale, is_compiled: bool
-) -> SensorErrors:
-    """Return the errors of a sensor, drawn from `rng`; both ways give the same bits.
-
-    Args:
-        rng: of the sensor.
-        kind: errors of force and torque; none = the usual ones.
-        is_compiled: compiled functions are to be used.
-    """
-    if not is_compiled:
-        return SensorErrors(rng, *kind)
-    from fakes.sensor.compiled import CompiledErrors
-
-    return CompiledErrors(rng, *kind)

@@ -155,9 +155,7 @@ class SensorStream:
         if self._schedule is not None and self._sample_ns <= t_ns:
             self._sample_until(t_ns)
         pending = self._pending
-        if not pending or pending[0][0] > t_ns:
-            return []
-        gone = [pending.popleft()]
+        gone: list[Saying] = []
         while pending and pending[0][0] <= t_ns:
             gone.append(pending.popleft())
         return gone

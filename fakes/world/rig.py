@@ -19,7 +19,7 @@ from fakes.pucks import (
     PuckNetwork,
 )
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.sensor import FakeSerialPort, SensorChoice, make_errors, make_stream
+from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
@@ -117,9 +117,7 @@ class FakeRig:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
-        self.errors = make_errors(
-            self.random.sensor, *kind, is_compiled=self.plant.is_compiled
-        )
+        self.errors = SensorErrors(self.random.sensor, *kind)
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
