@@ -1,4 +1,5 @@
 from . import control_loop, ipc, recording, trial_file
+from .bounds import are_between, are_within
 from .cdr import CdrWriter, encode_log, encode_string
 from .clock import (
     NS_PER_S,
@@ -94,6 +95,8 @@ __all__ = [
     "Whole",
     "WrenchSample",
     "WrenchSensor",
+    "are_between",
+    "are_within",
     "control_loop",
     "encode_log",
     "encode_string",

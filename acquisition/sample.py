@@ -2,10 +2,13 @@
 
 from dataclasses import dataclass
 from enum import IntFlag
+from itertools import repeat
+from operator import sub
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.bounds import are_within
 from acquisition.devices import Arm, ArmReading, SafetyMode, Vector, WrenchSample
 from acquisition.schema import CYCLE
 
@@ -235,7 +238,5 @@ def control_bits(*, is_locked: bool, was_clipped: bool, has_contact: bool) -> in
 
 def is_clipped(sent: Vector, wanted: Vector) -> bool:
     """Return whether torques [N m], shapes (7,), were cut on their way out."""
-    for a, b in zip(sent.tolist(), wanted.tolist(), strict=True):
-        if not -_ROUNDING <= a - b <= _ROUNDING:
-            return True
-    return False
+    cuts = map(sub, sent.tolist(), wanted.tolist())
+    return not are_within(cuts, repeat(_ROUNDING))

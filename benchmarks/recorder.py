@@ -46,7 +46,7 @@ class Load:
     def __init__(self, shared: SharedLayout) -> None:
         self._shared = shared
         self._sample = Sample()
-        self._tape = FrameTape(shared.frames)
+        self._tape = FrameTape(shared.frames, SystemClock())
         self._noise = np.random.default_rng(1).normal(size=(997, 7))
         self.cycles = 0
 
@@ -62,7 +62,7 @@ class Load:
             wrench = WrenchSample(now_ns, number, (1.0,) * 6, 0, True, False)
             self._shared.wrenches.write(pack_wrench(wrench))
         data = number.to_bytes(8, "little")
-        self._tape.add([(now_ns, 0x400 + frame, 8, data) for frame in range(13)])
+        self._tape.add([(0x400 + frame, data, now_ns) for frame in range(13)])
         self.cycles += 1
 
 

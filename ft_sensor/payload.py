@@ -47,11 +47,14 @@ class Payload:
     sign: float
     bias: Array
     _weighing: Array = field(init=False, repr=False, compare=False)  # (3, 6)
+    # An array: to multiply by a number takes numpy twice as long.
+    _signs: Array = field(init=False, repr=False, compare=False)  # (6,)
 
     def __post_init__(self) -> None:
         turned = self.rotation @ cross_matrix(self.com).T
         weighing = -self.mass * GRAVITY * np.hstack([self.rotation, turned])
         object.__setattr__(self, "_weighing", weighing)
+        object.__setattr__(self, "_signs", np.full(6, self.sign))
 
     def tared(self, reading: Floats, rotation_base_7: Array) -> "Payload":
         """Return the payload with the bias that a reading in the air gives.
@@ -79,7 +82,7 @@ class Payload:
             raw: readings [N, N m], shape (..., 6).
             rotation_base_7: orientation(s) of frame 7, shape (..., 3, 3).
         """
-        return self.sign * (raw - self.bias) - self.weight(rotation_base_7)
+        return self._signs * (raw - self.bias) - self.weight(rotation_base_7)
 
     def to_base(self, wrench: Floats, rotation_base_7: Floats) -> Floats:
         """Return the force part of `wrench` (..., 6) in the base frame, (..., 3)."""

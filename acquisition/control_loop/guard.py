@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from acquisition.bounds import are_between, are_within
 from acquisition.clock import NS_PER_MS, NS_PER_S, PERIOD_NS
 from acquisition.control_loop.contact import Contact, ContactState, check_contact
 from acquisition.control_loop.details import (
@@ -139,11 +140,9 @@ def check(
         load,
         _check_cadence(limits, state, now),
     )
-    worst = OK
-    for verdict in verdicts:
-        if verdict is not OK and verdict.severity > worst.severity:
-            worst = verdict
-    return state, worst
+    if verdicts.count(OK) == len(verdicts):
+        return state, OK
+    return state, max((OK, *verdicts), key=lambda verdict: verdict.severity)
 
 
 def _remember(
@@ -195,8 +194,7 @@ def _check_safety(limits: GuardLimits, seen: Observation) -> GuardVerdict:
         return verdict_for(Fault.SAFETY_SILENT, detail, is_lasting=is_lasting)
     if seen.safety not in _BRAKED:
         return OK
-    is_stopped = seen.safety is SafetyMode.E_STOP
-    fault = Fault.E_STOP if is_stopped else Fault.PENDANT_IDLE
+    fault = Fault.E_STOP if seen.safety is SafetyMode.E_STOP else Fault.PENDANT_IDLE
     return verdict_for(fault, CircuitCauses())
 
 
@@ -248,11 +246,12 @@ def _check_numbers(total: float, seen: Observation) -> GuardVerdict:
 def _check_position(
     limits: GuardLimits, state: GuardState, q: list[float]
 ) -> GuardVerdict:
-    ranges = zip(q, limits.q_lower, limits.q_upper, strict=True)
-    for joint, (value, low, high) in enumerate(ranges):
-        if not low <= value <= high and state.armed >> joint & 1:
-            limit = low if value < low else high
-            return verdict_for(Fault.JOINT_LIMIT, JointExcess(joint + 1, value, limit))
+    lower, upper = limits.q_lower, limits.q_upper
+    if not are_between(lower, q, upper):
+        for i, (value, low, high) in enumerate(zip(q, lower, upper, strict=True)):
+            if not low <= value <= high and state.armed >> i & 1:
+                limit = low if value < low else high
+                return verdict_for(Fault.JOINT_LIMIT, JointExcess(i + 1, value, limit))
     return OK
 
 
@@ -275,9 +274,10 @@ def _check_torque(limits: GuardLimits, tau: list[float]) -> GuardVerdict:
 
 def _first_excess(values: list[float], limits: Sequence[float]) -> JointExcess | None:
     """Return the first joint beyond its limit; None if all are within."""
-    for joint, (value, limit) in enumerate(zip(values, limits, strict=True)):
-        if not -limit <= value <= limit:
-            return JointExcess(joint + 1, abs(value), limit)
+    if not are_within(values, limits):
+        for i, (value, limit) in enumerate(zip(values, limits, strict=True)):
+            if not -limit <= value <= limit:
+                return JointExcess(i + 1, abs(value), limit)
     return None
 
 

@@ -7,9 +7,11 @@ it is of: torques within their limits, and no sudden ones.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
+from operator import mul, sub
 
 import numpy as np
 
+from acquisition.bounds import are_within
 from acquisition.devices import Vector
 
 
@@ -84,6 +86,7 @@ class GuardLimits:
 # hold (17 rad/s after a twist of 1.2 N m); at 0.3 it does not, and one false position
 # makes 0.8 rad/s.
 TORQUE_STEP = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.3)
+_GENTLE_STEP = tuple(0.99 * step for step in TORQUE_STEP)  # however it is rounded
 
 
 def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector:
@@ -96,7 +99,11 @@ def bounded_torque(tau: Vector, last: Vector, limits: Sequence[float]) -> Vector
     """
     # Plain numbers: seven of them are bounded faster than numpy looks at an array, and
     # comparisons cost half of what `min` and `max` do. A NaN is neither less nor more.
-    rows = zip(tau.tolist(), last.tolist(), limits, TORQUE_STEP, strict=True)
+    values, befores = tau.tolist(), last.tolist()
+    is_gentle = are_within(map(sub, values, befores), map(mul, _GENTLE_STEP, limits))
+    if is_gentle and are_within(values, limits):
+        return tau
+    rows = zip(values, befores, limits, TORQUE_STEP, strict=True)
     bounded: list[float] = []
     for wanted, before, limit, share in rows:
         step = share * limit

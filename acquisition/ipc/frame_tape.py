@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from acquisition.clock import Clock
 from acquisition.ipc.rings import Ring
 from acquisition.sample import Record
 
@@ -16,16 +17,26 @@ _FRAME: Final = struct.Struct("<QIB3x8s")
 class FrameTape:
     """Writes the frames of the bus into a ring that outlives its writer."""
 
-    def __init__(self, ring: Ring) -> None:
-        self._ring = ring
+    def __init__(self, ring: Ring, clock: Clock) -> None:
+        self._clock = clock
+        self._place = (ring.counter, ring.memory, *ring.places, _FRAME.pack_into)
 
-    def add(self, frames: Iterable[tuple[int, int, int, bytes]]) -> None:
-        """Keep frames; the oldest are forgotten.
+    def add(self, frames: Iterable[tuple[int, bytes, int]]) -> None:
+        """Keep frames that were sent or arrived just now, oldest first.
+
+        The oldest on the tape are forgotten.
 
         Args:
-            frames: monotonic time [ns], identifier, length and data of each.
+            frames: identifier, data and monotonic time [ns] of each, 0 = of now.
         """
-        self._ring.pack(_FRAME, frames)
+        now_ns = self._clock.now_ns()
+        counter, memory, slots, stride, pack_into = self._place
+        number = counter[0]
+        for can_id, data, t_ns in frames:
+            place = number % slots * stride
+            pack_into(memory, place, t_ns or now_ns, can_id, len(data), data)
+            number += 1
+            counter[0] = number
 
 
 def last_frames(ring: Ring, seconds: float = SECONDS) -> Record:

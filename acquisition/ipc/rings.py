@@ -12,8 +12,6 @@ import ctypes
 import mmap
 import os
 import platform
-import struct
-from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -133,6 +131,12 @@ class Ring:
     """A ring of fixed records in memory that may be shared: one writer, any readers.
 
     The record being written is never handed out, so `slots - 1` records can be read.
+
+    Attributes:
+        slots: places for records; record n goes to place n % slots.
+        places: number of places, and bytes from one to the next.
+        memory: the places, for a writer that packs its records there.
+        counter: one number, of records written: a writer raises it behind each record.
     """
 
     def __init__(self, memory: memoryview, dtype: LayoutType, slots: int) -> None:
@@ -140,10 +144,11 @@ class Ring:
         self.slots = slots
         self._size = dtype.itemsize
         self._stride = lines(dtype.itemsize)
-        self._counter = memory[:8].cast("Q")
-        self._bytes = memory[LINE : self.size_of(dtype, slots)]
+        self.places = (slots, self._stride)
+        self.counter = memory[:8].cast("Q")
+        self.memory = memory[LINE : self.size_of(dtype, slots)]
         self._records: Record = np.ndarray(
-            (slots,), dtype, self._bytes, strides=(self._stride,)
+            (slots,), dtype, self.memory, strides=(self._stride,)
         )
 
     @staticmethod
@@ -154,28 +159,15 @@ class Ring:
     @property
     def written(self) -> int:
         """Number of records written since the start."""
-        return self._counter[0]
+        return self.counter[0]
 
     def write(self, payload: bytes | memoryview) -> None:
         """Append one record, given as its bytes."""
-        counter = self._counter
+        counter = self.counter
         number = counter[0]
         start = number % self.slots * self._stride
-        self._bytes[start : start + self._size] = payload
+        self.memory[start : start + self._size] = payload
         counter[0] = number + 1
-
-    def pack(self, layout: struct.Struct, rows: Iterable[Sequence[object]]) -> None:
-        """Append one record for each of `rows`, one after the other.
-
-        A row has the values of `layout`, which covers all of a record's bytes.
-        """
-        counter, pack_into, memory = self._counter, layout.pack_into, self._bytes
-        slots, stride = self.slots, self._stride
-        number = counter[0]
-        for row in rows:
-            pack_into(memory, number % slots * stride, *row)
-            number += 1
-            counter[0] = number
 
     def reader(self) -> "RingReader":
         """Return a reader that starts at the next record."""

@@ -29,7 +29,7 @@ from experiments.settings import FootSection, RigSettings, TerrainRow, build_dev
 from ft_sensor import LiveFoot, TerrainFrame, payload_of
 from ft_sensor.serial_line import SerialLink, SerialPort, SerialSensor
 from ft_sensor.vendors import BarrettSensor
-from wam.bus import CanLink, Door, FrameTap
+from wam.bus import CanLink, Door
 from wam.control import (
     FootController,
     FrictionCompensation,
@@ -105,7 +105,7 @@ def build_safety_limits(rig: RigSettings) -> SafetyLimits:
 
 def build_link(door: Door, shared: SharedLayout, clock: Clock) -> CanLink:
     """Return the link through a door; every frame goes into the shared memory too."""
-    return CanLink(door, FrameTap(FrameTape(shared.frames), clock))
+    return CanLink(door, FrameTape(shared.frames, clock).add)
 
 
 def build_arm(

@@ -8,7 +8,7 @@ import can
 
 from acquisition import NS_PER_S, Clock
 from fakes.pucks import OutFrame, PuckNetwork, WiredNetwork
-from wam.bus import DRAIN_AT_MOST, PythonCanDoor
+from wam.bus import DRAIN_AT_MOST, PythonCanDoor, as_frame
 from wam.bus import Frame as DoorFrame
 
 _PATIENCE_NS = NS_PER_S
@@ -26,7 +26,7 @@ class FakeCanBus(can.BusABC):
     def __init__(self, network: PuckNetwork, clock: Clock) -> None:
         self.channel_info = "fake bus"
         self.network = network
-        self._faults = network.faults
+        self._faults, self._schedule = network.faults, network.schedule
         self._clock = clock
         self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
@@ -76,8 +76,9 @@ class FakeCanBus(can.BusABC):
 
     def put(self, can_id: int, data: bytes) -> None:
         """Send a data frame as `send` does; only while `is_undisturbed`."""
-        now_ns = self._clock.now_ns()
-        self.advance(now_ns)
+        now_ns, schedule = self._clock.now_ns(), self._schedule
+        if now_ns != self._t_ns or schedule.outbox or schedule.next_ns <= now_ns:
+            self.advance(now_ns)
         self._wired.send(now_ns, can_id, data)
 
     def arrived(self) -> deque[OutFrame]:
@@ -195,7 +196,7 @@ class InProcessDoor(PythonCanDoor):
             return []
         if len(inbox) >= DRAIN_AT_MOST or self._now_ns() - inbox[0][0] > NS_PER_S:
             return super().receive()
-        frames = [DoorFrame(can_id, data, t_ns) for t_ns, can_id, data in inbox]
+        frames = [as_frame((can_id, data, t_ns)) for t_ns, can_id, data in inbox]
         inbox.clear()
         return frames
 

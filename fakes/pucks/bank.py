@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from operator import attrgetter
 from typing import Protocol
 
 from acquisition import SafetyMode
@@ -10,7 +11,10 @@ from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
-from wam.bus import MOTOR_NODES, Property, encode_position, wrap_position
+from wam.bus import MOTOR_NODES, Property, encode_positions, wrap_positions
+
+_node, _position_id = attrgetter("node"), attrgetter("position_id")
+_torque = attrgetter("torque")
 
 
 class MotorSide(Protocol):
@@ -58,6 +62,7 @@ class PuckBank:
             for node in MOTOR_NODES
         ]
         self._members: dict[int, list[MotorPuck]] = {}
+        self._reporting: dict[tuple[int, int], list[MotorPuck]] = {}
         self._wake_up()
 
     def follow(self, mode: SafetyMode, before: SafetyMode) -> None:
@@ -66,26 +71,26 @@ class PuckBank:
         if (power := power_after(mode, before)) is not None:
             for puck in self._pucks:
                 puck.restart(power)
-        self._members.clear()
+        self._forget_groups()
         self._set_puck_modes()
 
     def silence(self, node: int, *, is_mute: bool) -> None:
         """Cut the transmit wire of a puck, or mend it."""
-        self._pucks[node - 1].life.is_mute = is_mute
+        self._pucks[node - 1].life.cut(is_mute=is_mute)
 
     def set_bus_voltage(self, voltage: float) -> None:
         """Let the pucks measure `voltage` [V]."""
         for puck in self._pucks:
-            puck.properties["VBUS"] = round(voltage)
+            puck.define("VBUS", round(voltage))
 
     def set_property(self, node: int, name: str, value: int) -> None:
         """Let a puck measure `value` for a property such as TEMP."""
-        self._pucks[node - 1].properties[name] = value
+        self._pucks[node - 1].define(name, value)
 
     def reboot(self, node: int) -> None:
         """Let a puck fall into its monitor."""
         self._pucks[node - 1].restart(Power.MONITOR)
-        self._members.clear()
+        self._forget_groups()
         self._apply()
 
     def receive(self, node: int, request: Property) -> None:
@@ -96,15 +101,19 @@ class PuckBank:
 
     def receive_group(self, group: int, request: Property) -> None:
         """Take a GET or SET sent to a group."""
-        self._ask_or_tell(self._group(group), request)
+        key = (group, request.number)
+        if request.value is None and key in self._reporting:
+            self._plan_report(self._reporting[key])
+        else:
+            self._ask_or_tell(self._group(group), request)
 
     def receive_torques(self, group: int, header: int, units: Sequence[int]) -> None:
         """Take a torque frame: its first byte and four torques [puck units]."""
         for puck in self._group(group):
-            if puck.t_header == header:
-                puck.take_torque(units[(puck.properties["PIDX"] - 1) & 3])
+            if puck.t_header == header and puck.is_driven:
+                puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
-        self._motors.set_torques([puck.torque for puck in self._pucks])
+        self._motors.set_torques(list(map(_torque, self._pucks)))
 
     def _wake_up(self) -> None:
         for puck in self._pucks:
@@ -119,13 +128,15 @@ class PuckBank:
             for puck in pucks:
                 self._tell(puck, number, request.value)
             return
-        feedback = [p for p in pucks if p.p_number == number and p.life.power is AWAKE]
-        if feedback:
-            self._schedule.after(self._options.latch_ns, lambda: self._report(feedback))
+        if feedback := _asked_for_positions(pucks, number):
+            self._plan_report(feedback)
             return
         for puck in pucks:
             if (name := puck.name_of(number)) is not None:
                 puck.life.answer(number, name, partial(self._value_of, puck))
+
+    def _plan_report(self, pucks: list[MotorPuck]) -> None:
+        self._schedule.after(self._options.latch_ns, partial(self._report, pucks))
 
     def _value_of(self, puck: MotorPuck, name: str) -> int | None:
         return puck.value_of(name, self._encoder_counts()[puck.node - 1])
@@ -133,16 +144,14 @@ class PuckBank:
     def _report(self, pucks: list[MotorPuck]) -> None:
         """Latch the positions of `pucks` and hand them to the wire."""
         counts = self._encoder_counts()
-        reported: dict[int, int] = {}
-        for puck in pucks:
-            life = puck.life
-            if life.power is AWAKE and not life.is_mute:
-                node = puck.node
-                position = wrap_position(counts[node - 1] + puck.offset)
-                self._schedule.emit(puck.position_id, encode_position(position))
-                reported[node] = position
-        if reported:
-            self._on_positions(reported)
+        speaking = [puck for puck in pucks if puck.life.is_speaking]
+        if not speaking:
+            return
+        positions = [counts[puck.node - 1] + puck.offset for puck in speaking]
+        can_ids = list(map(_position_id, speaking))
+        self._schedule.emit_all(can_ids, encode_positions(positions))
+        nodes = map(_node, speaking)
+        self._on_positions(dict(zip(nodes, wrap_positions(positions), strict=True)))
 
     def _tell(self, puck: MotorPuck, number: int, value: int) -> None:
         name = puck.name_of(number)
@@ -156,8 +165,8 @@ class PuckBank:
             puck.take_torque(value)
             self._apply()
         else:
-            puck.properties[name] = value
-            self._members.clear()
+            puck.define(name, value)
+            self._forget_groups()
             if name == "MODE":
                 puck.torque = 0
                 self._apply()
@@ -173,16 +182,16 @@ class PuckBank:
         def finish() -> None:
             puck.restart(power)
             self._lose_positions([puck])
-            self._members.clear()
+            self._forget_groups()
 
         puck.life.later(delay_ns, finish)
-        self._members.clear()
+        self._forget_groups()
         self._apply()
 
     def _set_puck_modes(self) -> None:
         for puck in self._pucks:
             if puck.is_awake:
-                puck.properties["MODE"] = puck_mode_in(self._mode)
+                puck.define("MODE", puck_mode_in(self._mode))
             puck.torque = 0
         self._apply()
 
@@ -192,7 +201,7 @@ class PuckBank:
         is_driven = any(puck.is_driven for puck in self._pucks)
         is_powered = self._mode is not SafetyMode.E_STOP
         self._motors.set_braking(is_powered and not is_driven, is_powered)
-        self._motors.set_torques([puck.torque for puck in self._pucks])
+        self._motors.set_torques(list(map(_torque, self._pucks)))
 
     def _encoder_counts(self) -> Sequence[int]:
         self._motors.advance(self._schedule.now_ns)
@@ -204,6 +213,21 @@ class PuckBank:
             puck.lose_position(counts[puck.node - 1])
 
     def _group(self, group: int) -> list[MotorPuck]:
-        if group not in self._members:
-            self._members[group] = [p for p in self._pucks if p.hears(group)]
-        return self._members[group]
+        members = self._members.get(group)
+        if members is None:
+            members = [p for p in self._pucks if p.hears(group)]
+            self._members[group] = members
+            for number in {p.p_number for p in members}:
+                if feedback := _asked_for_positions(members, number):
+                    self._reporting[group, number] = feedback
+        return members
+
+    def _forget_groups(self) -> None:
+        """Find out anew who belongs to which group and who runs."""
+        self._members.clear()
+        self._reporting.clear()
+
+
+def _asked_for_positions(pucks: list[MotorPuck], number: int) -> list[MotorPuck]:
+    """Return those that run and to which property `number` is their position."""
+    return [p for p in pucks if p.p_number == number and p.life.power is AWAKE]

@@ -1,6 +1,6 @@
 """The time of a simulated network: what happens later, and the frames sent."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 
 from wam.bus import encode_reply, is_wide, property_reply_id
@@ -30,6 +30,7 @@ class EventQueue:
         self.now_ns = t_ns
         self.next_ns = NEVER
         self.emit: Callable[[int, bytes], None] = self.put
+        self._is_intercepted = False
         self._on_alarm: Callable[[], None] = lambda: None
         self._alarm_ns = NEVER
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
@@ -46,6 +47,17 @@ class EventQueue:
     def intercept(self, emit: Callable[[int, bytes], None]) -> None:
         """Give every frame of a device to `emit` from now on, instead of `put`."""
         self.emit = emit
+        self._is_intercepted = True
+
+    def emit_all(self, can_ids: Sequence[int], payloads: Sequence[bytes]) -> None:
+        """Send frames of devices now, in this order."""
+        if self._is_intercepted:
+            for can_id, data in zip(can_ids, payloads, strict=True):
+                self.emit(can_id, data)
+        else:
+            now_ns = self.now_ns
+            frames = zip(can_ids, payloads, strict=True)
+            self.outbox += [(now_ns, can_id, data) for can_id, data in frames]
 
     def define_alarm(self, action: Callable[[], None]) -> None:
         """Call `action` when the alarm goes off."""

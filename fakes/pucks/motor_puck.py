@@ -33,7 +33,8 @@ class MotorPuck:
         torque: torque it makes [puck units].
         p_number: number of the property P in its firmware.
         t_header: first byte of a torque frame that it takes.
-        properties: what a host has set or may ask for, by name.
+        slot: which of the four torques of a frame is its own, 0 to 3.
+        is_driven: it follows torques.
     """
 
     def __init__(self, life: PuckPower, options: NetworkOptions) -> None:
@@ -47,7 +48,7 @@ class MotorPuck:
         self._table = nearest_documented(self.vers)
         self.p_number = property_number(Device.MOTOR, "P", self._table)
         self.t_header = 0x80 | property_number(Device.MOTOR, "T", self._table)
-        self.properties = {
+        self._properties = {
             "ROLE": MAGNETIC_ENCODER | PuckRole.TATER,
             **{"SN": 1000 + node, "ID": node, "ERROR": 0, "MODE": PuckMode.IDLE},
             **{"TEMP": 35, "PTEMP": 60, "OTEMP": 60, "THERM": 33},
@@ -58,20 +59,27 @@ class MotorPuck:
             **{"PIDX": node if node <= 4 else node - 4, "JIDX": node},
         }
         self._monitor_vers = options.monitor_vers
+        self._follow_properties()
+
+    def define(self, name: str, value: int) -> None:
+        """Let a property have `value` from now on."""
+        self._properties[name] = value
+        self._follow_properties()
+
+    def _follow_properties(self) -> None:
+        """Take over what every torque frame asks for."""
+        self.is_driven = self._properties["MODE"] == _DRIVEN
+        self.slot = (self._properties["PIDX"] - 1) & 3
+        self._limit = self._properties["MT"]
 
     @property
     def is_awake(self) -> bool:
         """Whether its firmware runs."""
         return self.life.power is AWAKE
 
-    @property
-    def is_driven(self) -> bool:
-        """Whether it follows torques."""
-        return self.properties["MODE"] == _DRIVEN
-
     def hears(self, group: int) -> bool:
         """Return whether the puck belongs to `group` and runs."""
-        groups = (self.properties[name] for name in ("GRPA", "GRPB", "GRPC"))
+        groups = (self._properties[name] for name in ("GRPA", "GRPB", "GRPC"))
         return self.life.is_listening and group in groups
 
     def name_of(self, number: int) -> str | None:
@@ -86,16 +94,15 @@ class MotorPuck:
         computed = {
             "VERS": self._monitor_vers if is_asleep else self.vers,
             "STAT": PuckStatus.RESET if is_asleep else PuckStatus.READY,
-            "MECH": counts % (self.properties["CTS"] or 1),
+            "MECH": counts % (self._properties["CTS"] or 1),
             "T": self.torque,
         }
-        return computed.get(name, self.properties.get(name))
+        return computed.get(name, self._properties.get(name))
 
     def take_torque(self, units: int) -> None:
         """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
-        properties = self.properties
-        if properties["MODE"] == _DRIVEN:
-            limit = properties["MT"]
+        if self.is_driven:
+            limit = self._limit
             self.torque = (
                 limit if units > limit else -limit if units < -limit else units
             )
@@ -104,8 +111,8 @@ class MotorPuck:
         """Lose what a puck loses with its program."""
         self.life.enter(power)
         self.torque = 0
-        self.properties["MODE"] = PuckMode.IDLE
+        self.define("MODE", PuckMode.IDLE)
 
     def lose_position(self, counts: int) -> None:
         """Count from within one turn again, as the magnetic encoder sees it."""
-        self.offset = counts % (self.properties["CTS"] or 1) - counts
+        self.offset = counts % (self._properties["CTS"] or 1) - counts

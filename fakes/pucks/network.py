@@ -86,7 +86,11 @@ class PuckNetwork:
 
     def receive(self, t_ns: int, can_id: int, data: Payload) -> None:
         """Take a host's frame whose last bit arrived at `t_ns`."""
-        self.schedule.advance(t_ns)
+        schedule = self.schedule
+        if schedule.next_ns <= t_ns:
+            schedule.advance(t_ns)
+        elif schedule.now_ns < t_ns:  # nothing is planned till then
+            schedule.now_ns = t_ns
         if can_id & SENDER_MASK:
             return
         to = can_id & 0x1F
@@ -112,7 +116,7 @@ class PuckNetwork:
             self._safety.is_mute = is_mute
         elif node == SENSOR_NODE:
             if self._sensor is not None:
-                self._sensor.life.is_mute = is_mute
+                self._sensor.life.cut(is_mute=is_mute)
         else:
             self._bank.silence(node, is_mute=is_mute)
 

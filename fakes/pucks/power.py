@@ -47,7 +47,8 @@ class PuckPower:
     Attributes:
         node: the node's id.
         power: what it is doing.
-        is_mute: its transmit wire is cut; it still hears.
+        is_mute: its transmit wire is cut; it still hears. See `cut`.
+        is_speaking: it runs, and its transmit wire is whole.
     """
 
     def __init__(
@@ -55,7 +56,7 @@ class PuckPower:
     ) -> None:
         self.node = node
         self.power = Power.OFF
-        self.is_mute = False
+        self.is_mute = self.is_speaking = False
         self._options = options
         self._schedule = schedule
         self._lives = 0
@@ -69,6 +70,12 @@ class PuckPower:
         """Begin another life; what was planned in the last one is void."""
         self._lives += 1
         self.power = power
+        self.cut(is_mute=self.is_mute)
+
+    def cut(self, *, is_mute: bool) -> None:
+        """Cut its transmit wire, or mend it."""
+        self.is_mute = is_mute
+        self.is_speaking = self.power is AWAKE and not is_mute
 
     def transition(self, stat: int) -> tuple[int, Power] | None:
         """Return what SET STAT does: a silence [ns] and the power after it, if any."""

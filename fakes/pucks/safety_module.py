@@ -224,12 +224,17 @@ class FakeSafetyModule:
 
     def _judge_speed(self) -> None:
         """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
+        limits = self._properties
+        if self._speeds.bound() * COUNTS_PER_SPEED <= min(limits["VL1"], limits["VL2"]):
+            self._too_fast_since_ns = None
+            self._warn("velocity", is_warning=False)
+            return
         is_zeroed = self._properties["ZERO"] == 1
         speed = self._speeds.tip_speed() if is_zeroed else self._speeds.joint_speed()
         counts = speed * COUNTS_PER_SPEED
         if counts <= self._properties["VL2"] or self._properties["VL2"] <= 0:
             self._too_fast_since_ns = None
-            self._warn("velocity", counts > self._properties["VL1"] > 0)
+            self._warn("velocity", is_warning=counts > limits["VL1"] > 0)
         elif self._properties["IFAULT"] > 0:
             self._properties["IFAULT"] -= 1
         else:
@@ -252,9 +257,9 @@ class FakeSafetyModule:
             self._enter(SafetyMode.E_STOP)  # a choice: the effect is not known
         else:
             is_odd = not limits["VOLTL1"] <= voltage <= limits["VOLTH1"]
-            self._warn("voltage", is_odd)
+            self._warn("voltage", is_warning=is_odd)
 
-    def _warn(self, monitor: str, is_warning: bool) -> None:
+    def _warn(self, monitor: str, *, is_warning: bool) -> None:
         """Light or put out a warning; a fault stays until Shift-idle."""
         if self._levels[monitor] is not _FAULT:
             self._levels[monitor] = _WARNING if is_warning else _SAFE
@@ -264,7 +269,7 @@ class FakeSafetyModule:
         if self.mode is _ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
-            self._warn("torque", largest > self._properties["TL1"])
+            self._warn("torque", is_warning=largest > self._properties["TL1"])
 
     def _fault(self, monitor: str) -> None:
         """Note a fault until Shift-idle and stop the arm."""

@@ -164,18 +164,17 @@ class SampleTimestamper:
         `discarded`: bytes among them that belonged to no good frame.
         """
         steps = self._device.steps(readings, arrival_ns, discarded)
-        t_ns = arrival_ns - self._timing.wire_ns
-        times: list[int] = []
-        for step_ns in reversed(steps):
-            times.append(t_ns)
-            # A clock that jumped says nothing about the time between two frames.
-            t_ns -= step_ns if 0 < step_ns < LONGEST_STEP_NS else 0
-        return [
-            self._sample(reading, self._fitted(latest_ns, step_ns), step_ns > 0)
-            for reading, latest_ns, step_ns in zip(
-                readings, reversed(times), steps, strict=True
-            )
-        ]
+        if not readings:
+            return []
+        # A clock that jumped says nothing about the time between two frames.
+        apart = [step if 0 < step < LONGEST_STEP_NS else 0 for step in steps[1:]]
+        t_ns = arrival_ns - self._timing.wire_ns - sum(apart)
+        samples: list[WrenchSample] = []
+        for reading, step_ns, next_ns in zip(readings, steps, [*apart, 0], strict=True):
+            dated_ns = self._fitted(t_ns, step_ns)
+            samples.append(self._sample(reading, dated_ns, step_ns > 0))
+            t_ns += next_ns
+        return samples
 
     def _fitted(self, latest_ns: int, step_ns: int) -> int:
         """Return when a frame was sent, `latest_ns` at the latest [monotonic ns]."""
@@ -191,7 +190,8 @@ class SampleTimestamper:
         return min(latest_ns, fit.host_ns(self._device_ns))
 
     def _sample(self, reading: Reading, t_ns: int, is_running: bool) -> WrenchSample:
-        t_ns = max(t_ns, self._t_ns + 1)
+        if t_ns <= self._t_ns:
+            t_ns = self._t_ns + 1
         self._t_ns = t_ns
         wrench = reading.wrench
         if wrench != self._wrench:
@@ -205,11 +205,7 @@ class SampleTimestamper:
         self.frozen += not is_live
         # Of six numbers of 32 bits no sum overflows: it is finite if all of them are.
         is_number = math.isfinite(sum(wrench))
+        is_valid = is_live and reading.is_trusted and is_number
         return WrenchSample(
-            t_ns=t_ns,
-            counter=reading.ticks,
-            wrench=wrench,
-            status=reading.status,
-            is_valid=is_live and reading.is_trusted and is_number,
-            saturated=reading.saturated,
+            t_ns, reading.ticks, wrench, reading.status, is_valid, reading.saturated
         )

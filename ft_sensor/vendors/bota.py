@@ -11,9 +11,10 @@ import struct
 from binascii import crc_hqx
 from dataclasses import dataclass
 from enum import IntFlag
+from functools import partial
 from typing import NamedTuple
 
-from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond, is_measurable
+from ft_sensor.reading import ALL_AXES, Reading, Wrench, axes_beyond
 from ft_sensor.serial_line import FrameScanner
 
 HEADER = 0xAA
@@ -84,6 +85,10 @@ class BotaFrame(NamedTuple):
     temperature: float
 
 
+# Without the words of a call, which take longer than the frame.
+_as_frame = partial(tuple[int | float | Wrench].__new__, BotaFrame)
+
+
 def crc_x25(data: bytes) -> int:
     """Return the CRC-16/X-25 of `data`.
 
@@ -119,7 +124,7 @@ def decode_frame(data: bytes, start: int = 0) -> BotaFrame | None:
     _, status, fx, fy, fz, tx, ty, tz, device_us, temperature, _ = _FRAME.unpack_from(
         data, start
     )
-    return BotaFrame(status, (fx, fy, fz, tx, ty, tz), device_us, temperature)
+    return _as_frame((status, (fx, fy, fz, tx, ty, tz), device_us, temperature))
 
 
 def scanner(ranges: Wrench) -> FrameScanner[Reading]:
@@ -130,13 +135,12 @@ def scanner(ranges: Wrench) -> FrameScanner[Reading]:
         if frame is None:
             return None
         status, wrench, device_us, _ = frame
-        is_force = is_measurable(wrench, ranges)
         if not status:
-            return Reading(device_us, wrench, 0, is_force, 0)
+            return Reading(device_us, wrench, 0, True, 0)
         beyond = 0
         if status & _OVER_RANGE:  # which axis it is, the device does not say
             beyond = axes_beyond(wrench, ranges) or ALL_AXES
-        is_trusted = is_force and not status & _UNTRUSTED
+        is_trusted = not status & _UNTRUSTED
         return Reading(device_us, wrench, status, is_trusted, beyond)
 
     return FrameScanner(b"\xaa", FRAME_SIZE, read)

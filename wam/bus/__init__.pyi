@@ -23,6 +23,7 @@ from .frames import (
     encode_force,
     encode_get,
     encode_position,
+    encode_positions,
     encode_reply,
     encode_set,
     encode_torque,
@@ -30,10 +31,10 @@ from .frames import (
     group_id,
     position_reply_id,
     property_reply_id,
-    wrap_position,
+    wrap_positions,
 )
 from .kernel_door import LONGEST_QUEUE, interface_state
-from .link import DRAIN_AT_MOST, CanLink, Door, Frame, FrameTap, Link
+from .link import DRAIN_AT_MOST, CanLink, Door, Frame, Link, as_frame
 from .log import (
     LONGEST_LINE,
     BusSummary,
@@ -87,7 +88,6 @@ __all__ = [
     "Door",
     "Frame",
     "FrameError",
-    "FrameTap",
     "Group",
     "Link",
     "Payload",
@@ -98,6 +98,7 @@ __all__ = [
     "PuckStatus",
     "PythonCanDoor",
     "Triple",
+    "as_frame",
     "compose_id",
     "decode_force",
     "decode_position",
@@ -111,6 +112,7 @@ __all__ = [
     "encode_force",
     "encode_get",
     "encode_position",
+    "encode_positions",
     "encode_reply",
     "encode_set",
     "encode_torque",
@@ -127,5 +129,5 @@ __all__ = [
     "position_reply_id",
     "property_number",
     "property_reply_id",
-    "wrap_position",
+    "wrap_positions",
 ]

@@ -22,7 +22,6 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
-_POSITION_SIZES = frozenset({3, 6})  # without and with a joint encoder's
 _POSITION_MODULUS = 1 << 22
 _POSITION_MASK = _POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
@@ -158,14 +157,20 @@ def _checked_number(number: int) -> int:
     return number
 
 
-def wrap_position(counts: int) -> int:
-    """Return a motor position [encoder counts] as 22 bits carry it, signed."""
-    return (counts + _POSITION_SIGN) % _POSITION_MODULUS - _POSITION_SIGN
+def wrap_positions(counts: Sequence[int]) -> list[int]:
+    """Return motor positions [encoder counts] as 22 bits carry them, signed."""
+    half = _POSITION_SIGN
+    return [(count + half) % _POSITION_MODULUS - half for count in counts]
 
 
 def encode_position(counts: int) -> bytes:
-    """Return the three bytes of a motor position, wrapped at 22 bits as on a puck."""
-    return (counts % _POSITION_MODULUS).to_bytes(3, "big")
+    """Return the three bytes of one of `encode_positions`."""
+    return encode_positions((counts,))[0]
+
+
+def encode_positions(counts: Sequence[int]) -> list[bytes]:
+    """Return three bytes for each motor position, wrapped at 22 bits as on a puck."""
+    return [(count % _POSITION_MODULUS).to_bytes(3, "big") for count in counts]
 
 
 def decode_position(data: Payload) -> int:
@@ -177,11 +182,11 @@ def decode_position(data: Payload) -> int:
     Raises:
         FrameError: not 3 or 6 bytes.
     """
-    if len(data) not in _POSITION_SIZES:
+    if len(data) not in (3, 6):
         raise FrameError("Not a position reply", data)
     # The two bits above the 22 have no meaning, as for the vendor's library.
     counts = int.from_bytes(data[:3], "big") & _POSITION_MASK
-    return counts - _POSITION_MODULUS if counts & _POSITION_SIGN else counts
+    return (counts ^ _POSITION_SIGN) - _POSITION_SIGN
 
 
 def decode_joint_encoder(data: Payload) -> int | None:

@@ -10,13 +10,12 @@ import fcntl
 import socket
 import struct
 from collections.abc import Iterable
-from functools import partial
 from typing import NamedTuple
 
 from acquisition import NS_PER_S, Clock
 from wam.bus.datagrams import AT_ONCE, DatagramBatch, ReceiveMany
 from wam.bus.error_frames import ERROR_MASK
-from wam.bus.link import DRAIN_AT_MOST, Frame, broken_link, plausible_times
+from wam.bus.link import DRAIN_AT_MOST, Frame, as_frame, broken_link, plausible_times
 
 LONGEST_QUEUE = 16  # frames, about one cycle: what waits longer is stale
 _RESTART_MS = 100
@@ -36,7 +35,6 @@ _GET_FLAGS, _GET_QUEUE = 0x8913, 0x8942
 _REQUEST = struct.Struct("@16sI20x")  # struct ifreq
 _NAME_AT_MOST = 15  # characters
 _UP, _RUNNING = 0x1, 0x40
-_as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a call
 
 
 class InterfaceState(NamedTuple):
@@ -208,7 +206,7 @@ class KernelDoor:
             t_ns = utc_ns - offset_ns
             if not earliest_ns < t_ns <= latest_ns:
                 t_ns = 0
-            frames.append(_as_frame((can_id, data, t_ns)))
+            frames.append(as_frame((can_id, data, t_ns)))
         return len(arrived)
 
     def _utc_ns(self, parts: Iterable[tuple[int, bytes]]) -> int:

@@ -2,10 +2,11 @@
 
 import errno
 from collections.abc import Callable, Sequence
+from functools import partial
+from operator import itemgetter
 from typing import NamedTuple, Protocol
 
-from acquisition import NS_PER_S, Clock, LinkError, LinkFullError
-from acquisition.ipc import FrameTape
+from acquisition import NS_PER_S, LinkError, LinkFullError
 from wam.bus.error_frames import ERROR_FLAG, BusErrors
 from wam.bus.frames import SAFETY_NODE, SENDER_MASK, Group, compose_id
 
@@ -15,6 +16,12 @@ DRAIN_AT_MOST = 512  # frames; no flood may keep the loop here
 _PLAUSIBLE_NS = 10 * NS_PER_S  # a stamp further back is of another clock
 _AHEAD_NS = 5_000_000  # frames go on arriving while a bus is drained
 _LARGEST_ID = 0x7FF  # of a frame that a WAM uses
+_OF_DEVICES = frozenset(
+    can_id
+    for can_id in range(_LARGEST_ID + 1)
+    if can_id & SENDER_MASK and can_id != MODE_BROADCAST_ID
+)
+_can_id = itemgetter(0)  # of a frame
 
 
 class Frame(NamedTuple):
@@ -32,6 +39,7 @@ class Frame(NamedTuple):
     t_ns: int
 
 
+as_frame = partial(tuple[int | bytes].__new__, Frame)  # without the words of a call
 Tap = Callable[[Sequence[tuple[int, bytes, int]]], None]  # each like a Frame
 
 
@@ -214,27 +222,28 @@ class CanLink:
 
     def _sort(self, arrived: list[Frame]) -> None:
         """Show plain frames to the tap and keep those of devices."""
-        is_plain = True
+        if _OF_DEVICES.issuperset(map(_can_id, arrived)):
+            self._inbox += arrived
+        else:
+            self._inbox += [frame for frame in arrived if frame[0] in _OF_DEVICES]
+            self._note_others(arrived)
+            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
+        if self._tap is not None and arrived:
+            self._tap(arrived)
+
+    def _note_others(self, arrived: list[Frame]) -> None:
+        """Note what is no frame of a device: errors, changes of mode, hosts."""
         for frame in arrived:
             can_id = frame[0]
             if can_id > _LARGEST_ID:
-                is_plain = False
                 if can_id & ERROR_FLAG:
                     self.errors.add(can_id, frame[1])
             elif can_id == MODE_BROADCAST_ID:
                 self.mode_hints += 1
-            elif can_id & SENDER_MASK:
-                self._inbox.append(frame)
-            else:
+            elif not can_id & SENDER_MASK:
                 self.foreign_ids.add(can_id)
                 if self.foreign_id is None:
                     self.foreign_id = can_id
-        if self._tap is None:
-            return
-        if not is_plain:
-            arrived = [frame for frame in arrived if frame[0] <= _LARGEST_ID]
-        if arrived:
-            self._tap(arrived)
 
 
 def plausible_times(now_ns: int) -> tuple[int, int]:
@@ -264,21 +273,3 @@ def error_number(error: Exception) -> int | None:
     """Return the system's error number, which python-can keeps in its own field."""
     own = getattr(error, "error_code", None)
     return own if isinstance(own, int) else getattr(error, "errno", None)
-
-
-class FrameTap:
-    """Implements `wam.bus.link.Tap`; times are monotonic [ns].
-
-    What the bus has no time for is of now.
-    """
-
-    def __init__(self, tape: FrameTape, clock: Clock) -> None:
-        self._tape = tape
-        self._clock = clock
-
-    def __call__(self, frames: Sequence[tuple[int, bytes, int]]) -> None:
-        """Note frames that were sent or arrived just now, oldest first."""
-        now_ns = self._clock.now_ns()
-        self._tape.add(
-            [(t_ns or now_ns, can_id, len(data), data) for can_id, data, t_ns in frames]
-        )

@@ -166,7 +166,7 @@ class FootController(ControlLaw):
             tau = np.clip(gravity + self._pushed, -self._largest, self._largest)
             tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         else:
-            tau = gravity + self._standing_torque(reading, gravity)
+            tau = self._standing_torque(reading, gravity)
             tau[LOCKED_JOINT] = gravity[LOCKED_JOINT] + lock
         if self._friction is not None:
             self._compensate(self._friction, tau, reading)
@@ -201,18 +201,18 @@ class FootController(ControlLaw):
             np.clip(tau, -self._largest, self._largest, out=tau)
 
     def _standing_torque(self, reading: ArmReading, gravity: Vector) -> Vector:
-        """Return what is added to `gravity` in a state without a move [N m], (7,).
+        """Return `gravity` and what is added in a state without a move [N m], (7,).
 
-        It never makes a torque larger than its share of the limit: a fast arm that is
-        to hold would be stopped for its torques instead.
+        What is added never makes a torque larger than its share of the limit: a fast
+        arm that is to hold would be stopped for its torques instead.
         """
         if self._state is ArmState.FLOAT:
-            return np.zeros(7)
+            return gravity.copy()
         is_guided = self._state is ArmState.GUIDE
         tau = self._hold.torque(reading, is_guided=is_guided)
         # Plain numbers: seven of them are bounded faster than numpy looks at an array.
         rows = zip(tau.tolist(), gravity.tolist(), self._largest.tolist(), strict=True)
-        return np.array([_within(*row) for row in rows])
+        return gravity + np.array([_within(*row) for row in rows])
 
     def _move_torque(self, move: JointMove, reading: ArmReading) -> Vector:
         """Return what the PD of `move` adds to gravity [N m], shape (7,)."""

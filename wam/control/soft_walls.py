@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import ArmReading, Vector
+from acquisition import ArmReading, Vector, are_between
 
 DEPTH = 0.1  # rad
 _REACH = 0.2  # rad in which the spring would reach the torque limit
@@ -41,9 +41,9 @@ class SoftWalls:
 
     def __init__(self, walls: Walls) -> None:
         self._walls = walls
-        pairs = zip(walls.lower, walls.upper, strict=True)
-        self._free = [(lower + DEPTH, upper - DEPTH) for lower, upper in pairs]
-        self._bounds = np.array(self._free).T
+        self._lower = [lower + DEPTH for lower in walls.lower]
+        self._upper = [upper - DEPTH for upper in walls.upper]
+        self._bounds = np.array((self._lower, self._upper))
         self._armed = 0
 
     @property
@@ -56,10 +56,7 @@ class SoftWalls:
 
         None where no joint is.
         """
-        for angle, (low, high) in zip(q.tolist(), self._free, strict=True):
-            if not low <= angle <= high:
-                break
-        else:
+        if are_between(self._lower, q.tolist(), self._upper):
             return None
         lower, upper = self._bounds
         return np.maximum(lower - q, 0.0) - np.maximum(q - upper, 0.0)
@@ -71,8 +68,11 @@ class SoftWalls:
         """
         # An extrapolated position arms nothing.
         may_arm = reading.is_complete and self._armed != _ALL_ARMED
-        rows = zip(reading.q.tolist(), self._free, strict=True)
-        for joint, (angle, (lower, upper)) in enumerate(rows):
+        q = reading.q.tolist()
+        if not may_arm and are_between(self._lower, q, self._upper):
+            return
+        rows = zip(q, self._lower, self._upper, strict=True)
+        for joint, (angle, lower, upper) in enumerate(rows):
             if lower <= angle <= upper:
                 if may_arm:
                     self._armed |= 1 << joint

@@ -65,20 +65,20 @@ class JointEstimator:
         self.jump = None
         times_ns, rates, positions = self._times_ns, self._rates, self._positions
         known = self.counts
-        for i, counts in enumerate(received):
-            elapsed = (t_ns - times_ns[i]) * 1e-9
-            last, rate = known[i], rates[i]
+        rows = zip(received, times_ns, known, rates, self._fastest, strict=True)
+        for i, (counts, since_ns, last, rate, fastest) in enumerate(rows):
+            elapsed = (t_ns - since_ns) * 1e-9
             if counts is None:
                 ahead = elapsed if elapsed < _LONGEST_GUESS else _LONGEST_GUESS
                 positions[i] = last + rate * ahead
                 continue
-            farthest = self._fastest[i] * elapsed + _STILL
-            if not -farthest <= counts - last <= farthest:
+            farthest, moved = fastest * elapsed + _STILL, counts - last
+            if not -farthest <= moved <= farthest:
                 positions[i] = last
-                self._note_jump(i, counts - last, elapsed)
+                self._note_jump(i, moved, elapsed)
                 continue
             if elapsed > 0.0:
-                rates[i] = rate + share * ((counts - last) / elapsed - rate)
+                rates[i] = rate + share * (moved / elapsed - rate)
             known[i] = counts
             positions[i] = counts
             times_ns[i] = t_ns

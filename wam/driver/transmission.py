@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import DeviceFaultError, SettingsError, Vector
+from acquisition import DeviceFaultError, SettingsError, Vector, are_within
 
 MOTORS = 7
 # The smaller of the cable's limit (MT) and nine tenths of the safety module's warning.
@@ -119,7 +119,7 @@ class Transmission:
                 hint="This is an error of the program; nothing was sent.",
             )
         wanted: list[float] = self.exact_units(tau).tolist()
-        is_clipped = _is_beyond(wanted, self.torque_limits)
+        is_clipped = not are_within(wanted, self.torque_limits)
         if is_clipped:
             gravity: list[float] = self.exact_units(tau_gravity).tolist()
             wanted = keep_gravity(wanted, gravity, self.torque_limits)
@@ -147,14 +147,6 @@ def keep_gravity(
     )
     share = min(share, 1.0)
     return [h + share * r for h, r in zip(held, rest, strict=True)]
-
-
-def _is_beyond(values: Sequence[float], limits: Sequence[float]) -> bool:
-    """Return whether any of `values` is beyond its limit."""
-    for value, limit in zip(values, limits, strict=True):
-        if not -limit <= value <= limit:
-            return True
-    return False
 
 
 def _room(held: float, rest: float, limit: float) -> float:

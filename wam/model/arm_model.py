@@ -198,7 +198,8 @@ class ArmModel:
         velocity = pin.getFrameVelocity(self._model, self._data, self._sole, _AXES)
         pose = pin.SE3ToXYZQUAT(placement)
         if pose[6] < 0.0:
-            pose[3:] *= -1.0
+            turn = pose[3:]
+            np.negative(turn, turn)
         return pose, placement.rotation, velocity.vector
 
     def sole_path(self, q: NDArray[np.float64]) -> FootPath:

@@ -7,6 +7,7 @@ from acquisition.ipc.layout import FRAME_DTYPE
 from acquisition.ipc.rings import Ring
 from acquisition.trial_file.views import encode_can_batch
 from tests.acquisition.ros import decode
+from tests.fakes.stepped import SteppedClock
 
 S = 1_000_000_000
 
@@ -17,9 +18,15 @@ def ring():
     return Ring(memoryview(bytearray(size)), FRAME_DTYPE, 6)
 
 
+def clock_at(t_ns):
+    clock = SteppedClock()
+    clock.t_ns = t_ns
+    return clock
+
+
 def tape_of(ring, times_ns):
-    tape = FrameTape(ring)
-    tape.add((t_ns, 1, 0, b"") for t_ns in times_ns)
+    tape = FrameTape(ring, clock_at(0))
+    tape.add((1, b"", t_ns) for t_ns in times_ns)
 
 
 def times(frames):
@@ -36,6 +43,15 @@ def test_the_span_can_be_chosen(ring):
     assert times(last_frames(ring, 1.0)) == [S, 2 * S]
 
 
+def test_a_frame_is_of_its_own_time_or_of_now_in_the_order_of_arrival(ring):
+    frames = [(0x423, b"\x01\x02\x03", S - 9), (0x443, b"", 0), (1, bytes(8), 8)]
+    FrameTape(ring, clock_at(S)).add(frames)
+    kept = ring.last(5)
+    assert kept["can_id"].tolist() == [0x423, 0x443, 1]
+    assert kept["length"].tolist() == [3, 0, 8]
+    assert times(kept) == [S - 9, S, 8]
+
+
 def test_an_empty_tape_gives_nothing(ring):
     assert len(last_frames(ring)) == 0
 
@@ -45,9 +61,17 @@ def test_the_tape_does_not_grow(ring):
     assert times(last_frames(ring)) == [45, 46, 47, 48, 49]
 
 
+def test_a_frame_replaces_all_of_the_one_before(ring):
+    for _ in range(6):
+        ring.write(b"\xff" * FRAME_DTYPE.itemsize)
+    FrameTape(ring, clock_at(7)).add([(0x404, b"\x30", 0)])
+    assert ring.last(1).tobytes() == struct.pack("<QIB3x8s", 7, 0x404, 1, b"\x30")
+
+
 def frames_of(*frames):
     ring = Ring(memoryview(bytearray(Ring.size_of(FRAME_DTYPE, 9))), FRAME_DTYPE, 9)
-    FrameTape(ring).add((*frame[:2], len(frame[2]), frame[2]) for frame in frames)
+    tape = FrameTape(ring, clock_at(0))
+    tape.add((can_id, data, t_ns) for t_ns, can_id, data in frames)
     return ring.last(9)
 
 

@@ -1,5 +1,3 @@
-import struct
-
 import numpy as np
 import pytest
 
@@ -40,17 +38,6 @@ def test_records_come_out_bit_for_bit(ring):
     cycles = make_cycles(12)
     write(ring, cycles)
     assert reader.read().tobytes() == cycles.tobytes()
-
-
-def test_a_record_packed_in_place_replaces_all_of_the_one_before():
-    dtype = np.dtype([("number", "<u8"), ("gap", "V4"), ("value", "<u4")])
-    ring = Ring(memoryview(bytearray(Ring.size_of(dtype, 2))), dtype, 2)
-    reader = ring.reader()
-    ring.write(b"\xff" * dtype.itemsize)
-    ring.write(b"\xff" * dtype.itemsize)
-    ring.pack(struct.Struct("<Q4xI"), [(1, 2)])
-    assert reader.read().tobytes() == struct.pack("<Q4xI", 1, 2)
-    assert reader.lost == 2
 
 
 def test_a_lapped_reader_learns_how_many_it_lost(ring):

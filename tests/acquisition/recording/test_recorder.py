@@ -185,12 +185,13 @@ def test_a_long_wait_before_the_trigger_is_not_a_loss(loop_client):
 
 
 def test_raw_frames_are_recorded_when_the_header_asks(loop_client):
-    tape = FrameTape(loop_client.shared.frames)
-    tape.add([(loop_client.clock.now_ns() - 1001 * MS, 1, 0, b"")])
+    tape = FrameTape(loop_client.shared.frames, loop_client.clock)
+    now_ns = loop_client.clock.now_ns()
+    tape.add([(1, b"", now_ns - 1001 * MS)])
     loop_client.recorder.start(
         loop_client.path, replace(make_header(), has_frames=True)
     )
-    tape.add([(loop_client.clock.now_ns(), 0x404, 1, b"\x30")])
+    tape.add([(0x404, b"\x30", 0)])
     loop_client.run(5)
     loop_client.recorder.finish("end")
     ((_, payload),) = messages_of(loop_client.path)["/can/raw"]

@@ -268,22 +268,3 @@ def test_wire_time_of_a_frame_is_four_fifths_of_a_millisecond():
 def test_rate_is_51200_over_the_sinc_length():
     assert 1e9 / bota.frame_period_ns(64) == 800.0
     assert 1e9 / bota.frame_period_ns(51) == pytest.approx(1003.92, abs=0.01)
-
-
-@pytest.mark.parametrize("axis", range(6))
-@pytest.mark.parametrize("value", [1e30, -1e30, math.inf, math.nan, 5000.0])
-def test_a_value_no_sensor_measures_is_not_trusted_despite_its_checksum(axis, value):
-    wrench = [0.5] * 6
-    wrench[axis] = value
-    (reading,) = readings(BotaFrame(0, tuple(wrench), 7, 25.0))
-    assert not reading.is_trusted
-
-
-def test_a_value_somewhat_beyond_the_range_is_trusted():
-    (reading,) = readings(BotaFrame(0, (-1.5 * 400.0, *[0.5] * 5), 7, 25.0))
-    assert reading.is_trusted
-
-
-def readings(frame):
-    scanner = bota.scanner((400.0, 400.0, 1000.0, 10.0, 10.0, 10.0))
-    return scanner.feed(bota.encode_frame(frame))

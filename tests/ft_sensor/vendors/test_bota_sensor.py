@@ -1,3 +1,4 @@
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -252,6 +253,33 @@ def test_status_bits_reach_the_sample(status, is_valid, saturated):
     last = bench.run(50 * MS)[-1]
     assert (last.is_valid, last.saturated) == (is_valid, saturated)
     assert last.status == status
+
+
+def shown_with(bench, axis, value):
+    """Let the device show `value` on one axis; the others go on measuring."""
+    bench.device.faults.show = lambda wrench: (
+        *wrench[:axis],
+        value,
+        *wrench[axis + 1 :],
+    )
+    return bench.run(20 * MS)[4:]
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("value", [1e30, -1e30, math.inf, math.nan, 5000.0])
+def test_a_value_no_sensor_measures_is_not_valid_despite_its_checksum(axis, value):
+    bench = Bench().opened()
+    found = shown_with(bench, axis, value)
+    assert found
+    assert not any(sample.is_valid for sample in found)
+    assert bench.sensor.counters.bad_checks == 0
+
+
+def test_a_value_somewhat_beyond_the_range_is_valid():
+    bench = Bench().opened()
+    found = shown_with(bench, 0, -1.5 * bench.sensor.device.ranges[0])
+    assert found
+    assert all(sample.is_valid for sample in found)
 
 
 @pytest.mark.parametrize("fault", [ByteFault.FLIP, ByteFault.DROP])

@@ -194,7 +194,7 @@ def test_a_position_that_contradicts_the_layout_is_refused(data):
 @given(st.integers(-(1 << 40), 1 << 40))
 def test_a_wrapped_position_is_what_the_wire_makes_of_it(counts):
     on_wire = frames.encode_position(counts)
-    assert frames.wrap_position(counts) == frames.decode_position(on_wire)
+    assert frames.wrap_positions([counts]) == [frames.decode_position(on_wire)]
 
 
 @given(st.integers(-(2**21), 2**21 - 1))
