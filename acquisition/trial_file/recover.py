@@ -10,13 +10,13 @@ from typing import IO
 
 import numpy as np
 from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.writer import CompressionType, Writer
 
 from acquisition.errors import TrialFileError
 from acquisition.sample import Flag
 from acquisition.schema import CYCLE, EARLIER_CYCLES
 from acquisition.temporary_folders import temporary_folder
 from acquisition.trial_file.chunks import as_trial_file_error, read_file
-from acquisition.trial_file.mcap_file import McapFile
 from acquisition.trial_file.publishing import publish_file
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.salvage import Salvaged, SoundRecords
@@ -40,7 +40,12 @@ class TrialCopy:
         self.messages = 0
         self.metadata: set[str] = set()
         self.details = dict(details)
-        self._writer = McapFile(file, CHUNK_BYTES)
+        self._writer = Writer(
+            file,
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_data_crcs=True,
+        )
         self._writer.start(profile="ros2", library="traction")
         self._schemas = {0: 0}  # number in the source -> number here
         self._channels: dict[int, int] = {}

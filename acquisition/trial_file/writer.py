@@ -7,13 +7,13 @@ from collections.abc import Generator, Mapping
 from pathlib import Path
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from acquisition.cdr import CdrWriter, encode_log, encode_string
 from acquisition.errors import TrialFileError
 from acquisition.sample import CHANNELS, FORESIGHT_CHANNELS, Flag, Record
 from acquisition.schema import CYCLE, FORESIGHT, TRUTH, Layout, schema_text
 from acquisition.trial_file.header import TrialHeader, WriterCounts
-from acquisition.trial_file.mcap_file import McapFile
 from acquisition.trial_file.publishing import publish_file, sync_directory
 from acquisition.trial_file.views import VIEW_TOPICS, encode_can_batch, encode_views
 
@@ -62,7 +62,12 @@ class TrialWriter:
             self._file = self.partial.open("xb")
         except OSError as error:
             raise TrialFileError(self.partial, _reason(error)) from error
-        self._writer = McapFile(self._file, CHUNK_BYTES)
+        self._writer = Writer(
+            self._file,
+            chunk_size=CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            enable_data_crcs=True,
+        )
         with self._guarded():
             sync_directory(path.parent)
             self._start(topics)

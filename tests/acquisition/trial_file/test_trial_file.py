@@ -7,13 +7,13 @@ import struct
 import mcap.reader
 import numpy as np
 import pytest
+from mcap.writer import Writer
 
 from acquisition.errors import TrialFileError
 from acquisition.ipc.layout import FRAME_DTYPE, WRENCH_DTYPE
 from acquisition.recording.recorder import seal
 from acquisition.sample import CHANNELS, Flag
 from acquisition.schema import EARLIER_FORESIGHTS, FORESIGHT, TRUTH, schema_text
-from acquisition.trial_file.mcap_file import McapFile
 from acquisition.trial_file.reader import TrialReader
 from acquisition.trial_file.verify import verify_file
 from acquisition.trial_file.writer import (
@@ -370,25 +370,25 @@ def test_verify_refuses_other_messages_than_were_written(tmp_path):
 
 @pytest.mark.parametrize("name", ["trial", "clock", "provenance", "channels", "result"])
 def test_verify_wants_every_metadata_record(tmp_path, monkeypatch, name):
-    add = McapFile.add_metadata
+    add = Writer.add_metadata
 
     def forgetful(self, record, data):
         if record != name:
             add(self, record, data)
 
-    monkeypatch.setattr(McapFile, "add_metadata", forgetful)
+    monkeypatch.setattr(Writer, "add_metadata", forgetful)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError, match=f"metadata {name}|no trial of Traction"):
         verify_file(writer.partial)
 
 
 def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
-    add = McapFile.add_attachment
+    add = Writer.add_attachment
 
     def careless(self, created, logged, name, media_type, data):
         add(self, created, logged, name, media_type, data[:-1])
 
-    monkeypatch.setattr(McapFile, "add_attachment", careless)
+    monkeypatch.setattr(Writer, "add_attachment", careless)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError, match=r"no sound attachment config\.toml"):
         verify_file(writer.partial)
@@ -409,7 +409,7 @@ def test_verify_wants_every_attachment_as_it_was(tmp_path, monkeypatch):
 def test_verify_says_so_when_metadata_make_no_sense(
     tmp_path, monkeypatch, name, key, value
 ):
-    add = McapFile.add_metadata
+    add = Writer.add_metadata
 
     def lying(self, record, data):
         if record == name:
@@ -417,7 +417,7 @@ def test_verify_says_so_when_metadata_make_no_sense(
             data |= {} if value is None else {key: value}
         add(self, record, data)
 
-    monkeypatch.setattr(McapFile, "add_metadata", lying)
+    monkeypatch.setattr(Writer, "add_metadata", lying)
     writer = sealed_anyway(tmp_path, make_cycles(10))
     with pytest.raises(TrialFileError):
         verify_file(writer.partial)
