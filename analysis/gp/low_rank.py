@@ -75,45 +75,37 @@ class LowRankLikelihood:
         A.flat[:: m + 1] *= 1.0 + _JITTER
         L_inverse, _ = _inverse_factor(A)
 
-        scaled_r = self._r * root
-        # the last row is filled in when the weights are known
         U = np.empty((m + len(columns.Phi) + 1, self._r.size))
-        np.matmul(L_inverse, F * root, out=U[:m])
+        np.multiply(F, root, out=U[:m])
+        lapack("trmm")(
+            1.0, L_inverse, U[:m].T, side=1, lower=1, trans_a=1, overwrite_b=1
+        )
         np.multiply(columns.Phi, root, out=U[m:-1])
-        B = U[:-1] @ U[:-1].T
-        B.flat[:: len(B) + 1] += 1.0
+        # as one more row the outputs leave r'C^-1 r as the square of the last pivot
+        np.multiply(self._r, root, out=U[-1])
+        B = U @ U.T
+        B.flat[:-1 : len(B) + 1] += 1.0
         B_factor, log_det = _inverse_factor(B)
-        half = B_factor @ (U[:-1] @ scaled_r)
-        lml = 0.5 * float(half @ half - scaled_r @ scaled_r)
-        lml += self._constant - log_det + float(np.log(root).sum())
+        rest = 1.0 / float(B_factor[-1, -1])
+        lml = self._constant - log_det + np.log(rest) - 0.5 * rest * rest
+        lml += float(np.log(root).sum())
 
-        b, B_inverse = half @ B_factor, B_factor.T @ B_factor
-        U[-1] = scaled_r - b @ U[:-1]
-        T = B_factor @ U[:-1]
-        weight = (U[-1] ** 2 - 1.0 + np.einsum("mn,mn->n", T, T)) * root**2
-        of_columns = b * b - 1.0 + np.diagonal(B_inverse)
-        slope_noise = contract_noise(weight) + columns.contract(of_columns[m:])
-        slope = contract(self._weight(U, root, L_inverse, (b, B_inverse)))
-        return lml, np.concatenate([slope, slope_noise])
-
-    def _weight(
-        self, U: Array, root: Array, L_inverse: Array, solved: tuple[Array, Array]
-    ) -> Array:
-        """Return what dF is contracted with, that of dA at the pivots' columns.
-
-        With M = A^-1 F and W = a a' - C^-1, 1/2 tr(W dC) = sum (M W) o dF
-        - 1/2 sum (M W M') o dA.
-        """
-        (b, B_inverse), m = solved, len(L_inverse)
-        left = np.column_stack([-B_inverse[:m], b[:m]])
-        weight = (L_inverse.T @ left) @ U
-        weight *= root
-        inner = np.outer(b[:m], b[:m]) + B_inverse[:m, :m]
-        inner.flat[:: m + 1] -= 1.0
-        of_pivots = L_inverse.T @ inner @ L_inverse
+        b, half = -rest * B_factor[-1, :-1], B_factor[:-1, :-1]
+        inner = np.outer(b, b) + half.T @ half
+        of_U = np.column_stack([-inner, b])  # times U that is U W, scaled
+        of_F = L_inverse.T @ of_U[:m]
+        of_pivots = (of_F[:, :m] + L_inverse.T) @ L_inverse
         of_pivots.flat[:: m + 1] *= 1.0 + _JITTER
-        weight[:, self._pivots] -= 0.5 * of_pivots
-        return weight
+        weight = of_F @ U
+        weight *= root
+        # C W = r a' - I, so the diagonal of S W is what the rest of C W leaves
+        on_diagonal = U[-1] * (U[-1] - b @ U[:-1]) - 1.0
+        on_diagonal -= np.einsum("mn,mn->n", F, weight)
+        on_diagonal -= np.einsum("qn,qn->n", U[m:-1], of_U[m:] @ U)
+        weight[:, self._pivots] += 0.5 * of_pivots
+        slope_noise = contract_noise(on_diagonal / S)
+        slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
+        return float(lml), np.concatenate([contract(weight), slope_noise])
 
 
 def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | None:
