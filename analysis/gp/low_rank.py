@@ -84,7 +84,7 @@ class LowRankLikelihood:
         # as one more row the outputs leave r'C^-1 r as the square of the last pivot
         np.multiply(self._r, root, out=U[-1])
         B = U @ U.T
-        B.flat[:-1 : len(B) + 1] += 1.0
+        B.flat[: -1 : len(B) + 1] += 1.0
         B_factor, log_det = _inverse_factor(B)
         rest = 1.0 / float(B_factor[-1, -1])
         lml = self._constant - log_det + np.log(rest) - 0.5 * rest * rest
