@@ -29,7 +29,7 @@ from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
 _MOST = 80  # pivots beyond which an evaluation costs half of an exact one
-_LEAST = 1e-6  # t at which there is nothing left to choose pivots from
+_LEAST = 1e-3  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 
 Columns = Callable[[Array], ColumnsAt]
@@ -91,8 +91,11 @@ class LowRankLikelihood:
         lml += float(np.log(root).sum())
 
         b, half = -rest * B_factor[-1, :-1], B_factor[:-1, :-1]
-        inner = np.outer(b, b) + half.T @ half
-        of_U = np.column_stack([-inner, b])  # times U that is U W, scaled
+        inner = half.T @ half
+        inner += b * b[:, None]
+        of_U = np.empty((len(b), len(b) + 1))  # times U that is U W, scaled
+        np.negative(inner, out=of_U[:, :-1])
+        of_U[:, -1] = b
         of_F = L_inverse.T @ of_U[:m]
         of_pivots = (of_F[:, :m] + L_inverse.T) @ L_inverse
         of_pivots.flat[:: m + 1] *= 1.0 + _JITTER
@@ -101,7 +104,8 @@ class LowRankLikelihood:
         # C W = r a' - I, so the diagonal of S W is what the rest of C W leaves
         on_diagonal = U[-1] * (U[-1] - b @ U[:-1]) - 1.0
         on_diagonal -= np.einsum("mn,mn->n", F, weight)
-        on_diagonal -= np.einsum("qn,qn->n", U[m:-1], of_U[m:] @ U)
+        if len(b) > m:
+            on_diagonal -= np.einsum("qn,qn->n", U[m:-1], of_U[m:] @ U)
         weight[:, self._pivots] += 0.5 * of_pivots
         slope_noise = contract_noise(on_diagonal / S)
         slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
@@ -124,7 +128,8 @@ def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | N
     L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
     if not rank:  # no function at all
         return None
-    tail = total - np.cumsum(np.einsum("nm,nm->m", *[np.tril(L[:, :rank])] * 2))
+    columns = np.tril(L[:, : min(rank, _MOST)])
+    tail = total - np.cumsum(np.einsum("nm,nm->m", columns, columns))
     needed = 1 + int(np.count_nonzero(tail > trace[0]))
     count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
     return order[:count] - 1 if tail[count - 1] < trace[1] else None

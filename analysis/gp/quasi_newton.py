@@ -14,6 +14,7 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array
+from analysis.gp.likelihood import lapack
 
 # theta -> value and slope; may raise SettingsError
 Objective = Callable[[Array], tuple[float, Array]]
@@ -119,14 +120,15 @@ class _Parabola:
         """Return where to in the box, (p,), and the rise that the slope promises."""
         theta, slope, low, high = place.theta, place.slope, self._low, self._high
         is_held = ((theta <= low) & (slope < 0.0)) | ((theta >= high) & (slope > 0.0))
-        free = np.flatnonzero(~is_held)
-        way = np.zeros(theta.size)
-        way[free] = np.linalg.solve(self.bend[np.ix_(free, free)], slope[free])
-        way /= max(1.0, float(np.abs(way).max()) / _REACH)
-        end = np.clip(theta + way, low, high)
+        bend = self.bend
+        if is_held.any():
+            slope = np.where(is_held, 0.0, slope)
+            bend = np.where(is_held | is_held[:, None], np.diag(bend.diagonal()), bend)
+        way = lapack("posv")(bend, slope, lower=1)[1]
+        way *= _REACH / max(float(np.abs(way).max()), _REACH)
+        end = np.minimum(np.maximum(theta + way, low), high)
         if slope @ (end - theta) <= 0.0:  # the box has cut off what went upwards
-            way = np.where(is_held, 0.0, slope) / np.diagonal(self.bend)
-            end = np.clip(theta + way, low, high)
+            end = np.clip(theta + slope / bend.diagonal(), low, high)
         return end, float(slope @ (end - theta))
 
     def learn(self, step: Array, fall: Array) -> None:
@@ -141,8 +143,8 @@ class _Parabola:
             share = (1.0 - _DAMPED) * size / (size - found)
             fall = share * fall + (1.0 - share) * known
             found = _DAMPED * size
-        self.bend = self.bend + np.outer(fall, fall) / found
-        self.bend -= np.outer(known, known) / size
+        self.bend = self.bend + fall * (fall / found)[:, None]
+        self.bend -= known * (known / size)[:, None]
 
 
 def maximised(
