@@ -27,7 +27,7 @@ from analysis.gp.quasi_newton import (
 )
 
 _SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
-_BESIDE = (0.7, 2.0)  # the same, for second derivatives to be alike
+_BESIDE = (1.0, 3.0)  # the same, for second derivatives to be alike
 _REACH = 2.0  # of theta that an approximation is climbed over before it is made anew
 _NEARLY = 1.0  # a shorter way needs no other approximation
 _GAIN = 1e-5  # log likelihood below which a step is not worth an exact evaluation
