@@ -18,6 +18,7 @@ from experiments.arguments import (
     did_you_mean,
     with_present_names,
 )
+from experiments.linear_algebra import openblas_settings
 
 COMMANDS = {
     "check": "check that the rig is ready: one graded page",
@@ -147,8 +148,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
         _complete()
-    for library in ("OPENBLAS", "OMP"):  # its threads would wait for busy cores
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    for name, value in openblas_settings().items():
+        os.environ.setdefault(name, value)
     named = with_present_names(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
     args = parser.parse_args(named)
