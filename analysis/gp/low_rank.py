@@ -122,10 +122,13 @@ def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | N
             never enough.
     """
     root = 1.0 / np.sqrt(S)
-    # the upper triangle in C's order is the lower one in Fortran's
-    scaled = (K * root * root[:, None]).T
+    scaled = K * root
+    scaled *= root[:, None]
     total, n = float(np.trace(scaled)), root.size
-    L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
+    # the upper triangle in C's order is the lower one in Fortran's
+    L, order, rank, _ = lapack("pstrf")(
+        scaled.T, tol=_LEAST / n, lower=1, overwrite_a=1
+    )
     if not rank:  # no function at all
         return None
     columns = np.tril(L[:, : min(rank, _MOST)])
