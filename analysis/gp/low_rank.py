@@ -10,6 +10,10 @@ the determinant lemma give likelihood and gradient in O(n m^2):
 
     log det C = log det S + log det B,   U C^-1 U' = I - B^-1,   U C^-1 r = b
 
+With a = C^-1 r, W = a a' - C^-1, F = k(P, X), A = k(P, P) and M = A^-1 F, the gradient
+1/2 tr(W dC) is sum (M W) o dF - 1/2 sum (M W M') o dA in the kernel. For the noise it
+takes the diagonal of W, which follows from that of C W = r a' - I.
+
 The pivots are those of a Cholesky factorisation of S^-1/2 K S^-1/2 (Harbrecht, Peters
 and Schneider 2012). What it leaves, R = K - V'V, has no negative eigenvalue, so its
 scaled trace t = sum_i R_ii / S_ii bounds the error: log det C is too small by t at
@@ -90,10 +94,32 @@ class LowRankLikelihood:
         lml = self._constant - log_det + np.log(rest) - 0.5 * rest * rest
         lml += float(np.log(root).sum())
 
-        b, half = -rest * B_factor[-1, :-1], B_factor[:-1, :-1]
+        weight, on_diagonal, inner = self._weights(F, root, L_inverse, U, B_factor)
+        slope_noise = contract_noise(on_diagonal / S)
+        slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
+        return float(lml), np.concatenate([contract(weight), slope_noise])
+
+    def _weights(
+        self, F: Array, root: Array, L_inverse: Array, U: Array, B_factor: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return what derivatives are contracted with.
+
+        Args:
+            F: k(P, X), shape (m, n).
+            root: S^-1/2, shape (n,).
+            L_inverse: shape (m, m).
+            U: U, and S^-1/2 r as one more row.
+            B_factor: inverse Cholesky factor of B, with that row too.
+
+        Returns:
+            What dF is contracted with, that of dA taken in at the pivots' columns,
+            shape (m, n); the diagonal of S W, shape (n,); and b b' + B^-1.
+        """
+        m = len(F)
+        b, half = B_factor[-1, :-1] / -B_factor[-1, -1], B_factor[:-1, :-1]
         inner = half.T @ half
         inner += b * b[:, None]
-        of_U = np.empty((len(b), len(b) + 1))  # times U that is U W, scaled
+        of_U = np.empty((len(b), len(b) + 1))  # U W S^1/2 = of_U U
         np.negative(inner, out=of_U[:, :-1])
         of_U[:, -1] = b
         of_F = L_inverse.T @ of_U[:m]
@@ -101,15 +127,12 @@ class LowRankLikelihood:
         of_pivots.flat[:: m + 1] *= 1.0 + _JITTER
         weight = of_F @ U
         weight *= root
-        # C W = r a' - I, so the diagonal of S W is what the rest of C W leaves
         on_diagonal = U[-1] * (U[-1] - b @ U[:-1]) - 1.0
         on_diagonal -= np.einsum("mn,mn->n", F, weight)
         if len(b) > m:
             on_diagonal -= np.einsum("qn,qn->n", U[m:-1], of_U[m:] @ U)
         weight[:, self._pivots] += 0.5 * of_pivots
-        slope_noise = contract_noise(on_diagonal / S)
-        slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
-        return float(lml), np.concatenate([contract(weight), slope_noise])
+        return weight, on_diagonal, inner
 
 
 def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | None:
