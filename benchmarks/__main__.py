@@ -15,9 +15,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from acquisition import openblas_settings
 from benchmarks.rows import BenchRow
 from benchmarks.surroundings import surroundings
-from experiments.linear_algebra import openblas_settings
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "measured.md"

@@ -12,13 +12,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from acquisition import TractionError
+from acquisition import TractionError, openblas_settings
 from experiments.arguments import (
     add_global_options,
     did_you_mean,
     with_present_names,
 )
-from experiments.linear_algebra import openblas_settings
 
 COMMANDS = {
     "check": "check that the rig is ready: one graded page",

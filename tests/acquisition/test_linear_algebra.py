@@ -1,6 +1,6 @@
 import pytest
 
-from experiments.linear_algebra import openblas_settings
+from acquisition.linear_algebra import openblas_settings
 
 THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 FLAGS = "fpu avx2 avx512f avx512dq avx512cd avx512bw avx512vl"

@@ -7,6 +7,8 @@ takes later ones for a Haswell of 2013, whose products take half as long again.
 
 from pathlib import Path
 
+ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP")}
+
 _CPU = Path("/proc/cpuinfo")
 _FIRST = 8192  # bytes that hold what is said of the first core
 _LAST_KNOWN = 25  # family of AMD's processors
@@ -19,12 +21,11 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
     Args:
         cpu: where Linux describes the processor; elsewhere it is not there.
     """
-    threads = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP")}
     try:
         with cpu.open("rb") as file:
             text = file.read(_FIRST).decode("ascii", "replace")
     except OSError:
-        return threads
+        return ONE_THREAD
     pairs = (
         line.partition(":")[::2] for line in text.partition("\n\n")[0].splitlines()
     )
@@ -32,7 +33,7 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
     family = said.get("cpu family", "")
     is_newer = family.isdecimal() and int(family) > _LAST_KNOWN
     if said.get("vendor_id") != "AuthenticAMD" or not is_newer:
-        return threads
+        return ONE_THREAD
     if not set(said.get("flags", "").split()) >= _AVX512:
-        return threads
-    return threads | {"OPENBLAS_CORETYPE": "SkylakeX"}
+        return ONE_THREAD
+    return ONE_THREAD | {"OPENBLAS_CORETYPE": "SkylakeX"}
