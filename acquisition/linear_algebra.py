@@ -2,7 +2,7 @@
 
 One thread: more would wait for busy cores. And where a processor is newer than the
 library, which of its kernels to take: OpenBLAS 0.3.31 knows AMD's families up to 25 and
-takes later ones for a Haswell of 2013, whose products take half as long again.
+takes later ones for a Haswell of 2013, whose products take a third longer.
 """
 
 from pathlib import Path
