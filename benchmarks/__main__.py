@@ -2,8 +2,9 @@
 
     python -m benchmarks [--only NAME ...] [--write]
 
-Each benchmark runs in a process of its own, one after the other, with one thread of
-linear algebra. `--write` puts the table into docs/measured.md, between its marks.
+Each benchmark runs in a process of its own, one after the other, with the program's
+settings of linear algebra. `--write` puts the table into docs/measured.md, between its
+marks.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from acquisition import openblas_settings
 from benchmarks.rows import BenchRow
 from benchmarks.surroundings import surroundings
 
@@ -32,12 +34,11 @@ _MARK = "ROWS "
 def run_one(name: str) -> list[BenchRow]:
     """Return the rows of one benchmark, run in a process of its own."""
     command = [sys.executable, "-m", "benchmarks", "--inside", name]
-    threads = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"), "1")
     try:
         done = subprocess.run(
             command,
             cwd=ROOT,
-            env=os.environ | threads,
+            env=os.environ | openblas_settings(),
             capture_output=True,
             text=True,
             timeout=_LIMIT_S,

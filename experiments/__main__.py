@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from acquisition import TractionError
+from acquisition import TractionError, openblas_settings
 from experiments.arguments import (
     add_global_options,
     did_you_mean,
@@ -147,8 +147,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     if "_ARGCOMPLETE" in os.environ:  # the shell asks, and reads what is printed
         _complete()
-    for library in ("OPENBLAS", "OMP"):  # its threads would wait for busy cores
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    for name, value in openblas_settings().items():
+        os.environ.setdefault(name, value)
     named = with_present_names(sys.argv[1:] if arguments is None else arguments)
     parser = build_parser(set(named) & set(COMMANDS))
     args = parser.parse_args(named)

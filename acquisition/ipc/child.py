@@ -22,14 +22,13 @@ from acquisition.ipc.channel import Channel, ChannelClosedError
 from acquisition.ipc.layout import SharedLayout
 from acquisition.ipc.rings import SharedMemory
 from acquisition.ipc.rpc import send_call
+from acquisition.linear_algebra import ONE_THREAD
 
 _ROOT = str(Path(__file__).parents[2])
 _START = (
     "import sys; sys.path.insert(0, sys.argv[1]); "
     "from acquisition.ipc.child import main; main(sys.argv[2:])"
 )
-# One thread per process: a pool of the linear algebra library would preempt the loop.
-_ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 _RAISED = re.compile(r"[A-Za-z_][\w.]*(Error|Exception|Interrupt)\b")
 _STDERR_CHARACTERS = 4000  # characters of a child's standard error
 _PATIENCE = 3.0  # s a child gets to end by itself
@@ -95,7 +94,8 @@ class Child:
             stdout=subprocess.DEVNULL,
             stderr=self._stderr,
             start_new_session=True,
-            env={**os.environ, **_ONE_THREAD},
+            # a pool of the linear algebra library would preempt the loop
+            env={**os.environ, **ONE_THREAD},
         )
         theirs.close()
         self.channel.send(dict(settings))

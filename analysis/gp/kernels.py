@@ -131,43 +131,49 @@ class SquaredExponential(Composable):
 
 
 class _SquaredExponentialOver:
-    """A squared exponential over two sets of rows, in memory of its own."""
+    """A squared exponential over two sets of rows, in memory of its own.
+
+    The exponent is one matrix product, of (x / l^2, 2 log sf - |x/l|^2/2, -1/2 l^-2)
+    and (x', 1, x' o x'); only the former changes with theta.
+    """
 
     def __init__(self, X: Array, X_other: Array | None) -> None:
-        self._X, self._X_other = X, X if X_other is None else X_other
-        (n, d), m = X.shape, self._X_other.shape[0]
+        other = X if X_other is None else X_other
+        (n, d), m = X.shape, other.shape[0]
+        self._X, self._squares = X, X * X
         self._parts = computed_parts(n, m, is_upper=X_other is None)
-        self._left, self._right = np.ones((n, d + 2)), np.ones((d + 2, m))
+        self._left = np.empty((n, 2 * d + 1))
+        self._right = np.vstack([other.T, np.ones(m), (other * other).T])
         self._K = np.empty((n, m))
 
     def __call__(self, theta: Array) -> tuple[Array, Contraction]:
         """Return K and its contraction.
 
-        The exponent is one matrix product, 2 log sf - |z|^2/2 + z'z' - |z'|^2/2; what
-        rounding leaves above its largest value is cut off.
+        What rounding leaves above the largest exponent is cut off.
         """
-        lengths, K = np.exp(theta[1:]), self._K
-        Z, Z_other = self._X / lengths, self._X_other / lengths
-        self._left[:, :-2], self._right[:-2] = Z, Z_other.T
-        self._left[:, -2] = 2.0 * theta[0] - 0.5 * np.einsum("nd,nd->n", Z, Z)
-        self._right[-1] = -0.5 * np.einsum("nd,nd->n", Z_other, Z_other)
-        np.matmul(self._left, self._right, out=K)
+        K, left, highest = self._K, self._left, 2.0 * theta[0]
+        inverse = np.exp(-2.0 * theta[1:])
+        d = inverse.size
+        np.multiply(self._X, inverse, out=left[:, :d])
+        left[:, d] = highest - 0.5 * (self._squares @ inverse)
+        left[:, d + 1 :] = -0.5 * inverse
+        np.matmul(left, self._right, out=K)
         for part in self._parts:
-            np.minimum(K[part], 2.0 * theta[0], out=K[part])
+            np.minimum(K[part], highest, out=K[part])
             np.exp(K[part], out=K[part])
-        return K, lambda W: self._contract(W, Z, Z_other)
+        return K, lambda W: self._contract(W, inverse)
 
-    def _contract(self, W: Array, Z: Array, Z_other: Array) -> Array:
+    def _contract(self, W: Array, inverse: Array) -> Array:
         """Return sum_ij W_ij dK_ij/dtheta.
 
-        With G = W o K: sum_ij G_ij (x_i - x'_j)^2 = (x o x)'(G 1) + (x' o x')'(G' 1)
-        - 2 x'(G x'), so the lengths cost one product with G and no matrix of their own.
+        With G = W o K: sum_ij G_ij (x_i - x'_j)^2 = (x o x)'(G 1) - 2 x'(G x')
+        + 1'(G (x' o x')), so the lengths cost one product with G.
         """
-        G = np.multiply(W, self._K, out=W)
-        row_sums, column_sums = G.sum(axis=1), G.sum(axis=0)
-        slopes_l = (Z * Z).T @ row_sums + (Z_other * Z_other).T @ column_sums
-        slopes_l -= 2.0 * np.einsum("nd,nd->d", Z, G @ Z_other)
-        return np.concatenate([[2.0 * row_sums.sum()], slopes_l])
+        G, d = np.multiply(W, self._K, out=W), inverse.size
+        sums = G @ self._right.T
+        of_l = self._squares.T @ sums[:, d] + sums[:, d + 1 :].sum(axis=0)
+        of_l -= 2.0 * np.einsum("nd,nd->d", self._X, sums[:, :d])
+        return np.concatenate([[2.0 * sums[:, d].sum()], inverse * of_l])
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from analysis.gp.trial_noise import SharedAt, TrialRows, shared_over
 
 _JITTERS = (0.0, 1e-10, 1e-8, 1e-6)  # times the mean variance; the first that works
 _BLAS = frozenset({"syr", "trmm"})
-_SMALL = 80  # rows of a triangle that LAPACK inverts as fast as products do
+_SMALL = 40  # rows of a triangle that LAPACK inverts as fast as products do
 
 
 class Factor(NamedTuple):

@@ -10,6 +10,10 @@ the determinant lemma give likelihood and gradient in O(n m^2):
 
     log det C = log det S + log det B,   U C^-1 U' = I - B^-1,   U C^-1 r = b
 
+With a = C^-1 r, W = a a' - C^-1, F = k(P, X), A = k(P, P) and M = A^-1 F, the gradient
+1/2 tr(W dC) is sum (M W) o dF - 1/2 sum (M W M') o dA in the kernel. For the noise it
+takes the diagonal of W, which follows from that of C W = r a' - I.
+
 The pivots are those of a Cholesky factorisation of S^-1/2 K S^-1/2 (Harbrecht, Peters
 and Schneider 2012). What it leaves, R = K - V'V, has no negative eigenvalue, so its
 scaled trace t = sum_i R_ii / S_ii bounds the error: log det C is too small by t at
@@ -29,7 +33,7 @@ from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
 _MOST = 80  # pivots beyond which an evaluation costs half of an exact one
-_LEAST = 1e-6  # t at which there is nothing left to choose pivots from
+_LEAST = 1e-3  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 
 Columns = Callable[[Array], ColumnsAt]
@@ -75,45 +79,60 @@ class LowRankLikelihood:
         A.flat[:: m + 1] *= 1.0 + _JITTER
         L_inverse, _ = _inverse_factor(A)
 
-        scaled_r = self._r * root
-        # the last row is filled in when the weights are known
         U = np.empty((m + len(columns.Phi) + 1, self._r.size))
-        np.matmul(L_inverse, F * root, out=U[:m])
+        np.multiply(F, root, out=U[:m])
+        lapack("trmm")(
+            1.0, L_inverse, U[:m].T, side=1, lower=1, trans_a=1, overwrite_b=1
+        )
         np.multiply(columns.Phi, root, out=U[m:-1])
-        B = U[:-1] @ U[:-1].T
-        B.flat[:: len(B) + 1] += 1.0
+        # as one more row the outputs leave r'C^-1 r as the square of the last pivot
+        np.multiply(self._r, root, out=U[-1])
+        B = U @ U.T
+        B.flat[: -1 : len(B) + 1] += 1.0
         B_factor, log_det = _inverse_factor(B)
-        half = B_factor @ (U[:-1] @ scaled_r)
-        lml = 0.5 * float(half @ half - scaled_r @ scaled_r)
-        lml += self._constant - log_det + float(np.log(root).sum())
+        rest = 1.0 / float(B_factor[-1, -1])
+        lml = self._constant - log_det + np.log(rest) - 0.5 * rest * rest
+        lml += float(np.log(root).sum())
 
-        b, B_inverse = half @ B_factor, B_factor.T @ B_factor
-        U[-1] = scaled_r - b @ U[:-1]
-        T = B_factor @ U[:-1]
-        weight = (U[-1] ** 2 - 1.0 + np.einsum("mn,mn->n", T, T)) * root**2
-        of_columns = b * b - 1.0 + np.diagonal(B_inverse)
-        slope_noise = contract_noise(weight) + columns.contract(of_columns[m:])
-        slope = contract(self._weight(U, root, L_inverse, (b, B_inverse)))
-        return lml, np.concatenate([slope, slope_noise])
+        weight, on_diagonal, inner = self._weights(F, root, L_inverse, U, B_factor)
+        slope_noise = contract_noise(on_diagonal / S)
+        slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
+        return float(lml), np.concatenate([contract(weight), slope_noise])
 
-    def _weight(
-        self, U: Array, root: Array, L_inverse: Array, solved: tuple[Array, Array]
-    ) -> Array:
-        """Return what dF is contracted with, that of dA at the pivots' columns.
+    def _weights(
+        self, F: Array, root: Array, L_inverse: Array, U: Array, B_factor: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return what derivatives are contracted with.
 
-        With M = A^-1 F and W = a a' - C^-1, 1/2 tr(W dC) = sum (M W) o dF
-        - 1/2 sum (M W M') o dA.
+        Args:
+            F: k(P, X), shape (m, n).
+            root: S^-1/2, shape (n,).
+            L_inverse: shape (m, m).
+            U: U, and S^-1/2 r as one more row.
+            B_factor: inverse Cholesky factor of B, with that row too.
+
+        Returns:
+            What dF is contracted with, that of dA taken in at the pivots' columns,
+            shape (m, n); the diagonal of S W, shape (n,); and b b' + B^-1.
         """
-        (b, B_inverse), m = solved, len(L_inverse)
-        left = np.column_stack([-B_inverse[:m], b[:m]])
-        weight = (L_inverse.T @ left) @ U
-        weight *= root
-        inner = np.outer(b[:m], b[:m]) + B_inverse[:m, :m]
-        inner.flat[:: m + 1] -= 1.0
-        of_pivots = L_inverse.T @ inner @ L_inverse
+        m = len(F)
+        b, half = B_factor[-1, :-1] / -B_factor[-1, -1], B_factor[:-1, :-1]
+        inner = half.T @ half
+        inner += b * b[:, None]
+        of_U = np.empty((len(b), len(b) + 1))  # U W S^1/2 = of_U U
+        np.negative(inner, out=of_U[:, :-1])
+        of_U[:, -1] = b
+        of_F = L_inverse.T @ of_U[:m]
+        of_pivots = (of_F[:, :m] + L_inverse.T) @ L_inverse
         of_pivots.flat[:: m + 1] *= 1.0 + _JITTER
-        weight[:, self._pivots] -= 0.5 * of_pivots
-        return weight
+        weight = of_F @ U
+        weight *= root
+        on_diagonal = U[-1] * (U[-1] - b @ U[:-1]) - 1.0
+        on_diagonal -= np.einsum("mn,mn->n", F, weight)
+        if len(b) > m:
+            on_diagonal -= np.einsum("qn,qn->n", U[m:-1], of_U[m:] @ U)
+        weight[:, self._pivots] += 0.5 * of_pivots
+        return weight, on_diagonal, inner
 
 
 def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | None:
@@ -126,13 +145,17 @@ def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | N
             never enough.
     """
     root = 1.0 / np.sqrt(S)
-    # the upper triangle in C's order is the lower one in Fortran's
-    scaled = (K * root * root[:, None]).T
+    scaled = K * root
+    scaled *= root[:, None]
     total, n = float(np.trace(scaled)), root.size
-    L, order, rank, _ = lapack("pstrf")(scaled, tol=_LEAST / n, lower=1, overwrite_a=1)
+    # the upper triangle in C's order is the lower one in Fortran's
+    L, order, rank, _ = lapack("pstrf")(
+        scaled.T, tol=_LEAST / n, lower=1, overwrite_a=1
+    )
     if not rank:  # no function at all
         return None
-    tail = total - np.cumsum(np.einsum("nm,nm->m", *[np.tril(L[:, :rank])] * 2))
+    columns = np.tril(L[:, : min(rank, _MOST)])
+    tail = total - np.cumsum(np.einsum("nm,nm->m", columns, columns))
     needed = 1 + int(np.count_nonzero(tail > trace[0]))
     count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
     return order[:count] - 1 if tail[count - 1] < trace[1] else None

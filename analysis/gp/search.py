@@ -16,7 +16,7 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.ascent import GOOD, Approximated, climb, objective_of
+from analysis.gp.ascent import Top, climb, objective_of
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.low_rank import near_over
@@ -91,7 +91,7 @@ def maximise(
         for point in kernel.design(sd_y, spread(X))
     ]
     began = _first_starts(kernel, offered, rough)
-    reached: list[Start] = []
+    reached: list[Top] = []
     for start in began:
         reached.append(climb(objective, start, box, reached))
     began.append(_last_start(kernel, offered, exact, (began, reached), box))
@@ -100,7 +100,7 @@ def maximise(
     for start in _idle_starts(model, best, exact, box):
         began.append(start)
         reached.append(climb(objective, start, box, reached))
-    return _optimum(model, objective, box, (began, reached))
+    return _optimum(model, box, (began, reached))
 
 
 def climb_from(
@@ -122,7 +122,7 @@ def climb_from(
         exact: theta -> likelihood of all rows: one more start is chosen by it, where
             the best top may be another one than those known.
     """
-    box, reached = _box(model, X, sd_y), list[Start]()
+    box, reached = _box(model, X, sd_y), list[Top]()
     began = list(starts)
     for start in began:
         reached.append(climb(objective, start, box, reached))
@@ -134,7 +134,7 @@ def climb_from(
         for start in _idle_starts(model, best, exact, box):
             began.append(start)
             reached.append(climb(objective, start, box, reached))
-    return _optimum(model, objective, box, (began, reached))
+    return _optimum(model, box, (began, reached))
 
 
 def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
@@ -163,20 +163,17 @@ def _box(model: tuple[Kernel, Noise], X: Array, sd_y: float) -> SearchBox:
 
 def _optimum(
     model: tuple[Kernel, Noise],
-    objective: Objective,
     box: SearchBox,
-    climbed: tuple[Sequence[Array], list[Start]],
+    climbed: tuple[Sequence[Array], list[Top]],
 ) -> Optimum:
-    """Return the best of what the starts reached, climbed on from."""
+    """Return the best of what the starts reached."""
     kernel, noise = model
     began, reached = climbed
-    best = _finish(objective, box, reached)
-    theta = np.array(best.theta)
-    is_edge = np.abs(box.bounds - theta[:, None]).min(axis=1) < _AT_BOUND
+    best = max(reached, key=lambda start: start.lml)
+    is_edge = np.abs(box.bounds - best.theta[:, None]).min(axis=1) < _AT_BOUND
     edges = np.array([*kernel.names, *noise.names])[is_edge]
-    return Optimum(
-        theta, best.lml, tuple(reached), tuple(began), tuple(map(str, edges))
-    )
+    starts = tuple(top.start for top in reached)
+    return Optimum(best.theta, best.lml, starts, tuple(began), tuple(map(str, edges)))
 
 
 def spread(X: Array) -> Array:
@@ -199,7 +196,7 @@ def _last_start(
     kernel: Kernel,
     offered: Sequence[Array],
     exact: Score,
-    known: tuple[Sequence[Array], Sequence[Start]],
+    known: tuple[Sequence[Array], Sequence[Top]],
     box: SearchBox,
 ) -> Array:
     """Return the likeliest point that may belong to another top.
@@ -216,7 +213,7 @@ def _last_start(
     """
     began, reached = known
     count = len(kernel.names)
-    tops = [np.array(top.theta) for top in reached]
+    tops = [top.theta for top in reached]
     best = tops[int(np.argmax([top.lml for top in reached]))]
     moved = kernel.moves(best[:count])
     unused = [t[:count] for t in offered if _gap(kernel, t, began) >= _APART]
@@ -229,7 +226,7 @@ def _last_start(
 
 
 def _idle_starts(
-    model: tuple[Kernel, Noise], best: Start, exact: Score, box: SearchBox
+    model: tuple[Kernel, Noise], best: Top, exact: Score, box: SearchBox
 ) -> list[Array]:
     """Return the best top without a long length, where that costs next to nothing.
 
@@ -239,7 +236,7 @@ def _idle_starts(
     kernel, _ = model
     starts = []
     for k, name in enumerate(kernel.names):
-        theta = np.array(best.theta)
+        theta = best.theta.copy()
         is_length = name.rpartition("_")[2].startswith("l")
         if is_length and _LONG < theta[k] < box.bounds[k, 1] - _NEIGHBOURS:
             theta[k] = box.bounds[k, 1]
@@ -261,24 +258,6 @@ def _scored(score: Score, theta: Array) -> float:
         return score(theta)
     except SettingsError:
         return -np.inf
-
-
-def _finish(objective: Objective, box: SearchBox, reached: list[Start]) -> Start:
-    """Climb on from the best end, put what that reaches in its place and return it.
-
-    On a ridge a climb may stop short of the top; without its memory it goes on. Where
-    an approximation is good, it was climbed last and promises no more.
-    """
-    k = int(np.argmax([start.lml for start in reached]))
-    end, theta = reached[k], np.array(reached[k].theta)
-    if isinstance(objective, Approximated):
-        if objective.near(theta, GOOD) is not None:
-            return end
-        objective = objective.exact
-    more = climb(objective, theta, box, [])
-    best = max(end, more, key=lambda start: start.lml)
-    reached[k] = best._replace(evaluations=end.evaluations + more.evaluations)
-    return reached[k]
 
 
 def posterior_search(

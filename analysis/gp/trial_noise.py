@@ -193,18 +193,23 @@ class TrialNoise:
         self, theta: Array, parts: Sequence[tuple[slice, Array, Array]]
     ) -> SharedAt:
         sc, sp, so, tau = self._components(self._split(theta)[1])
-        drifts = [so**2 * np.exp(-gap / tau) for _, _, gap in parts]
-        blocks = [
-            (rows, sc**2 + drift + sp**2 * np.outer(f, f))
-            for (rows, f, _), drift in zip(parts, drifts, strict=True)
-        ]
+        blocks = [(rows, sc**2 + sp**2 * (f * f[:, None])) for rows, f, _ in parts]
+        drifts: list[Array] = []
+        if self.has_drift:
+            drifts = [so**2 * np.exp(-gap / tau) for _, _, gap in parts]
+            blocks = [
+                (rows, block + drift)
+                for (rows, block), drift in zip(blocks, drifts, strict=True)
+            ]
 
         def contract(W: Array) -> Array:
             sums = np.zeros(4)
-            for (rows, f, gap), drift in zip(parts, drifts, strict=True):
+            for rows, f, _ in parts:
                 inside = W[rows, rows]
-                along = inside * drift
-                sums += inside.sum(), f @ inside @ f, along.sum(), (along * gap).sum()
+                sums[:2] += inside.sum(), f @ inside @ f
+            for (rows, _, gap), drift in zip(parts, drifts, strict=self.has_drift):
+                along = W[rows, rows] * drift
+                sums[2:] += along.sum(), (along * gap).sum()
             slope = sums * [2.0 * sc**2, 2.0 * sp**2, 2.0, 1.0 / tau]
             padding = np.zeros(len(self.within.names))
             return np.concatenate([padding, slope[self._present()]])

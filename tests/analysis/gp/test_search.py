@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from acquisition.errors import SettingsError
-from analysis.gp import search as search_module
 from analysis.gp.arcsine import Arcsine
 from analysis.gp.kernels import SquaredExponential
 from analysis.gp.noise import ConstantNoise, LogLinearNoise
@@ -79,23 +78,6 @@ def test_a_last_start_is_far_from_known_tops(length):
     # lengths beyond e^3 standard deviations are all the same
     gaps = np.minimum(tops, 3.0) - np.minimum(optimum.began[2], 3.0)
     assert np.abs(gaps)[:, 1:3].max(axis=1).min() >= 1.0
-
-
-def test_the_best_end_is_climbed_on_and_counts_as_one_start(monkeypatch):
-    original, climbs = search_module.climb, []
-
-    def watched(objective, start, box, known):
-        climbs.append((start, original(objective, start, box, known)))
-        return climbs[-1][1]
-
-    monkeypatch.setattr(search_module, "climb", watched)
-    optimum = search(hill((np.array([0.0, -1.0, 0.5, -0.5]), 5.0, 1.0)))
-    *ends, (again, _) = climbs
-    best = max((end for _, end in ends), key=lambda end: end.lml)
-    np.testing.assert_array_equal(again, best.theta)
-    assert optimum.lml >= best.lml
-    spent = sum(end.evaluations for _, end in climbs)
-    assert sum(start.evaluations for start in optimum.starts) == spent
 
 
 def test_points_without_a_likelihood_are_no_starts():
