@@ -196,18 +196,20 @@ def foot_velocity(t: Array, position: Array) -> Array:
     Returns:
         Velocity of the shape of `position`.
     """
-    rows = np.arange(t.size)
-    before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, t.size - 1)
-    span = t[after] - t[before]
-    change = position[after] - position[before]
-    velocity = (change.T / span).T
     steps = np.diff(t)
+    velocity = (_central_change(position).T / _central_change(t)).T
     # n missing samples leave a step of n + 1 periods; half a period is jitter
-    is_gap = steps > (_LONGEST_GAP + 1.5) * np.median(steps)
-    velocity[np.concatenate([is_gap, [False]]) | np.concatenate([[False], is_gap])] = (
-        np.nan
-    )
+    gaps = np.flatnonzero(steps > (_LONGEST_GAP + 1.5) * np.median(steps))
+    velocity[gaps] = velocity[gaps + 1] = np.nan
     return velocity
+
+
+def _central_change(values: Array) -> Array:
+    """Return the next less the last row; at the ends the row itself for one of them."""
+    change = np.empty_like(values)
+    np.subtract(values[2:], values[:-2], out=change[1:-1])
+    change[0], change[-1] = values[1] - values[0], values[-1] - values[-2]
+    return change
 
 
 def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
