@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from analysis.data import (
     terrain_kind,
 )
 from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.jobs import Progress, Store, Workers, run_tasks
+from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.relatives import (
@@ -141,12 +140,14 @@ def run_study(
     workers = Workers(options.n_jobs, options.scheduler)
     whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
     akin = plan_relatives(prepared, grounds_of(trials), options.fit)
-    parts = _in_turn(progress, [len(of) for of in (tasks, whole_tasks, apart, akin)])
-    first, second, third, fourth = parts
-    folds = run_tasks(run_fold, tasks, workers, first, store)
-    wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
-    fitted = run_tasks(fit_components, apart, workers, third, store)
-    outcomes = run_tasks(run_relatives, akin, workers, fourth, store)
+    batches = [
+        Batch(run_fold, tasks),
+        Batch(run_relatives, akin),
+        Batch(fit_components, apart),
+        Batch(fit_terrain, whole_tasks),
+    ]
+    done = run_batches(batches, workers, progress, store)
+    folds, outcomes, fitted, wholes = done
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
@@ -181,20 +182,6 @@ def _prepared(
             terrain: tuple(prepare_trial(series, options) for series in recorded)
             for terrain, recorded in trials.items()
         }
-
-
-def _in_turn(
-    progress: Progress | None, counts: Sequence[int]
-) -> Sequence[Progress | None]:
-    """Return one progress as that of several runs of tasks, one after the other."""
-    if progress is None:
-        return [None] * len(counts)
-    total, tell = sum(counts), progress
-
-    def from_(start: int) -> Progress:
-        return lambda done, _: tell(start + done, total)
-
-    return [from_(start) for start in [0, *accumulate(counts)][:-1]]
 
 
 def _apart(
