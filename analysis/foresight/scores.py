@@ -6,7 +6,8 @@ recall that the same alarms have when they are shifted in time (chance).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
@@ -134,26 +135,47 @@ def _chance(ticks: Sequence[TrialTicks], onsets: int) -> float:
     return hits / (onsets * (SHIFTS - 1)) if onsets else float("nan")
 
 
-def score_ground(
-    pairs: Sequence[tuple[GroundModel, Sequence[WatchedTrial]]],
-) -> GroundScore | None:
+@dataclass(slots=True)
+class GroundAnswers:
+    """What a model says of the surface of trials that it has not seen.
+
+    Attributes:
+        trials: number of trials on flat or rocky ground.
+        begun: whether the answer after each of `MOMENTS` was right, by trial.
+        anew: (probability of rocky ground, whether it is), of every second of sliding.
+        back: times to 95 % on the right surface after changes of ground [s].
+    """
+
+    trials: int = 0
+    begun: list[list[bool]] = field(default_factory=lambda: [[] for _ in MOMENTS])
+    anew: list[list[tuple[float, bool]]] = field(
+        default_factory=lambda: [[] for _ in MOMENTS]
+    )
+    back: list[float] = field(default_factory=list[float])
+
+
+def ground_answers(model: GroundModel, trials: Sequence[WatchedTrial]) -> GroundAnswers:
+    """Return what a model says of trials; nothing where it has one surface only."""
+    answers = GroundAnswers()
+    if model.surfaces:
+        known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
+        answers.trials = len(known)
+        for trial in known:
+            _judge_trial(model, trial, answers)
+        answers.back = _changes(model, known)
+    return answers
+
+
+def score_ground(answers: Sequence[GroundAnswers]) -> GroundScore | None:
     """Return how surfaces were told apart; None where no model has two of them.
 
     Args:
-        pairs: models, each with trials that it has not seen.
+        answers: of models to trials that they have not seen.
     """
-    begun: list[list[bool]] = [[] for _ in MOMENTS]
-    anew: list[list[tuple[float, bool]]] = [[] for _ in MOMENTS]
-    back: list[float] = []
-    count = 0
-    for model, trials in pairs:
-        if not model.surfaces:
-            continue
-        known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
-        count += len(known)
-        for trial in known:
-            _judge_trial(model, trial, begun, anew)
-        back += _changes(model, known)
+    count = sum(of.trials for of in answers)
+    begun = [list(chain(*of)) for of in zip(*(a.begun for a in answers), strict=True)]
+    anew = [list(chain(*of)) for of in zip(*(a.anew for a in answers), strict=True)]
+    back = [time for of in answers for time in of.back]
     if not count or not all(anew):
         return None
     p, is_rocky = (np.array(column) for column in zip(*anew[0], strict=True))
@@ -171,10 +193,7 @@ def score_ground(
 
 
 def _judge_trial(
-    model: GroundModel,
-    trial: WatchedTrial,
-    begun: list[list[bool]],
-    anew: list[list[tuple[float, bool]]],
+    model: GroundModel, trial: WatchedTrial, answers: GroundAnswers
 ) -> None:
     """Add the answers of a trial, from its beginning and begun anew every second."""
     is_rocky, rows = trial.surface == ROCKY_SURFACE, trial.sliding
@@ -184,14 +203,16 @@ def _judge_trial(
     for count, row in enumerate(rows, 1):
         _feed(recogniser, trial, row)
         if count in asked and recogniser.rocky is not None:
-            begun[asked[count]].append((recogniser.rocky > 0.5) == is_rocky)
+            right = (recogniser.rocky > 0.5) == is_rocky
+            answers.begun[asked[count]].append(right)
     recogniser.reset()
     for start in range(0, len(rows) - MOMENTS[-1], MOMENTS[-1]):
         recogniser.forget()
         for count, row in enumerate(rows[start : start + MOMENTS[-1]], 1):
             _feed(recogniser, trial, row)
             if count in MOMENTS and recogniser.rocky is not None:
-                anew[MOMENTS.index(count)].append((recogniser.rocky, is_rocky))
+                moment = MOMENTS.index(count)
+                answers.anew[moment].append((recogniser.rocky, is_rocky))
 
 
 def _feed(recogniser: GroundRecogniser, trial: WatchedTrial, row: int) -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from analysis.report import (
     drawn_once,
     foresight_figure,
 )
-from analysis.study import Store, Study
+from analysis.study import Store, Study, run_tasks
 from experiments.report.tables import foresight_tables
 from experiments.rig import ForesightSource, state_record, states_of
 
@@ -72,7 +73,9 @@ def study_foresight(
     """
     task = plan_judged(trials, study.kinds, break_away)
     files = {name: TrialFiles(of) for name, of in trials.items()}
-    judged = judged_foresight(task, lambda: watch_all(files, study.kinds), store)
+    judged = judged_foresight(
+        task, lambda: watch_all(files, study.kinds), store, study.options.n_jobs
+    )
     if judged.curves is None:
         return StudyForesight(judged.model, (), {})
     surface = judged.surface
@@ -102,7 +105,10 @@ def _figures(
 
 
 def judged_foresight(
-    task: JudgedTask, watched: Callable[[], Sequence[WatchedTrial]], store: Store | None
+    task: JudgedTask,
+    watched: Callable[[], Sequence[WatchedTrial]],
+    store: Store | None,
+    n_jobs: int | None = 1,
 ) -> JudgedForesight:
     """Return what trials teach and what that is worth; from the store where it is kept.
 
@@ -110,11 +116,12 @@ def judged_foresight(
         task: what it follows from.
         watched: gives its trials, watched; called only where nothing is kept.
         store: outcomes of earlier reports.
+        n_jobs: processes; one per core where it is None.
     """
     kept = None if store is None else store.get(task)
     if isinstance(kept, JudgedForesight):
         return kept
-    outcome = judge(watched(), task.break_away)
+    outcome = judge(watched(), task.break_away, partial(run_tasks, workers=n_jobs))
     if store is not None:
         store.put(task, outcome)
     return outcome
