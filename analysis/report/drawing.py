@@ -16,61 +16,31 @@ from typing import Any
 
 import numpy as np
 
-from analysis.figures import (
-    PAGE_ORDER,
-    FigureSpec,
-    Picture,
-    ReportSection,
-    break_away,
-    confusion,
-    curves,
-    errors,
-    excerpts,
-    render,
-    rig,
-    styled,
-    surfaces,
-    trials,
-    uncertainty,
-)
-from analysis.findings import StudyResults
-from analysis.report.page_model import ReportFigure
+from analysis.figures import PAGE_ORDER, Picture, ReportSection
+from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study import Store, Study, available_cores, run_tasks
 
 _MOST_DRAWING = 4  # processes
-_MANY_TERRAINS = 4  # from which on they pay
+_MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 _PLAIN = (type(None), bool, int, float, str, bytes, Enum)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
 }
-_FAMILIES = (
-    *(excerpts, curves, surfaces, errors, uncertainty),
-    *(break_away, confusion, trials, rig),
-)
-FIGURES: tuple[FigureSpec, ...] = tuple(
-    sorted(
-        (spec for family in _FAMILIES for spec in family.FIGURES),
-        key=lambda spec: PAGE_ORDER.index(spec.key),
-    )
-)
 
 
-def report_figures(
-    results: StudyResults, n_jobs: int = 1, *, with_pdf: bool = False
-) -> list[ReportFigure]:
+def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
-        results: what is shown.
+        shown: what they show.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
-        with_pdf: figures are wanted as PDF, too.
     """
-    batches = [FigureBatch(results, k, n_jobs, with_pdf) for k in range(n_jobs)]
+    batches = [FigureBatch(shown, k, n_jobs) for k in range(n_jobs)]
     drawn: dict[str, ReportFigure] = {}
     for batch in run_tasks(draw_batch, batches, n_jobs):
         drawn |= {figure.picture.key: figure for figure in batch}
-    return [drawn[spec.key] for spec in FIGURES if spec.key in drawn]
+    return [drawn[key] for key in PAGE_ORDER if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,41 +48,23 @@ class FigureBatch:
     """The figures that one process draws.
 
     Attributes:
-        results: what is shown.
+        shown: what they show.
         first: number of its first figure.
         step: from one of its figures to the next.
-        with_pdf: figures are wanted as PDF, too.
     """
 
-    results: StudyResults
+    shown: ShownNumbers
     first: int
     step: int
-    with_pdf: bool = False
 
 
 def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
     """Return the figures of a batch that there are numbers for."""
-    with styled():
-        figures = [_draw(spec, batch) for spec in FIGURES[batch.first :: batch.step]]
+    from analysis.report.gallery import draw_figure
+
+    keys = PAGE_ORDER[batch.first :: batch.step]
+    figures = [draw_figure(key, batch.shown) for key in keys]
     return [figure for figure in figures if figure is not None]
-
-
-def _draw(spec: FigureSpec, batch: FigureBatch) -> ReportFigure | None:
-    results = batch.results
-    figure = spec.draw(results)
-    if figure is None:
-        return None
-    is_simulated = results.study.simulated
-    picture = render(
-        spec.key,
-        figure,
-        is_simulated,
-        is_vector=spec.is_vector,
-        with_pdf=batch.with_pdf,
-    )
-    return ReportFigure(
-        spec.section, spec.title, spec.alt, spec.caption(results), picture
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,23 +84,20 @@ class DrawingTask:
     with_pdf: bool
 
 
-def kept_figures(
-    results: StudyResults, store: Store | None = None, *, with_pdf: bool = False
-) -> list[ReportFigure]:
+def kept_figures(shown: ShownNumbers, store: Store | None = None) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
-        results: what is shown.
+        shown: what they show.
         store: figures of earlier reports.
-        with_pdf: figures are wanted as PDF, too.
     """
-    study = results.study
+    study = shown.results.study
 
     def draw() -> list[ReportFigure]:
-        return report_figures(results, _processes(study), with_pdf=with_pdf)
+        return report_figures(shown, _processes(study))
 
     return drawn_once(
-        results, draw, store, is_simulated=study.simulated, with_pdf=with_pdf
+        shown, draw, store, is_simulated=study.simulated, with_pdf=shown.with_pdf
     )
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from analysis.figures import (
+    FORESIGHT,
     MODEL_COLOURS,
     SPEED_LABEL,
     Axes,
@@ -15,8 +16,6 @@ from analysis.figures import (
 )
 from analysis.foresight import HORIZON, ForesightCurves, ForesightExcerpt
 from analysis.report.page_model import ReportFigure
-
-FORESIGHT_KEY = "foresight"
 
 _HEIGHT = 4.6  # inches
 _STYLES = ("-", "--", "-.", ":")
@@ -37,7 +36,7 @@ def foresight_figure(
         drawn = draw_foresight(curves)
         if drawn is None:
             return None
-        picture = render(FORESIGHT_KEY, drawn, is_simulated, with_pdf=with_pdf)
+        picture = render(FORESIGHT, drawn, is_simulated, with_pdf=with_pdf)
     return ReportFigure(
         section=ReportSection.BEYOND,
         title="Foresight on held-out trials",

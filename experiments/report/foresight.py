@@ -24,12 +24,7 @@ from analysis.foresight import (
     plan_judged,
     watch_all,
 )
-from analysis.report import (
-    ReportFigure,
-    ReportTable,
-    drawn_once,
-    foresight_figure,
-)
+from analysis.report import ReportTable
 from analysis.study import Store, Study, run_tasks
 from experiments.report.tables import foresight_tables
 from experiments.rig import ForesightSource, state_record, states_of
@@ -45,13 +40,13 @@ class StudyForesight:
         model: learnt from all trials; None where they are too few.
         tables: what it is worth.
         numbers: the same as plain values.
-        figures: what a page shows of it.
+        curves: what a figure shows of it; None where there were too few trials.
     """
 
     model: ForesightModel | None
     tables: tuple[ReportTable, ...]
     numbers: Mapping[str, Any]
-    figures: tuple[ReportFigure, ...] = ()
+    curves: ForesightCurves | None = None
 
 
 def study_foresight(
@@ -59,8 +54,6 @@ def study_foresight(
     trials: Mapping[str, Sequence[HeldTrial]],
     break_away: Mapping[str, BreakAwayModel],
     store: Store | None = None,
-    *,
-    with_pdf: bool = False,
 ) -> StudyForesight:
     """Return what the trials of a study teach, and what that is worth on others.
 
@@ -69,7 +62,6 @@ def study_foresight(
         trials: of the study, by terrain; read anew where nothing is kept.
         break_away: models by terrain.
         store: outcomes of earlier reports.
-        with_pdf: figures are wanted as PDF, too.
     """
     task = plan_judged(trials, study.kinds, break_away)
     files = {name: TrialFiles(of) for name, of in trials.items()}
@@ -85,23 +77,7 @@ def study_foresight(
         "terrain_after_sliding": judged.grounds,
     }
     tables = foresight_tables(judged.slips, judged.grounds, surface)
-    figures = _figures(judged.curves, store, study.simulated, with_pdf=with_pdf)
-    return StudyForesight(judged.model, tables, numbers, figures)
-
-
-def _figures(
-    curves: ForesightCurves, store: Store | None, is_simulated: bool, *, with_pdf: bool
-) -> tuple[ReportFigure, ...]:
-    """Return the figure of foresight, none without numbers for it."""
-
-    def draw() -> list[ReportFigure]:
-        figure = foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
-        return [] if figure is None else [figure]
-
-    drawn = drawn_once(
-        curves, draw, store, is_simulated=is_simulated, with_pdf=with_pdf
-    )
-    return tuple(drawn)
+    return StudyForesight(judged.model, tables, numbers, judged.curves)
 
 
 def judged_foresight(

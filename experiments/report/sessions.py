@@ -235,9 +235,7 @@ def report_sessions(
     break_away = break_away_of(study, store)
     variants = order.choices.variants
     others = repeat_study(study, analysed.files, variants, console, store)
-    foresight = study_foresight(
-        study, trials, break_away, store, with_pdf=order.with_pdf
-    )
+    foresight = study_foresight(study, trials, break_away, store)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = _context(sessions, order, analysed, foresight, others)
     context = replace(context, break_away=break_away, store=store)
@@ -269,7 +267,6 @@ def _context(
             *foresight.tables,
             *report_tables(sessions, trials),
         ],
-        figures=foresight.figures,
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
@@ -278,5 +275,6 @@ def _context(
         photos=[BedPhoto(*photo) for photo in photos],
         rig=with_tares([trial.health for trial in every], every),
         foresight=foresight.model if len(sessions) > 1 else None,
+        foresight_curves=foresight.curves,
         with_pdf=order.with_pdf,
     )

@@ -4,7 +4,7 @@ from analysis.figures.sections import ReportSection
 from analysis.figures.style import styled
 from analysis.figures.surfaces import distinct_labels, round_ticks
 from analysis.findings.findings import compute_results
-from analysis.report.drawing import FIGURES
+from analysis.report.gallery import FIGURES
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
