@@ -35,8 +35,10 @@ from .watching import (
     HORIZON,
     ROCKY_SURFACE,
     WatchedTrial,
+    WatchTask,
     watch,
     watch_all,
+    watch_file,
     watch_series,
 )
 from .whole_record import FootRecord
@@ -74,6 +76,7 @@ __all__ = [
     "Signals",
     "SlipModel",
     "SlipScore",
+    "WatchTask",
     "WatchedSource",
     "WatchedTrial",
     "all_pairs",
@@ -93,5 +96,6 @@ __all__ = [
     "score_slips",
     "watch",
     "watch_all",
+    "watch_file",
     "watch_series",
 ]

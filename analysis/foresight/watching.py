@@ -7,6 +7,7 @@ positive if a slip begins within the next 0.2 s.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from analysis.data import (
     TractionSeries,
     find_slips,
     groups_of,
+    load_trial,
     prepare_trial,
 )
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
@@ -116,6 +118,28 @@ def watch(trial: RecordedTrial, surface: str) -> WatchedTrial:
     smooth = prepare_trial(trial.series(), PrepareOptions()).smooth
     along = trial.frame.axes()[0].tolist()  # live values, not those computed anew
     return _watched(origin, FootRecord.of(trial.cycles, along), smooth)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchTask:
+    """A trial on disk.
+
+    Attributes:
+        path: the file.
+        surface: "flat", "rocky" or a word of its own.
+    """
+
+    path: Path
+    surface: str
+
+
+def watch_file(task: WatchTask) -> WatchedTrial:
+    """Return a trial on disk with its features and its slips.
+
+    Raises:
+        TrialFileError: the file is not a sound trial.
+    """
+    return watch(load_trial(task.path), task.surface)
 
 
 def watch_series(

@@ -37,8 +37,8 @@ class Workers:
     """Where tasks run; never what they return.
 
     Attributes:
-        n_jobs: number of processes; by default one per core, and none beside this one
-            for three tasks or fewer.
+        n_jobs: number of processes; by default one per core, and for three tasks or
+            fewer those that are running.
         scheduler: address of a Dask scheduler, on this machine or by TLS, e.g.
             "tcp://127.0.0.1:8786"; None for processes of this one. Its workers need the
             same version of this project.
@@ -50,7 +50,7 @@ class Workers:
     def count(self, tasks: int) -> int:
         """Return the number of local processes for so many tasks."""
         if self.n_jobs is None and tasks <= _FEW:
-            return 1
+            return min(running_workers(), tasks)
         return min(available_cores() if self.n_jobs is None else self.n_jobs, tasks)
 
 
@@ -98,6 +98,17 @@ class Store(Protocol):
 def available_cores() -> int:
     """Return the number of cores this process may use."""
     return max(1, len(os.sched_getaffinity(0)))
+
+
+_started = [1]  # numbers of local processes that tasks were given to, and this one
+
+
+def running_workers() -> int:
+    """Return how many processes earlier tasks have started; 1 where there are none.
+
+    Tasks that take less time than starting them are worth giving to these only.
+    """
+    return max(_started)
 
 
 def run_tasks(
@@ -196,6 +207,7 @@ def _stream(
             _one_threaded(batches[k].function, (k, n), every[k][n]) for k, n in left
         )
     else:
+        _started.append(count)
         with parallel_config(
             "loky", n_jobs=count, inner_max_num_threads=1, max_nbytes=_MAPPED
         ):

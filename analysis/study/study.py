@@ -1,6 +1,6 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,7 +20,7 @@ from analysis.data import (
     summed_up,
     terrain_kind,
 )
-from analysis.study.crossval import plan_folds, run_fold
+from analysis.study.crossval import Prepared, plan_folds, run_fold
 from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
@@ -120,6 +120,7 @@ def run_study(
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
+    beside: Callable[[Prepared], Sequence[Batch]] = lambda _: (),
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -129,6 +130,8 @@ def run_study(
         simulated: the trials were simulated; marks every product.
         progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
+        beside: gives tasks of the prepared trials that are done with the fits; what
+            comes of them is in the store.
 
     Raises:
         SettingsError: there is no trial at all.
@@ -145,9 +148,10 @@ def run_study(
         Batch(run_relatives, akin),
         Batch(fit_components, apart),
         Batch(fit_terrain, whole_tasks),
+        *beside(prepared),
     ]
     done = run_batches(batches, workers, progress, store)
-    folds, outcomes, fitted, wholes = done
+    folds, outcomes, fitted, wholes = done[:4]
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {

@@ -11,8 +11,8 @@ import numpy as np
 from acquisition import FORESIGHT, Record, SettingsError
 from acquisition.trial_file import TrialReader
 from analysis.breakaway import BreakAwayModel
-from analysis.data import load_trial
-from analysis.findings import HeldTrial, TrialFiles
+from analysis.data import groups_of, load_trial
+from analysis.findings import HeldTrial
 from analysis.foresight import (
     ForesightCurves,
     ForesightModel,
@@ -20,9 +20,10 @@ from analysis.foresight import (
     JudgedTask,
     RigIdentity,
     WatchedTrial,
+    WatchTask,
     judge,
     plan_judged,
-    watch_all,
+    watch_file,
 )
 from analysis.report import ReportTable
 from analysis.study import Store, Study, run_tasks
@@ -64,9 +65,8 @@ def study_foresight(
         store: outcomes of earlier reports.
     """
     task = plan_judged(trials, study.kinds, break_away)
-    files = {name: TrialFiles(of) for name, of in trials.items()}
     judged = judged_foresight(
-        task, lambda: watch_all(files, study.kinds), store, study.options.n_jobs
+        task, lambda: watched_trials(study, trials), store, study.options.n_jobs
     )
     if judged.curves is None:
         return StudyForesight(judged.model, (), {})
@@ -78,6 +78,19 @@ def study_foresight(
     }
     tables = foresight_tables(judged.slips, judged.grounds, surface)
     return StudyForesight(judged.model, tables, numbers, judged.curves)
+
+
+def watched_trials(
+    study: Study, trials: Mapping[str, Sequence[HeldTrial]]
+) -> list[WatchedTrial]:
+    """Return the trials of a study, read anew and watched.
+
+    Raises:
+        TrialFileError: a file is not a sound trial any more.
+    """
+    surface = groups_of(study.kinds)["surface"]
+    tasks = [WatchTask(t.path, surface[n]) for n, of in trials.items() for t in of]
+    return run_tasks(watch_file, tasks, study.options.n_jobs)
 
 
 def judged_foresight(
