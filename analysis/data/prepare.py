@@ -214,8 +214,7 @@ def _central_change(values: Array) -> Array:
 
 def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
     """Return the kept samples of a trial: smoothed, thinned, inside the window."""
-    widths = options.widths(series)
-    smooth = _smooth(series, widths[0])
+    widths, smooth = options.widths(series), smoothed(series, options)
     lag = None if series.is_prepared else force_lag(series.t, series.v_t, series.F_t)
     thinned = np.arange(0, smooth.t.size, widths[1])
     v = smooth.v_t[thinned]
@@ -242,7 +241,9 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
     )
 
 
-def _smooth(series: TractionSeries, width: int) -> Smoothed:
+def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
+    """Return a whole trial after the moving average, and nothing else of it."""
+    width, _ = options.widths(series)
     columns = {
         field.name: moving_average(getattr(series, field.name), width)
         for field in fields(Smoothed)

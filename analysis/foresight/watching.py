@@ -23,7 +23,7 @@ from analysis.data import (
     find_slips,
     groups_of,
     load_trial,
-    prepare_trial,
+    smoothed,
 )
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
@@ -115,7 +115,7 @@ def watch(trial: RecordedTrial, surface: str) -> WatchedTrial:
         RigIdentity.of(metadata),
         metadata.get("seed", ""),
     )
-    smooth = prepare_trial(trial.series(), PrepareOptions()).smooth
+    smooth = smoothed(trial.series(), PrepareOptions())
     along = trial.frame.axes()[0].tolist()  # live values, not those computed anew
     return _watched(origin, FootRecord.of(trial.cycles, along), smooth)
 
@@ -154,7 +154,7 @@ def watch_series(
         surface: "flat", "rocky" or a word of its own.
         rig: foot and rig that it is taken to be from.
     """
-    smooth = prepare_trial(series, PrepareOptions()).smooth
+    smooth = smoothed(series, PrepareOptions())
     start = float(series.t[0])
     numbers = np.arange(round((float(series.t[-1]) - start) / PERIOD) + 1)
     grid = start + numbers * PERIOD
