@@ -8,6 +8,7 @@ recall that the same alarms have when they are shifted in time (chance).
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -196,28 +197,39 @@ def _judge_trial(
     model: GroundModel, trial: WatchedTrial, answers: GroundAnswers
 ) -> None:
     """Add the answers of a trial, from its beginning and begun anew every second."""
-    is_rocky, rows = trial.surface == ROCKY_SURFACE, trial.sliding
-    first = _first_run(trial.tick[rows].tolist())
+    is_rocky, slid = trial.surface == ROCKY_SURFACE, _slid(trial)
+    first = _first_run([tick.tick for tick in slid])
     recogniser = GroundRecogniser(model)
     asked = {first + moment: k for k, moment in enumerate(MOMENTS)}
-    for count, row in enumerate(rows, 1):
-        _feed(recogniser, trial, row)
+    for count, tick in enumerate(slid, 1):
+        recogniser.push(*tick)
         if count in asked and recogniser.rocky is not None:
             right = (recogniser.rocky > 0.5) == is_rocky
             answers.begun[asked[count]].append(right)
     recogniser.reset()
-    for start in range(0, len(rows) - MOMENTS[-1], MOMENTS[-1]):
+    for start in range(0, len(slid) - MOMENTS[-1], MOMENTS[-1]):
         recogniser.forget()
-        for count, row in enumerate(rows[start : start + MOMENTS[-1]], 1):
-            _feed(recogniser, trial, row)
+        for count, tick in enumerate(slid[start : start + MOMENTS[-1]], 1):
+            recogniser.push(*tick)
             if count in MOMENTS and recogniser.rocky is not None:
                 moment = MOMENTS.index(count)
                 answers.anew[moment].append((recogniser.rocky, is_rocky))
 
 
-def _feed(recogniser: GroundRecogniser, trial: WatchedTrial, row: int) -> None:
-    v, F_t, F_n = trial.motion[row].tolist()
-    recogniser.push(int(trial.tick[row]), v, F_t, F_n)
+class _SlidTick(NamedTuple):
+    """A tick of sliding, as `GroundRecogniser.push` takes it."""
+
+    tick: int
+    v: float
+    F_t: float
+    F_n: float
+
+
+def _slid(trial: WatchedTrial) -> list[_SlidTick]:
+    """Return the ticks in which the foot slides."""
+    rows = trial.sliding
+    pairs = zip(trial.tick[rows].tolist(), trial.motion[rows].tolist(), strict=True)
+    return [_SlidTick(tick, *motion) for tick, motion in pairs]
 
 
 def _first_run(ticks: Sequence[int]) -> int:
@@ -235,29 +247,34 @@ def _changes(model: GroundModel, trials: Sequence[WatchedTrial]) -> list[float]:
     if not flat or not rocky:
         return []
     times: list[float] = []
+    slid = [_slid(trial) for trial in trials]
     for k, before in enumerate(trials):
         others = rocky if before.surface == FLAT_SURFACE else flat
         after = others[k % len(others)]
-        least = _BEFORE + MOMENTS[-1]
-        if len(before.sliding) >= _BEFORE and len(after.sliding) >= least:
-            times.append(_time_back(model, before, after))
+        met = slid[trials.index(after)]
+        if len(slid[k]) >= _BEFORE and len(met) >= _BEFORE + MOMENTS[-1]:
+            ends = slid[k][:_BEFORE], met[_BEFORE : _BEFORE + _AFTER]
+            times.append(_time_back(model, *ends, after.surface))
     return times
 
 
-def _time_back(model: GroundModel, before: WatchedTrial, after: WatchedTrial) -> float:
+def _time_back(
+    model: GroundModel,
+    before: Sequence[_SlidTick],
+    after: Sequence[_SlidTick],
+    surface: str,
+) -> float:
+    """Return the time to 95 % on the surface that a foot slides onto [s]."""
     recogniser = GroundRecogniser(model)
-    for row in before.sliding[:_BEFORE]:
-        _feed(recogniser, before, row)
-    offset = int(before.tick[before.sliding[_BEFORE - 1]])
-    rows = after.sliding[_BEFORE : _BEFORE + _AFTER]
-    offset += 1 - int(after.tick[rows[0]])
-    for count, row in enumerate(rows, 1):
-        v, F_t, F_n = after.motion[row].tolist()
-        recogniser.push(int(after.tick[row]) + offset, v, F_t, F_n)
+    for tick in before:
+        recogniser.push(*tick)
+    offset = before[-1].tick + 1 - after[0].tick
+    for count, tick in enumerate(after, 1):
+        recogniser.push(tick.tick + offset, *tick[1:])
         rocky = recogniser.rocky
         if rocky is None:
             continue
-        right = rocky if after.surface == ROCKY_SURFACE else 1.0 - rocky
+        right = rocky if surface == ROCKY_SURFACE else 1.0 - rocky
         if right >= RIGHT:
             return count * 0.01
     return float("inf")

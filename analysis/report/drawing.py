@@ -21,6 +21,7 @@ from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study import Store, Study, available_cores, run_tasks
 
 _MOST_DRAWING = 4  # processes
+_EACH = 2  # batches of a process: figures take unlike times
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 _PLAIN = (type(None), bool, int, float, str, bytes, Enum)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
@@ -36,7 +37,8 @@ def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
         shown: what they show.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
     """
-    batches = [FigureBatch(shown, k, n_jobs) for k in range(n_jobs)]
+    count = n_jobs if n_jobs == 1 else _EACH * n_jobs
+    batches = [FigureBatch(shown, k, count) for k in range(count)]
     drawn: dict[str, ReportFigure] = {}
     for batch in run_tasks(draw_batch, batches, n_jobs):
         drawn |= {figure.picture.key: figure for figure in batch}
@@ -45,7 +47,7 @@ def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
 
 @dataclass(frozen=True, slots=True)
 class FigureBatch:
-    """The figures that one process draws.
+    """Figures that are drawn one after the other.
 
     Attributes:
         shown: what they show.
