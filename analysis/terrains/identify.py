@@ -274,7 +274,9 @@ def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEviden
     ]
     scored: dict[str, list[TrialEvidence]] = {}
     scores = sum(len(task.experts) for task in tasks)
-    workers = study.options.n_jobs if scores > _SCORES_HERE else running_workers()
+    workers = study.options.n_jobs
+    if workers is None and scores <= _SCORES_HERE:
+        workers = running_workers()
     done = run_tasks(run_score, tasks, workers)
     for task, evidence in zip(tasks, done, strict=True):
         scored.setdefault(task.trial.terrain, []).append(evidence)

@@ -5,6 +5,7 @@ import pytest
 
 from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
+from analysis.findings.findings import compute_results
 from analysis.report import drawing
 from analysis.report.drawing import (
     DRAWN_TYPES,
@@ -12,7 +13,7 @@ from analysis.report.drawing import (
     drawn_once,
     shown_digest,
 )
-from analysis.report.page_model import ReportFigure
+from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study.store import TYPES, ResultStore
 
 PICTURE = Picture("rig", b"\x89PNG\x00\xff", b"%PDF", 1146, "<svg></svg>")
@@ -143,3 +144,9 @@ def test_what_is_no_figure_is_drawn_anew(store):
 def test_a_number_shows_the_same_when_the_store_gives_it_back(value):
     assert shown_digest([value]) == shown_digest([value.item()])
     assert shown_digest([value]) != shown_digest([value.item() + 1])
+
+
+@pytest.mark.slow
+def test_pictures_are_the_same_from_two_processes(small_study):
+    shown = ShownNumbers(compute_results(small_study))
+    assert drawing.report_figures(shown, 2) == drawing.report_figures(shown, 1)
