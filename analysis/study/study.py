@@ -144,14 +144,14 @@ def run_study(
     whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
     akin = plan_relatives(prepared, grounds_of(trials), options.fit)
     batches = [
+        *beside(prepared),  # first: they are longer than a fit
         Batch(run_fold, tasks),
         Batch(run_relatives, akin),
         Batch(fit_components, apart),
         Batch(fit_terrain, whole_tasks),
-        *beside(prepared),
     ]
     done = run_batches(batches, workers, progress, store)
-    folds, outcomes, fitted, wholes = done[:4]
+    folds, outcomes, fitted, wholes = done[-4:]
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
