@@ -11,7 +11,7 @@ from . import (
     uncertainty,
 )
 from .pictures import Picture
-from .sections import FORESIGHT, PAGE_ORDER, ReportSection
+from .sections import PAGE_ORDER, ReportSection
 from .spec import FigureSpec
 from .style import (
     MODEL_COLOURS,
@@ -27,7 +27,6 @@ from .style import (
 )
 
 __all__ = [
-    "FORESIGHT",
     "MODEL_COLOURS",
     "MODEL_HATCHES",
     "PAGE_ORDER",

@@ -23,7 +23,6 @@ class ReportSection(Enum):
         return self.name.lower()
 
 
-FORESIGHT = "foresight"  # drawn from other numbers than all else
 PAGE_ORDER = (
     "fig2_tustin_model",
     "fig4_excerpts",
@@ -50,5 +49,4 @@ PAGE_ORDER = (
     "stick_slip",
     "timing",
     "rig",
-    FORESIGHT,
 )

@@ -5,21 +5,28 @@ be kept, too. They are known by a digest of all that they show and of the code t
 draws them: whatever is changed in the analysis, they are drawn anew.
 """
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from analysis.figures import PAGE_ORDER, Picture, ReportSection
+from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
 from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study import Store, Study, available_cores, run_tasks
 
+if TYPE_CHECKING:
+    from analysis.figures import FigureSpec
+
+_KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
 _EACH = 2  # batches of a process: figures take unlike times
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
@@ -42,7 +49,7 @@ def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
     drawn: dict[str, ReportFigure] = {}
     for batch in run_tasks(draw_batch, batches, n_jobs):
         drawn |= {figure.picture.key: figure for figure in batch}
-    return [drawn[key] for key in PAGE_ORDER if key in drawn]
+    return [drawn[key] for key in _KEYS if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +69,53 @@ class FigureBatch:
 
 def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
     """Return the figures of a batch that there are numbers for."""
-    from analysis.report.gallery import draw_figure
-
-    keys = PAGE_ORDER[batch.first :: batch.step]
-    figures = [draw_figure(key, batch.shown) for key in keys]
+    keys = _KEYS[batch.first :: batch.step]
+    figures = [_draw(key, batch.shown) for key in keys]
     return [figure for figure in figures if figure is not None]
+
+
+def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
+    from analysis.figures import render, styled
+
+    results, with_pdf = shown.results, shown.with_pdf
+    is_simulated = results.study.simulated
+    if key == FORESIGHT_KEY:
+        curves = shown.foresight
+        if curves is None:
+            return None
+        return foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
+    spec = figure_specs()[key]
+    with styled():
+        figure = spec.draw(results)
+        if figure is None:
+            return None
+        vector = {"is_vector": spec.is_vector, "with_pdf": with_pdf}
+        picture = render(key, figure, is_simulated, **vector)
+    return ReportFigure(
+        spec.section, spec.title, spec.alt, spec.caption(results), picture
+    )
+
+
+@cache
+def figure_specs() -> Mapping[str, FigureSpec]:
+    """Return the figures of a study by their keys; whoever asks loads matplotlib."""
+    from analysis.figures import (
+        break_away,
+        confusion,
+        curves,
+        errors,
+        excerpts,
+        rig,
+        surfaces,
+        trials,
+        uncertainty,
+    )
+
+    families = (
+        *(excerpts, curves, surfaces, errors, uncertainty),
+        *(break_away, confusion, trials, rig),
+    )
+    return {spec.key: spec for family in families for spec in family.FIGURES}
 
 
 @dataclass(frozen=True, slots=True)

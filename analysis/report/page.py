@@ -21,6 +21,7 @@ from analysis.findings import (
 )
 from analysis.foresight import ForesightModel
 from analysis.report.drawing import kept_figures
+from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import (
     PageSection,
@@ -89,7 +90,7 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
     for name, content in files.items():
         if content:
             write_atomic(folder / name, content)
-    for key in PAGE_ORDER:
+    for key in (*PAGE_ORDER, FORESIGHT_KEY):
         for name in (f"{key}.png", f"{key}.pdf"):
             if not files.get(name):
                 (folder / name).unlink(missing_ok=True)

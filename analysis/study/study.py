@@ -20,7 +20,7 @@ from analysis.data import (
     summed_up,
     terrain_kind,
 )
-from analysis.study.crossval import Prepared, plan_folds, run_fold
+from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
 from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
@@ -30,10 +30,17 @@ from analysis.study.relatives import (
     plan_relatives,
     run_relatives,
 )
-from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
+from analysis.study.terrain_fit import (
+    PooledTustinFit,
+    TerrainResult,
+    TerrainTask,
+    fit_terrain,
+    mean_of,
+)
 from analysis.study.trial_components import (
     ComponentsTask,
     TimedRows,
+    TrialComponents,
     fit_components,
 )
 
@@ -140,35 +147,46 @@ def run_study(
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
-    workers = Workers(options.n_jobs, options.scheduler)
-    whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
-    akin = plan_relatives(prepared, grounds_of(trials), options.fit)
+    apart = _apart(prepared, options.fit)
     batches = [
         *beside(prepared),  # first: they are longer than a fit
         Batch(run_fold, tasks),
-        Batch(run_relatives, akin),
+        Batch(run_relatives, plan_relatives(prepared, grounds_of(trials), options.fit)),
         Batch(fit_components, apart),
-        Batch(fit_terrain, whole_tasks),
+        Batch(fit_terrain, _wholes(prepared, options)),
     ]
-    done = run_batches(batches, workers, progress, store)
-    folds, outcomes, fitted, wholes = done[-4:]
+    *_, folds, outcomes, fitted, wholes = run_batches(
+        batches, Workers(options.n_jobs, options.scheduler), progress, store
+    )
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
-        terrain: TerrainResult(
-            terrain=terrain,
-            kind=terrain_kind(terrain, [series.stones for series in trials[terrain]]),
-            trials=kept,
-            slips=tuple(find_slips(trial.smooth) for trial in kept),
-            folds=tuple(fold for fold in folds if fold.terrain == terrain),
-            whole=whole,
-            components=components.get(terrain),
-        )
-        for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
+        name: _result(trials[name], prepared[name], folds, whole, components.get(name))
+        for name, whole in zip(prepared, wholes, strict=True)
     }
     warnings = (*_contradictions(trials), *_all_warnings(results, options))
     relatives = {of.terrain: of for of in outcomes if of is not None}
     return Study(simulated, options, results, tuple(notes), warnings, relatives)
+
+
+def _result(
+    recorded: Sequence[TractionSeries],
+    kept: tuple[PreparedTrial, ...],
+    folds: Sequence[FoldResult],
+    whole: PooledTustinFit,
+    components: TrialComponents | None,
+) -> TerrainResult:
+    """Return the result of one terrain; of the folds those that are its own."""
+    terrain = whole.terrain
+    return TerrainResult(
+        terrain=terrain,
+        kind=terrain_kind(terrain, [series.stones for series in recorded]),
+        trials=kept,
+        slips=tuple(find_slips(trial.smooth) for trial in kept),
+        folds=tuple(fold for fold in folds if fold.terrain == terrain),
+        whole=whole,
+        components=components,
+    )
 
 
 def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
