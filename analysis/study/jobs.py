@@ -108,7 +108,7 @@ def running_workers() -> int:
 
     Tasks that take less time than starting them are worth giving to these only.
     """
-    return max(_started)
+    return min(max(_started), available_cores())
 
 
 def run_tasks(

@@ -114,6 +114,7 @@ def test_batches_come_back_each_in_its_own_order_and_are_counted_together(n_jobs
 
 def test_few_tasks_are_given_to_the_processes_that_run_already():
     run_tasks(square, [1, 2, 3, 4], 2)
-    assert running_workers() >= 2
-    assert Workers().count(2) == 2
+    expected = min(2, available_cores())
+    assert running_workers() >= expected
+    assert Workers().count(2) == expected
     assert Workers(1).count(2) == 1
