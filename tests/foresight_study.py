@@ -34,6 +34,7 @@ from analysis.foresight import (
     WatchedTrial,
     fit_foresight,
     foresee,
+    ground_answers,
     hold_out,
     score_ground,
     score_slips,
@@ -145,7 +146,7 @@ def report_ground(
     judge: Judge,
 ) -> None:
     """Print how flat and rocky ground are told apart, all pools together."""
-    ground = score_ground([(models[n].ground, pools[n]) for n in models])
+    ground = score_ground([ground_answers(models[n].ground, pools[n]) for n in models])
     if ground is None:
         sys.stdout.write("one surface only: nothing to tell apart\n")
         return

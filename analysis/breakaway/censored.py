@@ -130,7 +130,7 @@ class CensoredLikelihood:
         by_trial, gradients = self.by_trial(p)
         weights = np.ones(by_trial.size)
         if counts is not None:
-            weights = counts[np.unique(self.table.trial)]
+            weights = counts[self.table.trial[self.table.starts]]
         value, gradient = log_prior(p[self.levels :])
         total = gradients.T @ weights
         total[self.levels :] += gradient
@@ -149,20 +149,19 @@ class CensoredLikelihood:
         z = (table.log_peak - centre)[:, None] / s - su / s * points
         terms, slope = log_terms(self.family, z, table.is_held[:, None])
         terms = terms - np.where(table.is_held, 0.0, p[m + 1])[:, None]
-        starts = np.flatnonzero(np.diff(table.trial, prepend=-1))
-        at_node = np.add.reduceat(terms, starts) + np.log(weights)
+        at_node = np.add.reduceat(terms, table.starts) + np.log(weights)
         top = at_node.max(axis=1, keepdims=True)
         share = np.exp(at_node - top)
         value = (top + np.log(share.sum(axis=1, keepdims=True)))[:, 0]
         share /= share.sum(axis=1, keepdims=True)
-        posterior = np.repeat(share, np.diff(np.append(starts, table.count)), axis=0)
+        posterior = np.repeat(share, table.lengths, axis=0)
         by_z = (posterior * slope).sum(axis=1)
         rows = np.zeros((table.count, m + 3))
         rows[np.arange(table.count), table.terrain] = -by_z / s
         rows[:, m] = -by_z * table.load / s
         rows[:, m + 1] = -(posterior * slope * z).sum(axis=1) - ~table.is_held
         rows[:, m + 2] = -(posterior * slope * points).sum(axis=1) * su / s
-        return value, np.add.reduceat(rows, starts)
+        return value, np.add.reduceat(rows, table.starts)
 
     def log_scores(self, p: Array) -> Array:
         """Return the log density of every push alone in a new trial, shape (n,).

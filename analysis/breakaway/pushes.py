@@ -14,6 +14,7 @@ the strength and every estimate is too high. The default is 0.06 m/s.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class FootPush:
     is_held: bool
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PushTable:
     """Pushes of several trials and terrains as columns; a trial's rows are together.
 
@@ -89,6 +90,16 @@ class PushTable:
     def count(self) -> int:
         """Number of pushes."""
         return int(self.log_peak.size)
+
+    @cached_property
+    def starts(self) -> Indices:
+        """First row of every trial, shape (trials,)."""
+        return np.flatnonzero(np.diff(self.trial, prepend=-1))
+
+    @cached_property
+    def lengths(self) -> Indices:
+        """Number of rows of every trial, shape (trials,)."""
+        return np.diff(np.append(self.starts, self.count))
 
     def take(self, chosen: np.ndarray) -> "PushTable":
         """Return the rows of `chosen`, indices or a mask; trials keep their numbers."""

@@ -22,6 +22,7 @@ from .prepare import (
     Smoothed,
     moving_average,
     prepare_trial,
+    smoothed,
 )
 from .quality import (
     JOINT7_WARNING,
@@ -100,6 +101,7 @@ __all__ = [
     "prepare_trial",
     "quick_ratio",
     "share_below",
+    "smoothed",
     "suggest",
     "summed_up",
     "terrain_incline",

@@ -185,16 +185,16 @@ def load_trial(path: Path | str) -> RecordedTrial:
     cycles = reader.cycles().data
     _check_cycles(path, cycles)
     at_hand = _calibrated(reader)
-    payload, frame = at_hand.payload, at_hand.frame
+    payload, frame, axes = at_hand.payload, at_hand.frame, at_hand.frame.axes()
     metadata, attachments = reader.metadata, reader.attachments
     del reader  # with the whole file, before as much is allocated again
-    t = (cycles["host_ns"] - cycles["host_ns"][0]).astype(float) * 1e-9
+    start_ns = int(cycles["host_ns"][0])
+    t = (cycles["host_ns"] - np.uint64(start_ns)).astype(float) * 1e-9
     path_of_sole = at_hand.model.sole_path(np.ascontiguousarray(cycles["position"]))
     velocity = foot_velocity(t, path_of_sole.position)
     raw = np.ascontiguousarray(cycles["wrench_raw"])
     contact = payload.contact(raw, path_of_sole.rotation)
     force = payload.to_base(contact, path_of_sole.rotation)
-    axes, friction = frame.axes(), attachments.get("friction.toml", b"")
     trial = RecordedTrial(
         path=path,
         metadata=metadata,
@@ -209,13 +209,11 @@ def load_trial(path: Path | str) -> RecordedTrial:
         lateral=force @ axes[1],
         frame=frame,
         payload=payload,
-        constants=at_hand.constants,
+        constants=at_hand.model.constants,
         sole_point=at_hand.sole_point,
-        bracket=read_bracket(
-            path, metadata["trial"], payload.bias, int(cycles["host_ns"][0])
-        ),
+        bracket=read_bracket(path, metadata["trial"], payload.bias, start_ns),
         sensor_height=_sensor_height(attachments.get("config.toml", b"")),
-        friction_text=friction.decode(errors="ignore"),
+        friction_text=attachments.get("friction.toml", b"").decode(errors="ignore"),
     )
     try:
         trial.series()
@@ -231,7 +229,6 @@ class _Calibrated(NamedTuple):
     sole_point: Array
     terrain: str
     frame: TerrainFrame
-    constants: ArmConstants
     model: ArmModel
 
 
@@ -244,20 +241,23 @@ def _calibrated(reader: TrialReader) -> _Calibrated:
     try:
         payload, sole_point = payload_from_toml(_text(reader, "ft_calibration.toml"))
         terrain, frame = terrain_from_toml(_text(reader, "terrain.toml"))
-        constants = load_constants(_text(reader, "arm_model.toml"))
-        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
-        model = ArmModel(constants, Tool(nothing, nothing, sole_point))
+        model = _arm(_text(reader, "arm_model.toml"), tuple(sole_point.tolist()))
     except SettingsError as error:
         raise TrialFileError(reader.path, error.message.rstrip(".")) from error
     except (ValueError, ArithmeticError, RuntimeError) as error:
-        raise TrialFileError(
-            reader.path, f"has an impossible arm model ({error})"
-        ) from error
-    point = np.asarray(sole_point, dtype=np.float64)
-    return _Calibrated(payload, point, terrain, frame, constants, model)
+        text = f"has an impossible arm model ({error})"
+        raise TrialFileError(reader.path, text) from error
+    return _Calibrated(payload, sole_point, terrain, frame, model)
 
 
 @lru_cache(maxsize=16)  # the trials of a study have one or a few
+def _arm(constants: str, sole: tuple[float, ...]) -> ArmModel:
+    """Return the kinematics of `arm_model.toml` and of a sole on the tool plate."""
+    none = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    return ArmModel(load_constants(constants), Tool(none, none, np.array(sole)))
+
+
+@lru_cache(maxsize=16)
 def _sensor_height(config: bytes) -> float | None:
     try:
         height = parse_toml(config.decode())["ft_sensor"]["height"]

@@ -196,24 +196,25 @@ def foot_velocity(t: Array, position: Array) -> Array:
     Returns:
         Velocity of the shape of `position`.
     """
-    rows = np.arange(t.size)
-    before, after = np.maximum(rows - 1, 0), np.minimum(rows + 1, t.size - 1)
-    span = t[after] - t[before]
-    change = position[after] - position[before]
-    velocity = (change.T / span).T
     steps = np.diff(t)
+    velocity = (_central_change(position).T / _central_change(t)).T
     # n missing samples leave a step of n + 1 periods; half a period is jitter
-    is_gap = steps > (_LONGEST_GAP + 1.5) * np.median(steps)
-    velocity[np.concatenate([is_gap, [False]]) | np.concatenate([[False], is_gap])] = (
-        np.nan
-    )
+    gaps = np.flatnonzero(steps > (_LONGEST_GAP + 1.5) * np.median(steps))
+    velocity[gaps] = velocity[gaps + 1] = np.nan
     return velocity
+
+
+def _central_change(values: Array) -> Array:
+    """Return the next less the last row; at the ends the row itself for one of them."""
+    change = np.empty_like(values)
+    np.subtract(values[2:], values[:-2], out=change[1:-1])
+    change[0], change[-1] = values[1] - values[0], values[-1] - values[-2]
+    return change
 
 
 def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTrial:
     """Return the kept samples of a trial: smoothed, thinned, inside the window."""
-    widths = options.widths(series)
-    smooth = _smooth(series, widths[0])
+    widths, smooth = options.widths(series), smoothed(series, options)
     lag = None if series.is_prepared else force_lag(series.t, series.v_t, series.F_t)
     thinned = np.arange(0, smooth.t.size, widths[1])
     v = smooth.v_t[thinned]
@@ -240,7 +241,9 @@ def prepare_trial(series: TractionSeries, options: PrepareOptions) -> PreparedTr
     )
 
 
-def _smooth(series: TractionSeries, width: int) -> Smoothed:
+def smoothed(series: TractionSeries, options: PrepareOptions) -> Smoothed:
+    """Return a whole trial after the moving average, and nothing else of it."""
+    width, _ = options.widths(series)
     columns = {
         field.name: moving_average(getattr(series, field.name), width)
         for field in fields(Smoothed)

@@ -64,24 +64,24 @@ class TractionSeries:
         _check_name(self.terrain, self.name)
         columns = [np.asarray(getattr(self, key), dtype=np.float64) for key in _COLUMNS]
         _check_shapes(columns, self.name)
-        table = np.column_stack(columns)
-        is_finite = np.isfinite(table).all(axis=1)
-        finite = table[is_finite]
-        is_new = np.ones(len(finite), dtype=bool)
-        is_new[1:] = (finite[1:] != finite[:-1]).any(axis=1)
-        if np.count_nonzero(is_new) < MINIMUM_SAMPLES:
+        is_finite = _of_all([np.isfinite(column) for column in columns])
+        rows = int(np.count_nonzero(is_finite))
+        if rows < is_finite.size:
+            columns = [column[is_finite] for column in columns]
+        is_repeated = _of_all([column[1:] == column[:-1] for column in columns])
+        repeated = int(np.count_nonzero(is_repeated))
+        if rows - repeated < MINIMUM_SAMPLES:
             raise SettingsError(
-                f"{self.name}: {np.count_nonzero(is_new)} finite rows of "
+                f"{self.name}: {rows - repeated} finite rows of "
                 f"{is_finite.size}, at least {MINIMUM_SAMPLES} are needed.",
                 hint="Check that the file is complete.",
             )
-        for key, column in zip(_COLUMNS, finite[is_new].T, strict=True):
-            kept = np.ascontiguousarray(column)
+        is_new = np.concatenate([[True], ~is_repeated])
+        for key, column in zip(_COLUMNS, columns, strict=True):
+            kept = column[is_new] if repeated else np.array(column, order="C")
             kept.setflags(write=False)
             object.__setattr__(self, key, kept)
-        dropped = int(is_finite.size - np.count_nonzero(is_finite))
-        object.__setattr__(self, "dropped_rows", dropped)
-        repeated = int(is_new.size - np.count_nonzero(is_new))
+        object.__setattr__(self, "dropped_rows", is_finite.size - rows)
         object.__setattr__(self, "repeated_rows", repeated)
         _check_time(self.t, self.name)
 
@@ -116,6 +116,11 @@ class TractionSeries:
             F_t=F_t,
             stamped_lag=self.stamped_lag - lag,
         )
+
+
+def _of_all(claims: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Return where all four columns are so, shape (n,)."""
+    return np.logical_and.reduce(claims)
 
 
 def _check_name(terrain: str, name: str) -> None:

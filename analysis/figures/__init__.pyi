@@ -11,8 +11,8 @@ from . import (
     uncertainty,
 )
 from .pictures import Picture
-from .sections import ReportSection
-from .spec import PAGE_ORDER, FigureSpec
+from .sections import PAGE_ORDER, ReportSection
+from .spec import FigureSpec
 from .style import (
     MODEL_COLOURS,
     MODEL_HATCHES,

@@ -17,6 +17,7 @@ Pixels = np.ndarray[Any, np.dtype[np.uint8]]
 _COLOURS = 256  # of a palette
 _EXACT = 128  # of them that are kept as they are
 _MOST_WEIGHT = 64  # pixels of one shade that count
+_WHITE = 0xFFFFFF
 _LEVEL = 7  # of the compression: 9 takes five times as long for a tenth fewer bytes
 
 
@@ -47,17 +48,24 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
         pixels: red, green, blue and opacity, shape (rows, columns, 4).
         dpi: pixels per inch, for the file.
     """
-    packed = np.ascontiguousarray(pixels).view("<u4")[..., 0] & 0xFFFFFF
-    seen = np.zeros(1 << 24, dtype=np.bool_)
-    seen[packed] = True
+    packed = np.ascontiguousarray(pixels).view("<u4")[..., 0] & _WHITE
+    drawn = np.flatnonzero(packed != _WHITE)  # a tenth of a figure: the rest is paper
+    inks = packed.ravel()[drawn]
+    seen = np.zeros(_WHITE + 1, dtype=np.bool_)
+    seen[inks] = True
+    seen[_WHITE] = drawn.size < packed.size
     colours = np.flatnonzero(seen)
-    number = np.zeros(seen.size, dtype=np.int32)
+    number = np.empty(seen.size, dtype=np.int32)
     number[colours] = np.arange(colours.size)
-    numbers = number[packed]
+    numbers = number[inks]
+    counts = np.bincount(numbers, minlength=colours.size)
+    if seen[_WHITE]:  # the last: it is the largest number
+        counts[-1] = packed.size - drawn.size
     shades = np.column_stack([colours, colours >> 8, colours >> 16]).astype(np.uint8)
-    counts = np.bincount(numbers.ravel(), minlength=colours.size)
     palette, places = _palette(shades, counts)
-    image = Image.fromarray(places[numbers], "P")
+    indices = np.full(packed.shape, places[-1])
+    indices.ravel()[drawn] = places[numbers]
+    image = Image.fromarray(indices, "P")
     image.putpalette(palette.tobytes())
     png = io.BytesIO()
     image.save(png, "PNG", compress_level=_LEVEL, dpi=(dpi, dpi))

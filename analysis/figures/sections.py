@@ -1,4 +1,4 @@
-"""The sections of a page, in the order in which they stand."""
+"""The sections of a page and its figures, in the order in which they stand."""
 
 from enum import Enum
 
@@ -21,3 +21,32 @@ class ReportSection(Enum):
     def anchor(self) -> str:
         """Name of the section in links."""
         return self.name.lower()
+
+
+PAGE_ORDER = (
+    "fig2_tustin_model",
+    "fig4_excerpts",
+    "fig5_tustin",
+    "fig6_gp",
+    "fig7_gp_mean",
+    "fig8_gp_variance",
+    "fig9_errors",
+    "fig10_cross_bars",
+    "fig10_cross_map",
+    "new_trial",
+    "calibration",
+    "shares",
+    "noise",
+    "break_away",
+    "break_away_risk",
+    "confusion_terrains",
+    "confusion_stones",
+    "confusion_surface",
+    "coverage",
+    "trials",
+    "trends",
+    "residuals",
+    "stick_slip",
+    "timing",
+    "rig",
+)

@@ -29,32 +29,3 @@ class FigureSpec:
     caption: Callable[[StudyResults], str]
     section: ReportSection = ReportSection.BEYOND
     is_vector: bool = False
-
-
-PAGE_ORDER = (
-    "fig2_tustin_model",
-    "fig4_excerpts",
-    "fig5_tustin",
-    "fig6_gp",
-    "fig7_gp_mean",
-    "fig8_gp_variance",
-    "fig9_errors",
-    "fig10_cross_bars",
-    "fig10_cross_map",
-    "new_trial",
-    "calibration",
-    "shares",
-    "noise",
-    "break_away",
-    "break_away_risk",
-    "confusion_terrains",
-    "confusion_stones",
-    "confusion_surface",
-    "coverage",
-    "trials",
-    "trends",
-    "residuals",
-    "stick_slip",
-    "timing",
-    "rig",
-)

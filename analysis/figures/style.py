@@ -17,7 +17,6 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
@@ -189,6 +188,8 @@ def render(
         png = png_of_few_colours(np.asarray(canvas.buffer_rgba()), _DPI)
         figure.set_layout_engine("none")  # the layout is found; do not search again
         if with_pdf:
+            from matplotlib.backends.backend_pdf import FigureCanvasPdf
+
             FigureCanvasPdf(figure).print_pdf(pdf, metadata={"CreationDate": None})
         svg = _svg(key, figure) if is_vector else ""
     return Picture(key, png, pdf.getvalue(), round(_SHOWN * figure.get_figwidth()), svg)

@@ -6,7 +6,7 @@ from .engine import (
     RiskTable,
 )
 from .ground import GroundLaw, GroundModel, GroundRecogniser
-from .held_out import folds_of, foresee, hold_out, hold_out_models
+from .held_out import LearningTasks, folds_of, foresee, hold_out, learn
 from .judged import (
     JUDGED_TYPES,
     SLID,
@@ -20,8 +20,10 @@ from .judged import (
 from .logistic import RidgeLogistic, all_pairs, fit_logistic
 from .model import ForesightModel, Provenance, RigIdentity, SlipModel
 from .scores import (
+    GroundAnswers,
     GroundScore,
     SlipScore,
+    ground_answers,
     score_ground,
     score_slips,
 )
@@ -33,8 +35,10 @@ from .watching import (
     HORIZON,
     ROCKY_SURFACE,
     WatchedTrial,
+    WatchTask,
     watch,
     watch_all,
+    watch_file,
     watch_series,
 )
 from .whole_record import FootRecord
@@ -57,12 +61,14 @@ __all__ = [
     "ForesightModel",
     "ForesightRun",
     "ForesightState",
+    "GroundAnswers",
     "GroundLaw",
     "GroundModel",
     "GroundRecogniser",
     "GroundScore",
     "JudgedForesight",
     "JudgedTask",
+    "LearningTasks",
     "Provenance",
     "RidgeLogistic",
     "RigIdentity",
@@ -70,6 +76,7 @@ __all__ = [
     "Signals",
     "SlipModel",
     "SlipScore",
+    "WatchTask",
     "WatchedSource",
     "WatchedTrial",
     "all_pairs",
@@ -80,13 +87,15 @@ __all__ = [
     "folds_of",
     "foresee",
     "foresight_curves",
+    "ground_answers",
     "hold_out",
-    "hold_out_models",
     "judge",
+    "learn",
     "plan_judged",
     "score_ground",
     "score_slips",
     "watch",
     "watch_all",
+    "watch_file",
     "watch_series",
 ]

@@ -7,10 +7,9 @@ than 0.1 s missing, or a foot in the air for 0.2 s, the recognition of the groun
 
 from bisect import bisect_right
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import IntFlag
 from math import isfinite, nan
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -54,8 +53,7 @@ _BEYOND = int(ForesightFlag.BEYOND)
 _EXTRAPOLATED = int(ForesightFlag.EXTRAPOLATED)
 
 
-@dataclass(frozen=True, slots=True)
-class ForesightState:
+class ForesightState(NamedTuple):
     """What is to be expected, every 10 ms; NaN = not known.
 
     Attributes:

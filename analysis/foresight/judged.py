@@ -5,7 +5,7 @@ is known by digests of all that was read of the trials, never by their names alo
 """
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -20,7 +20,7 @@ from analysis.foresight.curves import (
 )
 from analysis.foresight.engine import ForesightFlag
 from analysis.foresight.ground import GroundLaw, GroundModel
-from analysis.foresight.held_out import foresee, hold_out_models
+from analysis.foresight.held_out import LearningTasks, Run, learn, run_here
 from analysis.foresight.logistic import RidgeLogistic
 from analysis.foresight.model import ForesightModel, Provenance, RigIdentity, SlipModel
 from analysis.foresight.scores import (
@@ -177,24 +177,25 @@ def plan_judged(
 def judge(
     watched: Sequence[WatchedTrial],
     break_away: Mapping[str, BreakAwayModel],
-    progress: Callable[[], object] = lambda: None,
+    run: Run = run_here,
 ) -> JudgedForesight:
     """Return what trials teach, each foreseen by models that have not seen it.
 
     Args:
         watched: the trials.
         break_away: models by terrain.
-        progress: called after every fold.
+        run: calls the function with every task, in any order and wherever it likes.
     """
-    model = fit_foresight(watched)
-    if model is None or len(watched) < LEAST_TRIALS:
-        return JudgedForesight(model)
-    folds = hold_out_models(watched, progress)
-    runs = [r for learnt, tested in folds for r in foresee(learnt, tested, break_away)]
+    if len(watched) < LEAST_TRIALS:
+        return JudgedForesight(fit_foresight(watched))
+    whole, *folds = run(learn, LearningTasks(watched, break_away))
+    if whole.model is None:
+        return JudgedForesight(None)
+    runs = [run for fold in folds for run in fold.runs]
     return JudgedForesight(
-        model=model,
-        slips=_slip_scores(runs) if model.slip is not None else {},
-        surface=score_ground([(learnt.ground, tested) for learnt, tested in folds]),
+        model=whole.model,
+        slips=_slip_scores(runs) if whole.model.slip is not None else {},
+        surface=score_ground([fold.answers for fold in folds]),
         grounds=_ground_rows(runs),
         curves=foresight_curves(runs),
     )

@@ -6,7 +6,9 @@ recall that the same alarms have when they are shifted in time (chance).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -134,26 +136,47 @@ def _chance(ticks: Sequence[TrialTicks], onsets: int) -> float:
     return hits / (onsets * (SHIFTS - 1)) if onsets else float("nan")
 
 
-def score_ground(
-    pairs: Sequence[tuple[GroundModel, Sequence[WatchedTrial]]],
-) -> GroundScore | None:
+@dataclass(slots=True)
+class GroundAnswers:
+    """What a model says of the surface of trials that it has not seen.
+
+    Attributes:
+        trials: number of trials on flat or rocky ground.
+        begun: whether the answer after each of `MOMENTS` was right, by trial.
+        anew: (probability of rocky ground, whether it is), of every second of sliding.
+        back: times to 95 % on the right surface after changes of ground [s].
+    """
+
+    trials: int = 0
+    begun: list[list[bool]] = field(default_factory=lambda: [[] for _ in MOMENTS])
+    anew: list[list[tuple[float, bool]]] = field(
+        default_factory=lambda: [[] for _ in MOMENTS]
+    )
+    back: list[float] = field(default_factory=list[float])
+
+
+def ground_answers(model: GroundModel, trials: Sequence[WatchedTrial]) -> GroundAnswers:
+    """Return what a model says of trials; nothing where it has one surface only."""
+    answers = GroundAnswers()
+    if model.surfaces:
+        known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
+        answers.trials = len(known)
+        for trial in known:
+            _judge_trial(model, trial, answers)
+        answers.back = _changes(model, known)
+    return answers
+
+
+def score_ground(answers: Sequence[GroundAnswers]) -> GroundScore | None:
     """Return how surfaces were told apart; None where no model has two of them.
 
     Args:
-        pairs: models, each with trials that it has not seen.
+        answers: of models to trials that they have not seen.
     """
-    begun: list[list[bool]] = [[] for _ in MOMENTS]
-    anew: list[list[tuple[float, bool]]] = [[] for _ in MOMENTS]
-    back: list[float] = []
-    count = 0
-    for model, trials in pairs:
-        if not model.surfaces:
-            continue
-        known = [t for t in trials if t.surface in (FLAT_SURFACE, ROCKY_SURFACE)]
-        count += len(known)
-        for trial in known:
-            _judge_trial(model, trial, begun, anew)
-        back += _changes(model, known)
+    count = sum(of.trials for of in answers)
+    begun = [list(chain(*of)) for of in zip(*(a.begun for a in answers), strict=True)]
+    anew = [list(chain(*of)) for of in zip(*(a.anew for a in answers), strict=True)]
+    back = [time for of in answers for time in of.back]
     if not count or not all(anew):
         return None
     p, is_rocky = (np.array(column) for column in zip(*anew[0], strict=True))
@@ -171,32 +194,42 @@ def score_ground(
 
 
 def _judge_trial(
-    model: GroundModel,
-    trial: WatchedTrial,
-    begun: list[list[bool]],
-    anew: list[list[tuple[float, bool]]],
+    model: GroundModel, trial: WatchedTrial, answers: GroundAnswers
 ) -> None:
     """Add the answers of a trial, from its beginning and begun anew every second."""
-    is_rocky, rows = trial.surface == ROCKY_SURFACE, trial.sliding
-    first = _first_run(trial.tick[rows].tolist())
+    is_rocky, slid = trial.surface == ROCKY_SURFACE, _slid(trial)
+    first = _first_run([tick.tick for tick in slid])
     recogniser = GroundRecogniser(model)
     asked = {first + moment: k for k, moment in enumerate(MOMENTS)}
-    for count, row in enumerate(rows, 1):
-        _feed(recogniser, trial, row)
+    for count, tick in enumerate(slid, 1):
+        recogniser.push(*tick)
         if count in asked and recogniser.rocky is not None:
-            begun[asked[count]].append((recogniser.rocky > 0.5) == is_rocky)
+            right = (recogniser.rocky > 0.5) == is_rocky
+            answers.begun[asked[count]].append(right)
     recogniser.reset()
-    for start in range(0, len(rows) - MOMENTS[-1], MOMENTS[-1]):
+    for start in range(0, len(slid) - MOMENTS[-1], MOMENTS[-1]):
         recogniser.forget()
-        for count, row in enumerate(rows[start : start + MOMENTS[-1]], 1):
-            _feed(recogniser, trial, row)
+        for count, tick in enumerate(slid[start : start + MOMENTS[-1]], 1):
+            recogniser.push(*tick)
             if count in MOMENTS and recogniser.rocky is not None:
-                anew[MOMENTS.index(count)].append((recogniser.rocky, is_rocky))
+                moment = MOMENTS.index(count)
+                answers.anew[moment].append((recogniser.rocky, is_rocky))
 
 
-def _feed(recogniser: GroundRecogniser, trial: WatchedTrial, row: int) -> None:
-    v, F_t, F_n = trial.motion[row].tolist()
-    recogniser.push(int(trial.tick[row]), v, F_t, F_n)
+class _SlidTick(NamedTuple):
+    """A tick of sliding, as `GroundRecogniser.push` takes it."""
+
+    tick: int
+    v: float
+    F_t: float
+    F_n: float
+
+
+def _slid(trial: WatchedTrial) -> list[_SlidTick]:
+    """Return the ticks in which the foot slides."""
+    rows = trial.sliding
+    pairs = zip(trial.tick[rows].tolist(), trial.motion[rows].tolist(), strict=True)
+    return [_SlidTick(tick, *motion) for tick, motion in pairs]
 
 
 def _first_run(ticks: Sequence[int]) -> int:
@@ -214,29 +247,34 @@ def _changes(model: GroundModel, trials: Sequence[WatchedTrial]) -> list[float]:
     if not flat or not rocky:
         return []
     times: list[float] = []
+    slid = [_slid(trial) for trial in trials]
     for k, before in enumerate(trials):
         others = rocky if before.surface == FLAT_SURFACE else flat
         after = others[k % len(others)]
-        least = _BEFORE + MOMENTS[-1]
-        if len(before.sliding) >= _BEFORE and len(after.sliding) >= least:
-            times.append(_time_back(model, before, after))
+        met = slid[trials.index(after)]
+        if len(slid[k]) >= _BEFORE and len(met) >= _BEFORE + MOMENTS[-1]:
+            ends = slid[k][:_BEFORE], met[_BEFORE : _BEFORE + _AFTER]
+            times.append(_time_back(model, *ends, after.surface))
     return times
 
 
-def _time_back(model: GroundModel, before: WatchedTrial, after: WatchedTrial) -> float:
+def _time_back(
+    model: GroundModel,
+    before: Sequence[_SlidTick],
+    after: Sequence[_SlidTick],
+    surface: str,
+) -> float:
+    """Return the time to 95 % on the surface that a foot slides onto [s]."""
     recogniser = GroundRecogniser(model)
-    for row in before.sliding[:_BEFORE]:
-        _feed(recogniser, before, row)
-    offset = int(before.tick[before.sliding[_BEFORE - 1]])
-    rows = after.sliding[_BEFORE : _BEFORE + _AFTER]
-    offset += 1 - int(after.tick[rows[0]])
-    for count, row in enumerate(rows, 1):
-        v, F_t, F_n = after.motion[row].tolist()
-        recogniser.push(int(after.tick[row]) + offset, v, F_t, F_n)
+    for tick in before:
+        recogniser.push(*tick)
+    offset = before[-1].tick + 1 - after[0].tick
+    for count, tick in enumerate(after, 1):
+        recogniser.push(tick.tick + offset, *tick[1:])
         rocky = recogniser.rocky
         if rocky is None:
             continue
-        right = rocky if after.surface == ROCKY_SURFACE else 1.0 - rocky
+        right = rocky if surface == ROCKY_SURFACE else 1.0 - rocky
         if right >= RIGHT:
             return count * 0.01
     return float("inf")

@@ -7,6 +7,7 @@ positive if a slip begins within the next 0.2 s.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +22,8 @@ from analysis.data import (
     TractionSeries,
     find_slips,
     groups_of,
-    prepare_trial,
+    load_trial,
+    smoothed,
 )
 from analysis.foresight.ground_window import FASTEST, SLOWEST, windows_of
 from analysis.foresight.model import RigIdentity
@@ -113,9 +115,31 @@ def watch(trial: RecordedTrial, surface: str) -> WatchedTrial:
         RigIdentity.of(metadata),
         metadata.get("seed", ""),
     )
-    smooth = prepare_trial(trial.series(), PrepareOptions()).smooth
+    smooth = smoothed(trial.series(), PrepareOptions())
     along = trial.frame.axes()[0].tolist()  # live values, not those computed anew
     return _watched(origin, FootRecord.of(trial.cycles, along), smooth)
+
+
+@dataclass(frozen=True, slots=True)
+class WatchTask:
+    """A trial on disk.
+
+    Attributes:
+        path: the file.
+        surface: "flat", "rocky" or a word of its own.
+    """
+
+    path: Path
+    surface: str
+
+
+def watch_file(task: WatchTask) -> WatchedTrial:
+    """Return a trial on disk with its features and its slips.
+
+    Raises:
+        TrialFileError: the file is not a sound trial.
+    """
+    return watch(load_trial(task.path), task.surface)
 
 
 def watch_series(
@@ -130,7 +154,7 @@ def watch_series(
         surface: "flat", "rocky" or a word of its own.
         rig: foot and rig that it is taken to be from.
     """
-    smooth = prepare_trial(series, PrepareOptions()).smooth
+    smooth = smoothed(series, PrepareOptions())
     start = float(series.t[0])
     numbers = np.arange(round((float(series.t[-1]) - start) / PERIOD) + 1)
     grid = start + numbers * PERIOD

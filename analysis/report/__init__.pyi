@@ -1,4 +1,4 @@
-from .drawing import DRAWN_TYPES, drawn_once
+from .drawing import DRAWN_TYPES
 from .foresight_page import foresight_figure
 from .friction_page import (
     FRICTION_HEADER,
@@ -23,7 +23,6 @@ __all__ = [
     "StanceGroup",
     "StudyVariant",
     "draw_stances",
-    "drawn_once",
     "foresight_figure",
     "friction_html",
     "friction_rows",

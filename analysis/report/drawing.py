@@ -5,114 +5,117 @@ be kept, too. They are known by a digest of all that they show and of the code t
 draws them: whatever is changed in the analysis, they are drawn anew.
 """
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
-from functools import lru_cache
+from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.figures import (
-    PAGE_ORDER,
-    FigureSpec,
-    Picture,
-    ReportSection,
-    break_away,
-    confusion,
-    curves,
-    errors,
-    excerpts,
-    render,
-    rig,
-    styled,
-    surfaces,
-    trials,
-    uncertainty,
-)
-from analysis.findings import StudyResults
-from analysis.report.page_model import ReportFigure
+from analysis.figures import PAGE_ORDER, Picture, ReportSection
+from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
+from analysis.report.page_model import ReportFigure, ShownNumbers
 from analysis.study import Store, Study, available_cores, run_tasks
 
+if TYPE_CHECKING:
+    from analysis.figures import FigureSpec
+
+_KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
-_MANY_TERRAINS = 4  # from which on they pay
+_EACH = 2  # batches of a process: figures take unlike times
+_MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 _PLAIN = (type(None), bool, int, float, str, bytes, Enum)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
 DRAWN_TYPES: Mapping[str, type] = {
     kind.__name__: kind for kind in (Picture, ReportFigure, ReportSection)
 }
-_FAMILIES = (
-    *(excerpts, curves, surfaces, errors, uncertainty),
-    *(break_away, confusion, trials, rig),
-)
-FIGURES: tuple[FigureSpec, ...] = tuple(
-    sorted(
-        (spec for family in _FAMILIES for spec in family.FIGURES),
-        key=lambda spec: PAGE_ORDER.index(spec.key),
-    )
-)
 
 
-def report_figures(
-    results: StudyResults, n_jobs: int = 1, *, with_pdf: bool = False
-) -> list[ReportFigure]:
+def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
-        results: what is shown.
+        shown: what they show.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
-        with_pdf: figures are wanted as PDF, too.
     """
-    batches = [FigureBatch(results, k, n_jobs, with_pdf) for k in range(n_jobs)]
+    count = n_jobs if n_jobs == 1 else _EACH * n_jobs
+    batches = [FigureBatch(shown, k, count) for k in range(count)]
     drawn: dict[str, ReportFigure] = {}
     for batch in run_tasks(draw_batch, batches, n_jobs):
         drawn |= {figure.picture.key: figure for figure in batch}
-    return [drawn[spec.key] for spec in FIGURES if spec.key in drawn]
+    return [drawn[key] for key in _KEYS if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
 class FigureBatch:
-    """The figures that one process draws.
+    """Figures that are drawn one after the other.
 
     Attributes:
-        results: what is shown.
+        shown: what they show.
         first: number of its first figure.
         step: from one of its figures to the next.
-        with_pdf: figures are wanted as PDF, too.
     """
 
-    results: StudyResults
+    shown: ShownNumbers
     first: int
     step: int
-    with_pdf: bool = False
 
 
 def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
     """Return the figures of a batch that there are numbers for."""
-    with styled():
-        figures = [_draw(spec, batch) for spec in FIGURES[batch.first :: batch.step]]
+    keys = _KEYS[batch.first :: batch.step]
+    figures = [_draw(key, batch.shown) for key in keys]
     return [figure for figure in figures if figure is not None]
 
 
-def _draw(spec: FigureSpec, batch: FigureBatch) -> ReportFigure | None:
-    results = batch.results
-    figure = spec.draw(results)
-    if figure is None:
-        return None
+def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:
+    from analysis.figures import render, styled
+
+    results, with_pdf = shown.results, shown.with_pdf
     is_simulated = results.study.simulated
-    picture = render(
-        spec.key,
-        figure,
-        is_simulated,
-        is_vector=spec.is_vector,
-        with_pdf=batch.with_pdf,
-    )
+    if key == FORESIGHT_KEY:
+        curves = shown.foresight
+        if curves is None:
+            return None
+        return foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
+    spec = figure_specs()[key]
+    with styled():
+        figure = spec.draw(results)
+        if figure is None:
+            return None
+        vector = {"is_vector": spec.is_vector, "with_pdf": with_pdf}
+        picture = render(key, figure, is_simulated, **vector)
     return ReportFigure(
         spec.section, spec.title, spec.alt, spec.caption(results), picture
     )
+
+
+@cache
+def figure_specs() -> Mapping[str, FigureSpec]:
+    """Return the figures of a study by their keys; whoever asks loads matplotlib."""
+    from analysis.figures import (
+        break_away,
+        confusion,
+        curves,
+        errors,
+        excerpts,
+        rig,
+        surfaces,
+        trials,
+        uncertainty,
+    )
+
+    families = (
+        *(excerpts, curves, surfaces, errors, uncertainty),
+        *(break_away, confusion, trials, rig),
+    )
+    return {spec.key: spec for family in families for spec in family.FIGURES}
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,23 +135,20 @@ class DrawingTask:
     with_pdf: bool
 
 
-def kept_figures(
-    results: StudyResults, store: Store | None = None, *, with_pdf: bool = False
-) -> list[ReportFigure]:
+def kept_figures(shown: ShownNumbers, store: Store | None = None) -> list[ReportFigure]:
     """Return every figure that there are numbers for, in the order of the page.
 
     Args:
-        results: what is shown.
+        shown: what they show.
         store: figures of earlier reports.
-        with_pdf: figures are wanted as PDF, too.
     """
-    study = results.study
+    study = shown.results.study
 
     def draw() -> list[ReportFigure]:
-        return report_figures(results, _processes(study), with_pdf=with_pdf)
+        return report_figures(shown, _processes(study))
 
     return drawn_once(
-        results, draw, store, is_simulated=study.simulated, with_pdf=with_pdf
+        shown, draw, store, is_simulated=study.simulated, with_pdf=shown.with_pdf
     )
 
 

@@ -1,20 +1,17 @@
 """The figure of foresight on the page of a study."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from analysis.figures import (
-    MODEL_COLOURS,
-    SPEED_LABEL,
-    Axes,
-    Figure,
-    ReportSection,
-    new_figure,
-    plain,
-    render,
-    styled,
-)
+from analysis.figures import ReportSection
 from analysis.foresight import HORIZON, ForesightCurves, ForesightExcerpt
 from analysis.report.page_model import ReportFigure
+
+if TYPE_CHECKING:  # a page that is not drawn anew needs no matplotlib
+    from analysis.figures import Axes, Figure
 
 FORESIGHT_KEY = "foresight"
 
@@ -33,6 +30,8 @@ def foresight_figure(
         is_simulated: the trials were.
         with_pdf: it is wanted as PDF, too.
     """
+    from analysis.figures import render, styled
+
     with styled():
         drawn = draw_foresight(curves)
         if drawn is None:
@@ -78,6 +77,8 @@ def draw_foresight(curves: ForesightCurves) -> Figure | None:
 
     Panels without numbers are left out; None where there is none.
     """
+    from analysis.figures import new_figure
+
     panels = [
         draw
         for draw, values in (
@@ -100,6 +101,8 @@ def draw_foresight(curves: ForesightCurves) -> Figure | None:
 
 
 def _draw_excerpt(ax: Axes, excerpt: ForesightExcerpt) -> None:
+    from analysis.figures import SPEED_LABEL, plain
+
     ax.plot(excerpt.t, excerpt.p, color=_RISK, lw=1.2, label="slip within 0.2 s")
     ax.axhline(excerpt.threshold, color=_RISK, lw=0.8, ls=":", label="alarm")
     for k, onset in enumerate(excerpt.onsets):
@@ -134,6 +137,8 @@ def _draw_reliability(ax: Axes, curves: ForesightCurves) -> None:
 
 
 def _draw_grounds(ax: Axes, curves: ForesightCurves) -> None:
+    from analysis.figures import MODEL_COLOURS, plain
+
     for k, (name, means) in enumerate(curves.grounds.items()):
         style = _STYLES[(k // len(MODEL_COLOURS) + k) % len(_STYLES)]
         colour = MODEL_COLOURS[k % len(MODEL_COLOURS)]

@@ -12,7 +12,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from analysis.figures import ReportSection
+from analysis.figures import PAGE_ORDER, ReportSection
 from analysis.findings import (
     StudyResults,
     compute_results,
@@ -20,7 +20,7 @@ from analysis.findings import (
     plain_findings,
 )
 from analysis.foresight import ForesightModel
-from analysis.report.drawing import FIGURES, kept_figures
+from analysis.report.drawing import kept_figures
 from analysis.report.foresight_page import FORESIGHT_KEY
 from analysis.report.further_tables import beyond_tables
 from analysis.report.page_model import (
@@ -28,6 +28,7 @@ from analysis.report.page_model import (
     ReportContext,
     ReportFigure,
     ReportTable,
+    ShownNumbers,
     cell_text,
     number_columns,
 )
@@ -74,8 +75,8 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     if context.foresight is not None:
         text = _database(study, results, context, context.foresight)
         write_atomic(out_dir / "terrains.json", text.encode())
-    drawn = kept_figures(results, context.store, with_pdf=context.with_pdf)
-    shown = [*drawn, *context.figures]
+    numbers = ShownNumbers(results, context.foresight_curves, context.with_pdf)
+    shown = [*kept_figures(numbers, context.store), *context.figures]
     _file_figures(out_dir / "figures", shown)
     page = out_dir / "report" / "index.html"
     write_atomic(page, render_page(results, shown, context).encode())
@@ -89,7 +90,7 @@ def _file_figures(folder: Path, shown: Sequence[ReportFigure]) -> None:
     for name, content in files.items():
         if content:
             write_atomic(folder / name, content)
-    for key in (*(spec.key for spec in FIGURES), FORESIGHT_KEY):
+    for key in (*PAGE_ORDER, FORESIGHT_KEY):
         for name in (f"{key}.png", f"{key}.pdf"):
             if not files.get(name):
                 (folder / name).unlink(missing_ok=True)

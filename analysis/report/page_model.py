@@ -7,8 +7,8 @@ from typing import Any
 
 from analysis.breakaway import BreakAwayModel
 from analysis.figures import Picture, ReportSection
-from analysis.findings import RigTrial
-from analysis.foresight import ForesightModel
+from analysis.findings import RigTrial, StudyResults
+from analysis.foresight import ForesightCurves, ForesightModel
 from analysis.study import Store
 
 
@@ -73,6 +73,21 @@ class ReportFigure:
 
 
 @dataclass(frozen=True, slots=True)
+class ShownNumbers:
+    """All that the figures of a report follow from.
+
+    Attributes:
+        results: of the study.
+        foresight: on held-out trials; None where nothing was foreseen.
+        with_pdf: figures are wanted as PDF, too.
+    """
+
+    results: StudyResults
+    foresight: ForesightCurves | None = None
+    with_pdf: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class BedPhoto:
     """A photo of the bed after a trial, small.
 
@@ -120,6 +135,7 @@ class ReportContext:
         rig: health of the rig by trial.
         further_numbers: further plain values for fits.json, by name.
         foresight: for a terrain database beside the report; None = none is written.
+        foresight_curves: what a figure shows of it on held-out trials; None = nothing.
         photos: of the bed after the trials.
         with_pdf: figures are filed as PDF, too.
         break_away: models of break-away by terrain; None = the report fits them.
@@ -137,6 +153,7 @@ class ReportContext:
     rig: Sequence[RigTrial] = field(default=())
     further_numbers: Mapping[str, Any] = field(default_factory=dict)
     foresight: ForesightModel | None = None
+    foresight_curves: ForesightCurves | None = None
     photos: Sequence[BedPhoto] = field(default=())
     with_pdf: bool = False
     break_away: Mapping[str, BreakAwayModel] | None = None

@@ -1,8 +1,16 @@
 from .all_ground import AllGroundModel, Dissipation, TerrainRows, fit_all_ground
-from .crossval import FoldResult, ModelFold, plan_folds, run_fold
+from .crossval import FoldResult, ModelFold, Prepared, plan_folds, run_fold
 from .distribution import SHARES, Distribution, NewTrialPrediction
 from .fits import CsvRow, flag_counts, to_csv, to_fits, to_plain, tustin_medians
-from .jobs import Store, Workers, available_cores, run_tasks
+from .jobs import (
+    Batch,
+    Store,
+    Workers,
+    available_cores,
+    run_batches,
+    run_tasks,
+    running_workers,
+)
 from .metrics import (
     PairedComparison,
     Prediction,
@@ -63,6 +71,7 @@ __all__ = [
     "TUSTIN",
     "TYPES",
     "AllGroundModel",
+    "Batch",
     "CsvRow",
     "Dissipation",
     "Distribution",
@@ -77,6 +86,7 @@ __all__ = [
     "PairedComparison",
     "PooledTustinFit",
     "Prediction",
+    "Prepared",
     "RelativesOutcome",
     "ResultStore",
     "Score",
@@ -99,10 +109,12 @@ __all__ = [
     "mean_of",
     "plan_folds",
     "plan_relatives",
+    "run_batches",
     "run_fold",
     "run_relatives",
     "run_study",
     "run_tasks",
+    "running_workers",
     "smallest_adjusted",
     "standard_error",
     "to_csv",

@@ -37,8 +37,8 @@ class Workers:
     """Where tasks run; never what they return.
 
     Attributes:
-        n_jobs: number of processes; by default one per core, and none beside this one
-            for three tasks or fewer.
+        n_jobs: number of processes; by default one per core, and for three tasks or
+            fewer those that are running.
         scheduler: address of a Dask scheduler, on this machine or by TLS, e.g.
             "tcp://127.0.0.1:8786"; None for processes of this one. Its workers need the
             same version of this project.
@@ -50,7 +50,7 @@ class Workers:
     def count(self, tasks: int) -> int:
         """Return the number of local processes for so many tasks."""
         if self.n_jobs is None and tasks <= _FEW:
-            return 1
+            return min(running_workers(), tasks)
         return min(available_cores() if self.n_jobs is None else self.n_jobs, tasks)
 
 
@@ -65,6 +65,22 @@ class SharedTasks(Protocol):
     def outline(self, index: int) -> object:
         """Return what tells one task from every other, without its data."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """Tasks of one kind.
+
+    Attributes:
+        function: pure, importable by name, called with one task.
+        tasks: what to do.
+    """
+
+    function: Callable[[Any], Any]
+    tasks: Sequence[Any]
+
+
+Place = tuple[int, int]  # of a task: number of its batch, and in it
 
 
 class Store(Protocol):
@@ -82,6 +98,17 @@ class Store(Protocol):
 def available_cores() -> int:
     """Return the number of cores this process may use."""
     return max(1, len(os.sched_getaffinity(0)))
+
+
+_started = [1]  # numbers of local processes that tasks were given to, and this one
+
+
+def running_workers() -> int:
+    """Return how many processes earlier tasks have started; 1 where there are none.
+
+    Tasks that take less time than starting them are worth giving to these only.
+    """
+    return min(max(_started), available_cores())
 
 
 def run_tasks(
@@ -107,19 +134,42 @@ def run_tasks(
     Raises:
         SettingsError: the scheduler does not answer, or is reached without TLS.
     """
+    (results,) = run_batches([Batch(function, tasks)], workers, progress, store)
+    return results
+
+
+def run_batches(
+    batches: Sequence[Batch],
+    workers: Workers | int | None = None,
+    progress: Progress | None = None,
+    store: Store | None = None,
+) -> list[list[Any]]:
+    """Return the results of every batch, as of `run_tasks`.
+
+    No core waits between one batch and the next. Progress counts all of them.
+
+    Raises:
+        SettingsError: the scheduler does not answer, or is reached without TLS.
+    """
     keep_memory()  # what is fitted here, beside the tasks, is quicker for it, too
     where = workers if isinstance(workers, Workers) else Workers(workers)
-    results = {} if store is None else _stored(store, tasks)
-    left = [k for k in range(len(tasks)) if k not in results]
+    places = [
+        (k, n) for k, batch in enumerate(batches) for n in range(len(batch.tasks))
+    ]
+    results = {} if store is None else _stored(store, batches, places)
+    left = [place for place in places if place not in results]
     if progress is not None and results:
-        progress(len(results), len(tasks))
-    for k, result in _stream(function, tasks, left, where):
-        results[k] = result
+        progress(len(results), len(places))
+    for (k, n), result in _stream(batches, left, where):
+        results[k, n] = result
         if store is not None:
-            store.put(_key(tasks, k), result)
+            store.put(_key(batches[k].tasks, n), result)
         if progress is not None:
-            progress(len(results), len(tasks))
-    return [results[k] for k in range(len(tasks))]
+            progress(len(results), len(places))
+    return [
+        [results[k, n] for n in range(len(batch.tasks))]
+        for k, batch in enumerate(batches)
+    ]
 
 
 def _key(tasks: Sequence[Any], number: int) -> object:
@@ -127,34 +177,37 @@ def _key(tasks: Sequence[Any], number: int) -> object:
     return tasks.outline(number) if isinstance(tasks, SharedTasks) else tasks[number]
 
 
-def _stored(store: Store, tasks: Sequence[Any]) -> dict[int, Any]:
-    results = ((k, store.get(_key(tasks, k))) for k in range(len(tasks)))
-    return {k: result for k, result in results if result is not None}
+def _stored(
+    store: Store, batches: Sequence[Batch], places: Sequence[Place]
+) -> dict[Place, Any]:
+    results = (((k, n), store.get(_key(batches[k].tasks, n))) for k, n in places)
+    return {place: result for place, result in results if result is not None}
 
 
 def _stream(
-    function: Callable[[Task], Result],
-    tasks: Sequence[Task],
-    left: Sequence[int],
-    where: Workers,
-) -> Iterator[tuple[int, Result]]:
-    """Yield (number, result) of every task left as it is done, in any order."""
+    batches: Sequence[Batch], left: Sequence[Place], where: Workers
+) -> Iterator[tuple[Place, Any]]:
+    """Yield (place, result) of every task left as it is done, in any order."""
     count = where.count(len(left))
     if not left:
         return
-    shared: list[Any] = [tasks] if isinstance(tasks, SharedTasks) else []
+    every = [batch.tasks for batch in batches]
+    shared: list[Any] = [tasks for tasks in every if isinstance(tasks, SharedTasks)]
     calls: Iterable[Any] = (
-        delayed(_numbered)(function, k, tasks)
-        if shared
-        else delayed(_one_threaded)(function, k, tasks[k])
-        for k in left
+        delayed(_numbered)(batches[k].function, (k, n), every[k])
+        if isinstance(every[k], SharedTasks)
+        else delayed(_one_threaded)(batches[k].function, (k, n), every[k][n])
+        for k, n in left
     )
     if where.scheduler is not None:
         with _cluster(where.scheduler, shared):
             yield from _parallel(calls)
     elif count <= 1:
-        yield from (_one_threaded(function, k, tasks[k]) for k in left)
+        yield from (
+            _one_threaded(batches[k].function, (k, n), every[k][n]) for k, n in left
+        )
     else:
+        _started.append(count)
         with parallel_config(
             "loky", n_jobs=count, inner_max_num_threads=1, max_nbytes=_MAPPED
         ):
@@ -162,9 +215,9 @@ def _stream(
 
 
 def _numbered(
-    function: Callable[[Task], Result], number: int, tasks: Sequence[Task]
-) -> tuple[int, Result]:
-    return _one_threaded(function, number, tasks[number])
+    function: Callable[[Any], Any], place: Place, tasks: Sequence[Any]
+) -> tuple[Place, Any]:
+    return _one_threaded(function, place, tasks[place[1]])
 
 
 def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
@@ -173,15 +226,17 @@ def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
 
 
 def _one_threaded(
-    function: Callable[[Task], Result], number: int, task: Task
-) -> tuple[int, Result]:
+    function: Callable[[Any], Any],
+    place: Place,
+    task: Any,  # noqa: ANN401
+) -> tuple[Place, Any]:
     # A library is limited only once it is loaded: SciPy brings one of its own.
     import scipy.linalg  # noqa: F401
     from threadpoolctl import threadpool_limits
 
     keep_memory()
     with threadpool_limits(1):
-        return number, function(task)
+        return place, function(task)
 
 
 @cache

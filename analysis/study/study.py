@@ -1,8 +1,7 @@
 """A study: all terrains prepared, folded, fitted and compared."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 
 import numpy as np
 
@@ -21,8 +20,8 @@ from analysis.data import (
     summed_up,
     terrain_kind,
 )
-from analysis.study.crossval import plan_folds, run_fold
-from analysis.study.jobs import Progress, Store, Workers, run_tasks
+from analysis.study.crossval import FoldResult, Prepared, plan_folds, run_fold
+from analysis.study.jobs import Batch, Progress, Store, Workers, run_batches
 from analysis.study.metrics import standard_error
 from analysis.study.models import NEW_TRIAL, FitOptions
 from analysis.study.relatives import (
@@ -31,10 +30,17 @@ from analysis.study.relatives import (
     plan_relatives,
     run_relatives,
 )
-from analysis.study.terrain_fit import TerrainResult, TerrainTask, fit_terrain, mean_of
+from analysis.study.terrain_fit import (
+    PooledTustinFit,
+    TerrainResult,
+    TerrainTask,
+    fit_terrain,
+    mean_of,
+)
 from analysis.study.trial_components import (
     ComponentsTask,
     TimedRows,
+    TrialComponents,
     fit_components,
 )
 
@@ -121,6 +127,7 @@ def run_study(
     simulated: bool,
     progress: Progress | None = None,
     store: Store | None = None,
+    beside: Callable[[Prepared], Sequence[Batch]] = lambda _: (),
 ) -> Study:
     """Return the analysis of all trials.
 
@@ -130,6 +137,8 @@ def run_study(
         simulated: the trials were simulated; marks every product.
         progress: called with (fits done, fits in all).
         store: results of earlier runs, so that an interrupted study resumes.
+        beside: gives tasks of the prepared trials that are done with the fits; what
+            comes of them is in the store.
 
     Raises:
         SettingsError: there is no trial at all.
@@ -138,32 +147,46 @@ def run_study(
     prepared = _prepared(trials, options.prepare)
     targets = _prepared(trials, options.target) if options.target else prepared
     tasks, notes = plan_folds(prepared, options.fit, targets)
-    workers = Workers(options.n_jobs, options.scheduler)
-    whole_tasks, apart = _wholes(prepared, options), _apart(prepared, options.fit)
-    akin = plan_relatives(prepared, grounds_of(trials), options.fit)
-    parts = _in_turn(progress, [len(of) for of in (tasks, whole_tasks, apart, akin)])
-    first, second, third, fourth = parts
-    folds = run_tasks(run_fold, tasks, workers, first, store)
-    wholes = run_tasks(fit_terrain, whole_tasks, workers, second, store)
-    fitted = run_tasks(fit_components, apart, workers, third, store)
-    outcomes = run_tasks(run_relatives, akin, workers, fourth, store)
+    apart = _apart(prepared, options.fit)
+    batches = [
+        *beside(prepared),  # first: they are longer than a fit
+        Batch(run_fold, tasks),
+        Batch(run_relatives, plan_relatives(prepared, grounds_of(trials), options.fit)),
+        Batch(fit_components, apart),
+        Batch(fit_terrain, _wholes(prepared, options)),
+    ]
+    *_, folds, outcomes, fitted, wholes = run_batches(
+        batches, Workers(options.n_jobs, options.scheduler), progress, store
+    )
     components = {task.terrain: of for task, of in zip(apart, fitted, strict=True)}
     notes += [note for fold in folds for note in fold.notes]
     results = {
-        terrain: TerrainResult(
-            terrain=terrain,
-            kind=terrain_kind(terrain, [series.stones for series in trials[terrain]]),
-            trials=kept,
-            slips=tuple(find_slips(trial.smooth) for trial in kept),
-            folds=tuple(fold for fold in folds if fold.terrain == terrain),
-            whole=whole,
-            components=components.get(terrain),
-        )
-        for (terrain, kept), whole in zip(prepared.items(), wholes, strict=True)
+        name: _result(trials[name], prepared[name], folds, whole, components.get(name))
+        for name, whole in zip(prepared, wholes, strict=True)
     }
     warnings = (*_contradictions(trials), *_all_warnings(results, options))
     relatives = {of.terrain: of for of in outcomes if of is not None}
     return Study(simulated, options, results, tuple(notes), warnings, relatives)
+
+
+def _result(
+    recorded: Sequence[TractionSeries],
+    kept: tuple[PreparedTrial, ...],
+    folds: Sequence[FoldResult],
+    whole: PooledTustinFit,
+    components: TrialComponents | None,
+) -> TerrainResult:
+    """Return the result of one terrain; of the folds those that are its own."""
+    terrain = whole.terrain
+    return TerrainResult(
+        terrain=terrain,
+        kind=terrain_kind(terrain, [series.stones for series in recorded]),
+        trials=kept,
+        slips=tuple(find_slips(trial.smooth) for trial in kept),
+        folds=tuple(fold for fold in folds if fold.terrain == terrain),
+        whole=whole,
+        components=components,
+    )
 
 
 def _require_trials(trials: Mapping[str, Sequence[TractionSeries]]) -> None:
@@ -181,20 +204,6 @@ def _prepared(
             terrain: tuple(prepare_trial(series, options) for series in recorded)
             for terrain, recorded in trials.items()
         }
-
-
-def _in_turn(
-    progress: Progress | None, counts: Sequence[int]
-) -> Sequence[Progress | None]:
-    """Return one progress as that of several runs of tasks, one after the other."""
-    if progress is None:
-        return [None] * len(counts)
-    total, tell = sum(counts), progress
-
-    def from_(start: int) -> Progress:
-        return lambda done, _: tell(start + done, total)
-
-    return [from_(start) for start in [0, *accumulate(counts)][:-1]]
 
 
 def _apart(

@@ -1,6 +1,6 @@
 from .database import load, to_text
 from .evidence import Exclusion
-from .export import break_away_of, database_of
+from .export import break_away_batch, break_away_of, database_of
 from .identify import KEPT_PER_SECOND, Confusion, Identification, identify_study
 from .known import KnownTerrain, TerrainDatabase
 from .parts import foresight_in
@@ -19,6 +19,7 @@ __all__ = [
     "TractionEstimate",
     "TractionEstimates",
     "WindowEvidence",
+    "break_away_batch",
     "break_away_of",
     "database_of",
     "foresight_in",

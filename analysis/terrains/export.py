@@ -21,11 +21,13 @@ from analysis.study import (
     GP_SE_TRIAL,
     SHARES,
     TITLES,
+    Batch,
     FitOptions,
     ModelFitter,
     Store,
     Study,
     Workers,
+    run_batches,
     run_tasks,
 )
 from analysis.terrains.database import to_text
@@ -159,10 +161,23 @@ def break_away_of(
         store: results of earlier runs.
     """
     trials = {name: result.trials for name, result in study.terrains.items()}
-    options = BreakAwayOptions(seed=study.options.fit.seed)
-    task = plan_break_away(trials, study.kinds, options)
-    (models,) = run_tasks(fit_planned, [task], store=store)
+    batch = break_away_batch(trials, study.kinds, study.options.fit.seed)
+    ((models,),) = run_batches([batch], store=store)
     return models
+
+
+def break_away_batch(
+    trials: Mapping[str, Sequence[PreparedTrial]], kinds: Mapping[str, str], seed: int
+) -> Batch:
+    """Return the one task whose result is that of `break_away_of`.
+
+    Args:
+        trials: prepared trials by terrain.
+        kinds: kind by terrain.
+        seed: of the study.
+    """
+    task = plan_break_away(trials, kinds, BreakAwayOptions(seed=seed))
+    return Batch(fit_planned, [task])
 
 
 def _parts(

@@ -12,7 +12,13 @@ from typing import Any
 import numpy as np
 
 from analysis.data import LEVELS, PreparedTrial, groups_of
-from analysis.study import GP_SE, Study, TerrainResult, run_tasks
+from analysis.study import (
+    GP_SE,
+    Study,
+    TerrainResult,
+    run_tasks,
+    running_workers,
+)
 from analysis.terrains.classifier import (
     ROCKY_GROUND,
     SurfaceClassifier,
@@ -268,7 +274,9 @@ def _evidence(study: Study, model: str, rho: Mapping[str, float]) -> StudyEviden
     ]
     scored: dict[str, list[TrialEvidence]] = {}
     scores = sum(len(task.experts) for task in tasks)
-    workers = study.options.n_jobs if scores > _SCORES_HERE else 1
+    workers = study.options.n_jobs
+    if workers is None and scores <= _SCORES_HERE:
+        workers = running_workers()
     done = run_tasks(run_score, tasks, workers)
     for task, evidence in zip(tasks, done, strict=True):
         scored.setdefault(task.trial.terrain, []).append(evidence)

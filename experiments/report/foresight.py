@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,8 @@ import numpy as np
 from acquisition import FORESIGHT, Record, SettingsError
 from acquisition.trial_file import TrialReader
 from analysis.breakaway import BreakAwayModel
-from analysis.data import load_trial
-from analysis.findings import HeldTrial, TrialFiles
+from analysis.data import groups_of, load_trial
+from analysis.findings import HeldTrial
 from analysis.foresight import (
     ForesightCurves,
     ForesightModel,
@@ -19,17 +20,13 @@ from analysis.foresight import (
     JudgedTask,
     RigIdentity,
     WatchedTrial,
+    WatchTask,
     judge,
     plan_judged,
-    watch_all,
+    watch_file,
 )
-from analysis.report import (
-    ReportFigure,
-    ReportTable,
-    drawn_once,
-    foresight_figure,
-)
-from analysis.study import Store, Study
+from analysis.report import ReportTable
+from analysis.study import Store, Study, run_tasks
 from experiments.report.tables import foresight_tables
 from experiments.rig import ForesightSource, state_record, states_of
 
@@ -44,13 +41,13 @@ class StudyForesight:
         model: learnt from all trials; None where they are too few.
         tables: what it is worth.
         numbers: the same as plain values.
-        figures: what a page shows of it.
+        curves: what a figure shows of it; None where there were too few trials.
     """
 
     model: ForesightModel | None
     tables: tuple[ReportTable, ...]
     numbers: Mapping[str, Any]
-    figures: tuple[ReportFigure, ...] = ()
+    curves: ForesightCurves | None = None
 
 
 def study_foresight(
@@ -58,8 +55,6 @@ def study_foresight(
     trials: Mapping[str, Sequence[HeldTrial]],
     break_away: Mapping[str, BreakAwayModel],
     store: Store | None = None,
-    *,
-    with_pdf: bool = False,
 ) -> StudyForesight:
     """Return what the trials of a study teach, and what that is worth on others.
 
@@ -68,11 +63,11 @@ def study_foresight(
         trials: of the study, by terrain; read anew where nothing is kept.
         break_away: models by terrain.
         store: outcomes of earlier reports.
-        with_pdf: figures are wanted as PDF, too.
     """
     task = plan_judged(trials, study.kinds, break_away)
-    files = {name: TrialFiles(of) for name, of in trials.items()}
-    judged = judged_foresight(task, lambda: watch_all(files, study.kinds), store)
+    judged = judged_foresight(
+        task, lambda: watched_trials(study, trials), store, study.options.n_jobs
+    )
     if judged.curves is None:
         return StudyForesight(judged.model, (), {})
     surface = judged.surface
@@ -82,27 +77,27 @@ def study_foresight(
         "terrain_after_sliding": judged.grounds,
     }
     tables = foresight_tables(judged.slips, judged.grounds, surface)
-    figures = _figures(judged.curves, store, study.simulated, with_pdf=with_pdf)
-    return StudyForesight(judged.model, tables, numbers, figures)
+    return StudyForesight(judged.model, tables, numbers, judged.curves)
 
 
-def _figures(
-    curves: ForesightCurves, store: Store | None, is_simulated: bool, *, with_pdf: bool
-) -> tuple[ReportFigure, ...]:
-    """Return the figure of foresight, none without numbers for it."""
+def watched_trials(
+    study: Study, trials: Mapping[str, Sequence[HeldTrial]]
+) -> list[WatchedTrial]:
+    """Return the trials of a study, read anew and watched.
 
-    def draw() -> list[ReportFigure]:
-        figure = foresight_figure(curves, is_simulated=is_simulated, with_pdf=with_pdf)
-        return [] if figure is None else [figure]
-
-    drawn = drawn_once(
-        curves, draw, store, is_simulated=is_simulated, with_pdf=with_pdf
-    )
-    return tuple(drawn)
+    Raises:
+        TrialFileError: a file is not a sound trial any more.
+    """
+    surface = groups_of(study.kinds)["surface"]
+    tasks = [WatchTask(t.path, surface[n]) for n, of in trials.items() for t in of]
+    return run_tasks(watch_file, tasks, study.options.n_jobs)
 
 
 def judged_foresight(
-    task: JudgedTask, watched: Callable[[], Sequence[WatchedTrial]], store: Store | None
+    task: JudgedTask,
+    watched: Callable[[], Sequence[WatchedTrial]],
+    store: Store | None,
+    n_jobs: int | None = 1,
 ) -> JudgedForesight:
     """Return what trials teach and what that is worth; from the store where it is kept.
 
@@ -110,11 +105,12 @@ def judged_foresight(
         task: what it follows from.
         watched: gives its trials, watched; called only where nothing is kept.
         store: outcomes of earlier reports.
+        n_jobs: processes; one per core where it is None.
     """
     kept = None if store is None else store.get(task)
     if isinstance(kept, JudgedForesight):
         return kept
-    outcome = judge(watched(), task.break_away)
+    outcome = judge(watched(), task.break_away, partial(run_tasks, workers=n_jobs))
     if store is not None:
         store.put(task, outcome)
     return outcome

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
-from analysis.data import load_trial, summed_up
+from analysis.data import load_trial, summed_up, terrain_kind
 from analysis.findings import HeldTrial, TrialFiles, with_tares
-from analysis.foresight import JUDGED_TYPES, fit_foresight, watch_all
+from analysis.foresight import JUDGED_TYPES, fit_foresight
 from analysis.report import (
     DRAWN_TYPES,
     BedPhoto,
@@ -23,16 +23,27 @@ from analysis.study import (
     GP_SE_NOISE,
     GP_SE_TRIAL,
     TYPES,
+    Batch,
     FitOptions,
+    Prepared,
     ResultStore,
     Study,
     StudyOptions,
     run_study,
 )
-from analysis.terrains import break_away_of, database_of, identify_study
+from analysis.terrains import (
+    break_away_batch,
+    break_away_of,
+    database_of,
+    identify_study,
+)
 from experiments.operator import Console
 from experiments.report.choices import AnalysisChoices, repeat_study
-from experiments.report.foresight import StudyForesight, study_foresight
+from experiments.report.foresight import (
+    StudyForesight,
+    study_foresight,
+    watched_trials,
+)
 from experiments.report.progress import fitting
 from experiments.report.tables import report_tables, summary_table
 from experiments.report.truth_errors import (
@@ -163,8 +174,14 @@ def study_sessions(
         scheduler=order.scheduler,
     )
     series = {name: [t.series for t in group] for name, group in trials.items()}
+    kinds = {n: terrain_kind(n, [t.stones for t in of]) for n, of in series.items()}
+    store = results_below(data)
+
+    def beside(prepared: Prepared) -> list[Batch]:
+        return [break_away_batch(prepared, kinds, fit.seed)]
+
     with fitting(console) as progress:
-        study = run_study(series, options, is_simulated, progress, results_below(data))
+        study = run_study(series, options, is_simulated, progress, store, beside)
     return StudySession(study, trials, problems, truths)
 
 
@@ -208,7 +225,7 @@ def export_terrains(
         identify_study(study),
         iso_utc(SystemClock().utc_ns()),
         store=results_below(data),
-        foresight=fit_foresight(watch_all(analysed.files, study.kinds)),
+        foresight=fit_foresight(watched_trials(study, analysed.trials)),
     )
     write_new_text(out, text)
     console.say(f"{len(study.terrains)} terrains: {out}")
@@ -235,9 +252,7 @@ def report_sessions(
     break_away = break_away_of(study, store)
     variants = order.choices.variants
     others = repeat_study(study, analysed.files, variants, console, store)
-    foresight = study_foresight(
-        study, trials, break_away, store, with_pdf=order.with_pdf
-    )
+    foresight = study_foresight(study, trials, break_away, store)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = _context(sessions, order, analysed, foresight, others)
     context = replace(context, break_away=break_away, store=store)
@@ -269,7 +284,6 @@ def _context(
             *foresight.tables,
             *report_tables(sessions, trials),
         ],
-        figures=foresight.figures,
         further_numbers={
             "what_if": [plain_choice(c, study, other) for c, other in others],
             "foresight": foresight.numbers,
@@ -278,5 +292,6 @@ def _context(
         photos=[BedPhoto(*photo) for photo in photos],
         rig=with_tares([trial.health for trial in every], every),
         foresight=foresight.model if len(sessions) > 1 else None,
+        foresight_curves=foresight.curves,
         with_pdf=order.with_pdf,
     )

@@ -207,23 +207,22 @@ class ArmModel:
 
         All rows at once, joint by joint: the same as `sole_pose` of each to 1e-14.
         """
-        x, y, z = (np.repeat(axis[:, None], len(q), axis=1) for axis in np.eye(3))
-        position = np.zeros((3, len(q)))
-        sines, cosines = (np.ascontiguousarray(f(q.T)) for f in (np.sin, np.cos))
+        across = np.ascontiguousarray(q.T)
+        sines, cosines = np.sin(across), np.cos(across)
+        axes = np.repeat(np.eye(3)[:, :, None], len(q), axis=2)
+        x, y, z = axes
+        position = np.zeros_like(x)
         for joint in range(7):
-            s, c = sines[joint], cosines[joint]
-            x, y = c * x + s * y, c * y - s * x
+            _turn(x, y, cosines[joint], sines[joint])
             part = _constant_part(self.constants, joint)
             a, _, d = part.translation
-            position += a * x + d * z
-            c, s = part.rotation[1, 1], part.rotation[2, 1]
-            y, z = c * y + s * z, c * z - s * y
+            if a or d:
+                position += a * x + d * z
+            _turn(y, z, part.rotation[1, 1], part.rotation[2, 1])
         sole = self.tool.sole if self.tool else np.zeros(3)
         position += sole[0] * x + sole[1] * y + sole[2] * z
-        rotation = np.empty((len(q), 3, 3))
-        for column, axis in enumerate((x, y, z)):
-            rotation[:, :, column] = axis.T
-        return FootPath(np.ascontiguousarray(position.T), rotation)
+        columns = np.ascontiguousarray(axes.transpose(2, 1, 0))
+        return FootPath(np.ascontiguousarray(position.T), columns)
 
     def _pose(self, q: Array, frame: int) -> tuple[Array, Array]:
         pin.forwardKinematics(self._model, self._data, q)
@@ -232,3 +231,12 @@ class ArmModel:
 
     def _jacobian(self, q: Array, frame: int) -> Array:
         return pin.computeFrameJacobian(self._model, self._data, q, frame, _AXES).copy()
+
+
+def _turn(u: Array, v: Array, c: Array, s: Array) -> None:
+    """Turn the axes u toward v in place: c u + s v and c v - s u, shapes (3, n)."""
+    to_u, from_v = s * v, s * u
+    u *= c
+    u += to_u
+    v *= c
+    v -= from_v

@@ -57,3 +57,9 @@ def test_a_palette_holds_256_colours_and_the_resolution_is_stated():
     assert picture.mode == "P"
     assert len(picture.getcolors()) <= 256
     assert picture.info["dpi"] == pytest.approx((320, 320), abs=0.1)
+
+
+def test_a_picture_without_white_is_as_exact():
+    page = np.zeros((50, 60, 3), dtype=np.uint8)
+    page[10:20] = (213, 94, 0)
+    np.testing.assert_array_equal(read(png_of_few_colours(opaque(page), 320)), page)

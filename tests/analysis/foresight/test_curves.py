@@ -81,8 +81,7 @@ def test_trials_of_an_unknown_rig_say_nothing(runs):
         replace(
             run,
             states=tuple(
-                replace(
-                    state,
+                state._replace(
                     flags=int(ForesightFlag.OTHER_RIG),
                     slip_probability=np.nan,
                     terrains=(np.nan,) * len(state.terrains),

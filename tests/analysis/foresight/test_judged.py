@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from analysis.foresight.judged import (
     judge,
     source_of,
 )
+from analysis.study.jobs import run_tasks
 from analysis.study.store import encode, task_key
 from tests.analysis.foresight.databases import BREAKS
 from tests.analysis.foresight.made import OTHER_RIG, RIG, STONES, judged_task, trials
@@ -27,6 +29,11 @@ def test_an_outcome_has_scores_curves_and_what_was_learnt(outcome):
     assert outcome.model is not None
     assert set(outcome.slips) == {STONES, "TF"}
     assert outcome.curves.excerpt is not None
+
+
+def test_an_outcome_is_the_same_bit_for_bit_in_two_workers(outcome):
+    run = partial(run_tasks, workers=2)
+    assert encode(judge(WATCHED, {STONES: BREAKS}, run)) == encode(outcome)
 
 
 def test_few_trials_teach_and_are_not_judged():

@@ -6,7 +6,7 @@ import pytest
 from analysis.foresight.calibration import calibration_error
 from analysis.foresight.engine import ForesightFlag, ForesightState
 from analysis.foresight.held_out import folds_of, hold_out
-from analysis.foresight.scores import score_ground, score_slips
+from analysis.foresight.scores import ground_answers, score_ground, score_slips
 from analysis.foresight.ticks import ForesightRun
 from tests.analysis.foresight.made import STONES, model, trial, trials
 
@@ -93,7 +93,7 @@ def test_held_out_pushes_are_foreseen_too():
 
 
 def test_stones_and_plates_are_told_apart_and_changes_seen():
-    score = score_ground([(model().ground, trials(80, 3))])
+    score = score_ground([ground_answers(model().ground, trials(80, 3))])
     assert min(score.accuracy) == 1.0
     assert min(score.anywhere) > 0.97
     assert score.back <= 1.0  # s of sliding
@@ -101,4 +101,4 @@ def test_stones_and_plates_are_told_apart_and_changes_seen():
 
 def test_one_surface_cannot_be_told_apart():
     one = replace(model().ground, surfaces=())
-    assert score_ground([(one, trials(80, 1))]) is None
+    assert score_ground([ground_answers(one, trials(80, 1))]) is None

@@ -5,14 +5,18 @@ import pytest
 
 from analysis.figures.pictures import Picture
 from analysis.figures.sections import ReportSection
+from analysis.findings.findings import compute_results
 from analysis.report import drawing
 from analysis.report.drawing import (
     DRAWN_TYPES,
+    FigureBatch,
     code_digest,
+    draw_batch,
     drawn_once,
     shown_digest,
 )
-from analysis.report.page_model import ReportFigure
+from analysis.report.page_model import ReportFigure, ShownNumbers
+from analysis.study.jobs import run_tasks
 from analysis.study.store import TYPES, ResultStore
 
 PICTURE = Picture("rig", b"\x89PNG\x00\xff", b"%PDF", 1146, "<svg></svg>")
@@ -143,3 +147,12 @@ def test_what_is_no_figure_is_drawn_anew(store):
 def test_a_number_shows_the_same_when_the_store_gives_it_back(value):
     assert shown_digest([value]) == shown_digest([value.item()])
     assert shown_digest([value]) != shown_digest([value.item() + 1])
+
+
+@pytest.mark.slow
+def test_pictures_are_the_same_from_two_processes(small_study):
+    shown = ShownNumbers(compute_results(small_study))
+    batches = [FigureBatch(shown, first, 9) for first in range(4)]
+    here = [draw_batch(batch) for batch in batches]
+    assert all(here)
+    assert run_tasks(draw_batch, batches, 2) == here

@@ -1,10 +1,10 @@
 import pytest
 
-from analysis.figures.sections import ReportSection
+from analysis.figures.sections import PAGE_ORDER, ReportSection
 from analysis.figures.style import styled
 from analysis.figures.surfaces import distinct_labels, round_ticks
 from analysis.findings.findings import compute_results
-from analysis.report.drawing import FIGURES
+from analysis.report.drawing import figure_specs
 from analysis.study.models import FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -39,7 +39,9 @@ def is_whole(figure):
 @pytest.mark.parametrize(("count", "figures"), [("three", 18), ("one", 13)])
 def test_nothing_of_a_figure_is_cut(findings, count, figures):
     with styled():
-        drawn = {spec.key: spec.draw(findings[count]) for spec in FIGURES}
+        drawn = {
+            spec.key: spec.draw(findings[count]) for spec in figure_specs().values()
+        }
         shown = {key: figure for key, figure in drawn.items() if figure is not None}
         assert len(shown) >= figures
         assert [key for key, figure in shown.items() if not is_whole(figure)] == []
@@ -67,8 +69,8 @@ def test_numbers_that_differ_have_distinct_labels():
 
 
 def test_figures_of_one_section_stand_together_and_keys_are_unique():
-    keys = [spec.key for spec in FIGURES]
-    assert len(keys) == len(set(keys)) == 25
-    sections = [spec.section for spec in FIGURES]
+    assert len(PAGE_ORDER) == len(set(PAGE_ORDER)) == 25
+    assert set(figure_specs()) == set(PAGE_ORDER)
+    sections = [figure_specs()[key].section for key in PAGE_ORDER]
     places = [list(ReportSection).index(section) for section in sections]
     assert places == sorted(places)

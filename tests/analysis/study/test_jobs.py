@@ -3,7 +3,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from analysis.study.jobs import available_cores, run_tasks
+from analysis.study.jobs import (
+    Batch,
+    Workers,
+    available_cores,
+    run_batches,
+    run_tasks,
+    running_workers,
+)
 
 
 def square(number):
@@ -84,3 +91,30 @@ def test_tasks_of_one_body_of_data_are_known_by_their_numbers(n_jobs):
 def test_workers_map_the_data_that_tasks_share():
     *_, last = run_tasks(total, Sums(np.arange(50_000.0)), 2)
     assert last == (10.0, "memmap")
+
+
+@pytest.mark.parametrize("n_jobs", [1, 2])
+def test_batches_come_back_each_in_its_own_order_and_are_counted_together(n_jobs):
+    batches = [
+        Batch(square, [3, 2]),
+        Batch(total, Sums(np.arange(50_000.0))),
+        Batch(square, []),
+        Batch(str, [7]),
+    ]
+    seen, store = [], Memory()
+    found = run_batches(
+        batches, n_jobs, lambda done, of: seen.append((done, of)), store
+    )
+    squares, sums, nothing, texts = found
+    assert (squares, nothing, texts) == ([9, 4], [], ["7"])
+    assert [value for value, _ in sums] == [0.0, 0.0, 1.0, 3.0, 6.0, 10.0]
+    assert seen == [(done, 9) for done in range(1, 10)]
+    assert set(store.results) == {3, 2, 7, *(("sum", k) for k in range(6))}
+
+
+def test_few_tasks_are_given_to_the_processes_that_run_already():
+    run_tasks(square, [1, 2, 3, 4], 2)
+    expected = min(2, available_cores())
+    assert running_workers() >= expected
+    assert Workers().count(2) == expected
+    assert Workers(1).count(2) == 1

@@ -2,6 +2,7 @@ import csv
 import io
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from acquisition.errors import SettingsError
 from analysis.data.prepare import PrepareOptions
 from analysis.data.series import TractionSeries
 from analysis.study.fits import to_csv, to_fits
+from analysis.study.jobs import Batch
 from analysis.study.models import GP_SE, TUSTIN, FitOptions
 from analysis.study.study import StudyOptions, run_study
 
@@ -101,6 +103,25 @@ def test_results_are_identical_bit_by_bit_for_two_workers(small_study, slice_tri
     one, two = to_fits(small_study), to_fits(parallel)
     one["options"]["n_jobs"] = two["options"]["n_jobs"] = None
     assert one == two
+
+
+def names(trials):
+    return [trial.name for trial in trials]
+
+
+def test_what_is_done_beside_the_fits_is_in_the_store(slice_trials):
+    kept = {}
+    store = SimpleNamespace(
+        get=lambda _: None, put=lambda task, result: kept.update({repr(task): result})
+    )
+    run_study(
+        {"TF": slice_trials["TF"]},
+        OPTIONS,
+        simulated=True,
+        store=store,
+        beside=lambda prepared: [Batch(names, [prepared["TF"]])],
+    )
+    assert [t.name for t in slice_trials["TF"]] in kept.values()
 
 
 def test_a_terrain_is_fitted_alike_alone_and_in_company(small_study, slice_trials):

@@ -6,6 +6,7 @@ import shutil
 import pytest
 
 import analysis.report.drawing
+import analysis.study.jobs
 import analysis.study.study
 import analysis.terrains.export
 import experiments.report.foresight
@@ -47,6 +48,8 @@ def computed(monkeypatch):
             return function(*arguments, **named)
 
         monkeypatch.setattr(module, name, seen)
+    # in workers nobody would see it
+    monkeypatch.setattr(analysis.study.jobs, "available_cores", lambda: 1)
     return names
 
 
