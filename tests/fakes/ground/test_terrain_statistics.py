@@ -51,7 +51,7 @@ MAE = {
 }
 
 ROUNDING = 0.005  # N; the reference prints two decimals
-# On these plates a Gaussian process errs 2 to 4 % less than in any of the reference's sets.
+# On these plates a Gaussian process errs 2 to 4 % less than any set of the reference.
 SMOOTH = {(GP_SE, "TF"), (GP_SE, "Tf")}
 SMOOTHER = pytest.mark.xfail(reason="plates are smoother", strict=True)
 
