@@ -20,6 +20,7 @@ from analysis.findings import HeldTrial
 from analysis.study import run_fold
 from analysis.study.jobs import keep_memory
 from analysis.terrains.table import Table
+from benchmarks.fit import EVALUATION, chosen, load_rows, our_evaluation
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE, folds_of
 from experiments.__main__ import main as traction
@@ -72,14 +73,22 @@ def _held(path: Path) -> tuple[HeldTrial, PreparedTrial]:
     return trial, prepare_trial(trial.series, PrepareOptions())
 
 
-def fold_row() -> BenchRow:
-    """Return what one fold of the report's models costs, in a study's worker."""
+def worker_rows() -> list[BenchRow]:
+    """Return what a fold of the report's models costs in a study's worker.
+
+    And what one likelihood with its gradient does.
+    """
     keep_memory()
     task = folds_of(SLICE)[0]
     task = replace(task, options=replace(task.options, models=REPORTED))
     what = f"a fold of the report's {len(REPORTED)} models"
+    evaluate = our_evaluation(*chosen(load_rows()))
     with threadpool_limits(1):
-        return BenchRow(what, best(lambda: run_fold(task), 2), "s", 0.4)
+        fold, one = best(lambda: run_fold(task), 2), best(evaluate, 5, 20)
+    return [
+        BenchRow(what, fold, "s", 0.4),
+        BenchRow(f"{EVALUATION} in a study's worker", 1e3 * one, "ms", 1.15),
+    ]
 
 
 def table_rows() -> list[BenchRow]:
@@ -102,7 +111,7 @@ def table_rows() -> list[BenchRow]:
 
 def rows() -> list[BenchRow]:
     """Return what was measured, for the table."""
-    return [*trial_rows(), fold_row(), *table_rows()]
+    return [*trial_rows(), *worker_rows(), *table_rows()]
 
 
 if __name__ == "__main__":
