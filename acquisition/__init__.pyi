@@ -31,7 +31,7 @@ from .errors import (
     TractionError,
     TrialFileError,
 )
-from .linear_algebra import openblas_settings
+from .linear_algebra import keep_memory, openblas_settings
 from .sample import MOTOR_FRESH_SHIFT, Flag, Record, Sample
 from .schema import CYCLE, FORESIGHT, MOST_TERRAINS, TRUTH, schema_text
 from .settings import (
@@ -102,6 +102,7 @@ __all__ = [
     "encode_log",
     "encode_string",
     "ipc",
+    "keep_memory",
     "openblas_settings",
     "parse_toml",
     "read_text",

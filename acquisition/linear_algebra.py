@@ -1,14 +1,26 @@
-"""What OpenBLAS is told by the environment, before numpy loads it.
+"""What OpenBLAS and the C library are told for matrices of a few hundred rows.
 
-One thread: more would wait for busy cores. And where a processor is newer than the
-library, which of its kernels to take: OpenBLAS 0.3.31 knows AMD's families up to 25 and
-takes later ones for a Haswell of 2013, whose products take a third longer.
+By the environment, before numpy loads OpenBLAS: one thread, since more would wait for
+busy cores; and where a processor is newer than the library, which of its kernels to
+take. OpenBLAS 0.3.31 knows AMD's families up to 25 and takes later ones for a Haswell
+of 2013, whose products take a third longer.
+
+Such matrices are too large for the heap of the C library as it comes: every temporary
+one is mapped, cleared and unmapped again, and with threads beside it each unmapping
+interrupts the other cores. Two workers of a Dask cluster on two cores were 1.26 times
+as fast as one by that; docs/measured.md has the figure of today.
 """
 
+import ctypes
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP")}
 
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # parameters of mallopt(3)
+_KEPT = 256 * 2**20  # bytes of freed memory at the end of the heap
+_LARGEST = 32 * 2**20  # bytes from the heap at most; glibc takes no more
 _CPU = Path("/proc/cpuinfo")
 _FIRST = 8192  # bytes that hold what is said of the first core
 _LAST_KNOWN = 25  # family of AMD's processors
@@ -37,3 +49,17 @@ def openblas_settings(cpu: Path = _CPU) -> dict[str, str]:
     if not set(said.get("flags", "").split()) >= _AVX512:
         return ONE_THREAD
     return ONE_THREAD | {"OPENBLAS_CORETYPE": "SkylakeX"}
+
+
+@cache
+def keep_memory() -> bool:
+    """Let the C library keep large blocks that are freed, for the next matrix.
+
+    Returns:
+        whether it can be asked to; without, work takes longer.
+    """
+    with suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        asked = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _KEPT))
+        return all(mallopt(name, size) for name, size in asked)
+    return False

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from acquisition import keep_memory
 from analysis.data import PreparedTrial, PrepareOptions, load_trial, prepare_trial
 from analysis.findings import HeldTrial
 from analysis.study import run_fold
-from analysis.study.jobs import keep_memory
 from analysis.terrains.table import Table
 from benchmarks.fit import EVALUATION, chosen, load_rows, our_evaluation
 from benchmarks.rows import BenchRow

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from sklearn.gaussian_process import GaussianProcessRegressor
 from threadpoolctl import threadpool_limits
 
+from acquisition import keep_memory
 from analysis.data.prepare import PrepareOptions, prepare_trial
 from analysis.data.samples import SampleTable
 from analysis.data.tables import load_tables
@@ -24,7 +25,6 @@ from analysis.gp.arcsine import Arcsine
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.noise import ConstantNoise
 from analysis.gp.regression import fit_gp
-from analysis.study.jobs import keep_memory
 from analysis.tustin.model import TustinBounds, TustinParameters, fit_tustin, predict
 from benchmarks import beside_gpy, beside_tinygp
 from benchmarks.beside_sklearn import KERNELS, fit_theirs, our_starts, theirs

@@ -1,24 +1,30 @@
-"""The one door to joblib and dask: independent tasks on cores or on a cluster.
+"""The one door to joblib and dask: independent tasks on cores or on a cluster."""
 
-Matrices of a few hundred rows are too large for the heap of the C library as it comes:
-every temporary one is mapped, cleared and unmapped again, and with threads beside it
-each unmapping interrupts the other cores. Two workers of a Dask cluster on two cores
-were 1.26 times as fast as one by that; docs/measured.md has the figure of today.
-"""
-
-import ctypes
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from ipaddress import ip_address
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
 
 from joblib import Parallel, delayed, parallel_config
 
-from acquisition import SettingsError
+from acquisition import SettingsError, keep_memory
+
+
+class WorkerLostError(SettingsError):
+    """A process that worked on a task is gone: ended from outside."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "A process that was fitting was ended from outside, as the system does "
+            "where memory runs out.",
+            hint="Close other programs and run the command again: fits that were "
+            "finished are kept.",
+        )
+
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -27,9 +33,6 @@ Progress = Callable[[int, int], None]
 _FEW = 3  # tasks that cost less than starting workers
 _MAPPED = 20_000  # bytes of an array that is not copied into every task
 _PATIENCE = 10.0  # s to reach a scheduler
-_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3  # parameters of mallopt(3)
-_KEPT = 256 * 2**20  # bytes of freed memory at the end of the heap
-_LARGEST = 32 * 2**20  # bytes from the heap at most; glibc takes no more
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,7 +225,10 @@ def _numbered(
 
 def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
     stream: Any = Parallel(return_as="generator_unordered")(calls)
-    return stream
+    try:
+        yield from stream
+    except BrokenExecutor as error:
+        raise WorkerLostError from error
 
 
 def _one_threaded(
@@ -237,20 +243,6 @@ def _one_threaded(
     keep_memory()
     with threadpool_limits(1):
         return place, function(task)
-
-
-@cache
-def keep_memory() -> bool:
-    """Let the C library keep large blocks that are freed, for the next matrix.
-
-    Returns:
-        whether it can be asked to; without, work takes longer.
-    """
-    with suppress(OSError, AttributeError):
-        mallopt = ctypes.CDLL(None).mallopt
-        asked = ((_MMAP_THRESHOLD, _LARGEST), (_TRIM_THRESHOLD, _KEPT))
-        return all(mallopt(name, size) for name, size in asked)
-    return False
 
 
 def is_guarded(address: str) -> bool:
@@ -276,7 +268,7 @@ def _cluster(address: str, shared: Sequence[Any]) -> Iterator[None]:
 
     What is `shared` by them goes to every worker once.
     """
-    from distributed import Client
+    from distributed import Client, KilledWorker
 
     if not is_guarded(address):
         raise SettingsError(
@@ -294,4 +286,7 @@ def _cluster(address: str, shared: Sequence[Any]) -> Iterator[None]:
             "leave --scheduler out.",
         ) from error
     with client, parallel_config("dask", client=client, scatter=list(shared) or None):
-        yield
+        try:
+            yield
+        except KilledWorker as error:
+            raise WorkerLostError from error

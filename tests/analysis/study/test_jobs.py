@@ -1,3 +1,5 @@
+import os
+import signal
 from collections.abc import Sequence
 
 import numpy as np
@@ -5,6 +7,7 @@ import pytest
 
 from analysis.study.jobs import (
     Batch,
+    WorkerLostError,
     Workers,
     available_cores,
     run_batches,
@@ -40,6 +43,18 @@ def test_no_tasks_are_no_trouble():
 def test_an_error_in_a_task_is_not_swallowed():
     with pytest.raises(ValueError, match="7"):
         run_tasks(fail, [7], 1)
+
+
+def end_at_three(number):
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_a_worker_that_is_ended_from_outside_is_told_as_that_and_others_follow():
+    with pytest.raises(WorkerLostError, match="ended from outside"):
+        run_tasks(end_at_three, [1, 2, 3, 4, 5], 2)
+    assert run_tasks(square, [1, 2, 3, 4], 2) == [1, 4, 9, 16]
 
 
 def test_there_is_at_least_one_core():
