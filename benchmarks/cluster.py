@@ -2,8 +2,8 @@
 
     python -m benchmarks.cluster [--rounds 3]
 
-Workers are processes on this machine with one thread each. Windows of one and of two
-workers take turns; both are warm. The schedule for 8 and 64 workers is that of a list
+Folds are those of a report, with all its models. Workers are processes on this machine
+with one thread each. Windows of one and of two workers take turns; both are warm. The schedule for 8 and 64 workers is that of a list
 scheduler over the times of the same folds on one worker, drawn with replacement until
 there are 80 of each of 8 terrains. Tasks are handed out one after the other and the
 trials reach one worker after the other, both as long as was measured of folds without
@@ -22,10 +22,11 @@ from typing import Any
 import numpy as np
 
 from analysis.data import PrepareOptions, load_tables, prepare_trial
-from analysis.study import GP_NN, GP_SE, FitOptions, Workers, run_fold, run_tasks
+from analysis.study import FitOptions, Workers, run_fold, run_tasks
 from analysis.study.crossval import FoldPlan, plan_folds
 from benchmarks.rows import BenchRow
 from benchmarks.study_race import SLICE
+from experiments.report import REPORTED
 
 FOLDS = 640  # 80 trials of each of 8 terrains
 LARGER = (8, 64)  # workers of the schedules
@@ -64,9 +65,9 @@ class ClusterCosts:
 def plan(*models: str) -> FoldPlan:
     """Return the folds of the trials in the repository, for these models."""
     trials = {
-        f"{name} {half}": [prepare_trial(one, PrepareOptions()) for one in group]
+        f"{name} {part}": [prepare_trial(one, PrepareOptions()) for one in group]
         for name, group in load_tables([SLICE]).items()
-        for half in "ab"  # of an even number of folds
+        for part in "abcd"  # many more folds than workers, and an even number
     }
     return plan_folds(trials, FitOptions(models=models))[0]
 
@@ -96,7 +97,7 @@ def spent(folds: FoldPlan, address: str) -> float:
 
 def measured(rounds: int = _ROUNDS) -> ClusterCosts:
     """Return what one and two workers take."""
-    folds, light = plan(GP_SE, GP_NN), plan()
+    folds, light = plan(*REPORTED), plan()
     own: list[float] = []
     for k in range(len(folds)):
         before = time.process_time()
