@@ -3,11 +3,12 @@
     python -m benchmarks.cluster [--rounds 3]
 
 Folds are those of a report, with all its models. Workers are processes on this machine
-with one thread each. Windows of one and of two workers take turns; both are warm. The schedule for 8 and 64 workers is that of a list
-scheduler over the times of the same folds on one worker, drawn with replacement until
-there are 80 of each of 8 terrains. Tasks are handed out one after the other and the
-trials reach one worker after the other, both as long as was measured of folds without
-a model: less than a cluster does at once.
+with one thread each. Windows of one and of two workers take turns; both are warm. The
+schedule for 8 and 64 workers is that of a list scheduler over the times of the same
+folds on one worker, drawn with replacement until there are 80 of each of 8 terrains.
+Tasks are handed out one after the other and the trials reach one worker after the
+other, both as long as was measured of folds without a model: less than a cluster does
+at once.
 """
 
 import argparse
