@@ -14,6 +14,8 @@ import numpy as np
 from acquisition.bounds import are_within
 from acquisition.devices import Vector
 
+_JOINTS = 7
+
 
 @dataclass(frozen=True, slots=True)
 class GuardLimits:
@@ -75,6 +77,13 @@ class GuardLimits:
     idle_after_missing: int = 25
     idle_after_safety_ms: float = 400.0
     armed_inside: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuse a row that is too short: joints behind its end would have no limit."""
+        rows = (self.q_lower, self.q_upper, self.speed, self.torque, self.still_ways)
+        if any(len(row) != _JOINTS for row in rows):
+            lengths = ", ".join(str(len(row)) for row in rows)
+            raise ValueError(f"limits of {_JOINTS} joints have {lengths} numbers")
 
 
 # A torque changes in one cycle by this share of its limit at most: from zero to the

@@ -28,6 +28,7 @@ _MET = Cell(
 )
 _OWN = {
     "joint7-slip": _UNLOCKED,
+    "lie-of-motor-3": _IN_VAIN,
     "contact-force": _MET,
     "second-command": OTHER_REFUSED,
 }
@@ -39,7 +40,7 @@ def _cell(fault: str) -> Cell:
     if fault in _OWN:
         return _OWN[fault]
     still = TABLE[fault][_TARE]
-    if fault.startswith("stuck") or fault == "lie-of-motor-3":
+    if fault.startswith("stuck"):
         return _IN_VAIN
     if fault.startswith("creep"):
         return _ASTRAY

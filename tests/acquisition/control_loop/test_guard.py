@@ -503,3 +503,11 @@ def test_positions_that_are_never_believed_are_a_fault_of_their_own(cycles, acti
     if action is not Action.NONE:
         assert (verdict.fault, verdict.detail) == (Fault.POSITION_JUMP, JUMP)
         assert verdict.ends_session
+
+
+@pytest.mark.parametrize(
+    "name", ["q_lower", "q_upper", "speed", "torque", "still_ways"]
+)
+def test_limits_of_fewer_joints_than_the_arm_has_are_refused(name):
+    with pytest.raises(ValueError, match="limits of 7 joints"):
+        replace(LIMITS, **{name: getattr(LIMITS, name)[:6]})
