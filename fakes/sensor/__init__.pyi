@@ -1,5 +1,5 @@
 from .errors import FORCE_ERRORS, NO_SHIFT, TORQUE_ERRORS, SensorErrors
-from .kinds import SensorChoice, make_stream
+from .kinds import SensorChoice, draw_errors, make_stream
 from .port import FakeSerialPort
 from .pty import SerialPty
 from .stream import SensorStream, Source
@@ -14,5 +14,6 @@ __all__ = [
     "SensorStream",
     "SerialPty",
     "Source",
+    "draw_errors",
     "make_stream",
 ]

@@ -67,13 +67,23 @@ def bota_stream(
 ) -> SensorStream:
     """Return a Bota sensor that shows `source`."""
     firmware = BotaFirmware(options, start_ns)
-    stream = SensorStream(firmware, source, errors, start_ns, options.clock_start_us)
+    begin = start_ns, options.clock_start_us
+    if errors is not None and errors.is_compiled:
+        from fakes.sensor.compiled import CompiledBotaStream
+
+        stream = CompiledBotaStream(firmware, source, errors, *begin)
+    else:
+        stream = SensorStream(firmware, source, errors, *begin)
     stream.resets_on_open = options.resets_on_open
     return stream
 
 
 class BotaFirmware:
-    """Implements `fakes.sensor.stream.Firmware`."""
+    """Implements `fakes.sensor.stream.Firmware`.
+
+    Attributes:
+        is_raw: its calibration matrix is inactive, which its frames say.
+    """
 
     frame_size = bota.FRAME_SIZE
 
@@ -122,7 +132,7 @@ class BotaFirmware:
 
     def frame(self, shown: Measurement, status: int) -> bytes:
         """Return the 37 bytes of a sample."""
-        status |= shown.is_skipping | self._is_raw << 3 | (shown.saturated > 0) << 1
+        status |= shown.is_skipping | self.is_raw << 3 | (shown.saturated > 0) << 1
         return bota.encode_frame(
             BotaFrame(
                 status,
@@ -138,8 +148,8 @@ class BotaFirmware:
         self._start_measuring()
 
     def _start_measuring(self) -> None:
-        self._is_raw = self._raw_starts > 0
-        self._raw_starts -= self._is_raw
+        self.is_raw = self._raw_starts > 0
+        self._raw_starts -= self.is_raw
 
     def _run_from(self, t_ns: int) -> None:
         self._mode = BotaMode.RUN

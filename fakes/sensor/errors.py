@@ -1,5 +1,6 @@
 """What the gauges of a wrist sensor add to the true load."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -65,10 +66,10 @@ PER_DEGREE = (0.05, 0.05, 0.15, 0.002, 0.002, 0.002)  # [N, N m]; what warmth ad
 
 NO_SHIFT: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-_SLOW_NS = 10_000_000  # between two updates of what changes over seconds
-_CREEP_TIME = 20.0  # s
+SLOW_NS = 10_000_000  # between two updates of what changes over seconds
+CREEP_TIME = 20.0  # s
 _LAGGING = 0.05  # of the span: a larger change of load pulls the reading along
-_WARMTH, _WARMTH_TIME = 0.3, 300.0  # of the room and the arm [degrees Celsius], s
+_WARMTH, WARMTH_TIME = 0.3, 300.0  # of the room and the arm [degrees Celsius], s
 
 
 class SensorErrors:
@@ -80,9 +81,12 @@ class SensorErrors:
     averages away.
 
     Attributes:
+        is_compiled: they are added by compiled functions.
         warmth: how far the sensor is from its usual temperature [degrees Celsius].
         shift: what a fault has added to the zero [N, N m].
     """
+
+    is_compiled = False
 
     def __init__(
         self,
@@ -116,7 +120,7 @@ class SensorErrors:
         step_ns = t_ns - before_ns if before_ns is not None and t_ns > before_ns else 0
         if step_ns != self._step_ns:  # samples come at an almost even pace
             self._pace_drifts(step_ns)
-        if self._slow_ns is None or t_ns - self._slow_ns >= _SLOW_NS:
+        if self._slow_ns is None or t_ns - self._slow_ns >= SLOW_NS:
             self._update_slow(t_ns, wrench)
         next_normal = self._normals.next
         shown: list[float] = []
@@ -143,7 +147,7 @@ class SensorErrors:
         """Let walk, warmth and the effects of the load go on to `t_ns`."""
         passed_ns = 0 if self._slow_ns is None else t_ns - self._slow_ns
         self._slow_ns, dt, normal = t_ns, passed_ns * 1e-9, self._normals.next
-        keep, kick = exact_step(self._warmth_sd, _WARMTH_TIME, dt)
+        keep, kick = exact_step(self._warmth_sd, WARMTH_TIME, dt)
         self.warmth = keep * self.warmth + kick * normal()
         walk: list[float] = []
         for value, scale in zip(self._walk, self._scales, strict=True):
@@ -158,7 +162,12 @@ class SensorErrors:
 
 
 class LoadErrors:
-    """What the load itself makes the reading miss: creep, hysteresis, cross-talk."""
+    """What the load itself makes the reading miss: creep, hysteresis, cross-talk.
+
+    Attributes:
+        cross_talk: share of the loads by column that shows in the axes by row.
+        rows: creep, hysteresis and largest stretch [N, N m] of each axis.
+    """
 
     def __init__(self, scales: Sequence[ErrorScale], rng: np.random.Generator) -> None:
         """Draw the cross-talk of one sensor from `rng`."""
@@ -166,9 +175,9 @@ class LoadErrors:
         talk = np.array([[scale.cross_talk] for scale in scales])
         talk = talk * rng.standard_normal((6, 6)) * span[:, None] / span
         np.fill_diagonal(talk, 0.0)
-        self._cross_talk = talk
+        self.cross_talk: list[list[float]] = talk.tolist()
         lagging: list[float] = (_LAGGING * span).tolist()
-        self._rows = [
+        self.rows = [
             (scale.creep, scale.hysteresis, most)
             for scale, most in zip(scales, lagging)
         ]
@@ -187,8 +196,8 @@ class LoadErrors:
             self._before,
             self._stretch,
             self._taken_on,
-            self._rows,
-            (self._cross_talk @ wrench).tolist(),
+            self.rows,
+            [_along(row, wrench) for row in self.cross_talk],
         )
         for load, before, stretch, taken, (creep, hysteresis, most), talk in rows:
             moved = stretch + load - before
@@ -202,7 +211,14 @@ class LoadErrors:
         return errors
 
 
+def _along(row: Sequence[float], wrench: Sequence[float]) -> float:
+    """Return the scalar product, added from the left in every implementation."""
+    a, b, c, d, e, f = row
+    fx, fy, fz, tx, ty, tz = wrench
+    return a * fx + b * fy + c * fz + d * tx + e * ty + f * tz
+
+
 @lru_cache(maxsize=64)
 def _crept(dt: float) -> float:
     """Return the share of its way that the creep goes in `dt` [s]."""
-    return 1.0 - float(np.exp(-dt / _CREEP_TIME))
+    return 1.0 - math.exp(-dt / CREEP_TIME)

@@ -4,78 +4,14 @@
 with them. What is particular to a make is its `Firmware`. Told the time, never waits.
 """
 
-import math
 from collections import deque
 from collections.abc import Callable, Sequence
-from enum import Enum, auto
 
 from fakes.sensor.errors import PER_DEGREE, SensorErrors
 from fakes.sensor.firmware import Firmware, Measurement, SampleSchedule, Saying
+from fakes.sensor.stream_faults import ByteFault, StreamFaults, damage
 from ft_sensor import ALL_AXES, Wrench
 from ft_sensor.serial_line import wire_time_ns
-
-_GARBLED = 9  # byte of a frame that is inverted: in the middle of a force
-_NOT_A_NUMBER: Wrench = (math.nan, math.inf, 0.0, 0.0, 0.0, 0.0)
-
-
-class ByteFault(Enum):
-    """What may happen to one byte on the wire."""
-
-    FLIP = auto()
-    DROP = auto()
-    DOUBLE = auto()
-
-
-def damage(data: bytes, fault: ByteFault, index: int, bit: int = 0) -> bytes:
-    """Return `data` with one byte, at `index`, flipped in `bit`, dropped or doubled."""
-    byte = data[index : index + 1]
-    middle = {
-        ByteFault.FLIP: bytes((byte[0] ^ 1 << bit,)),
-        ByteFault.DROP: b"",
-        ByteFault.DOUBLE: byte * 2,
-    }[fault]
-    return data[:index] + middle + data[index + 1 :]
-
-
-class StreamFaults:
-    """Freezes, spoils and garbles what a sensor says, until `clear_faults`.
-
-    Attributes:
-        is_garbled: no frame reaches the host as it was sent.
-        is_nonsense: forces are no numbers, although the checksum is right.
-    """
-
-    def __init__(self) -> None:
-        self.is_garbled = False
-        self.is_nonsense = False
-        self._is_frozen = False
-        self._last: Wrench | None = None
-
-    def freeze(self) -> None:
-        """Repeat the next wrench for ever; the device's clock goes on."""
-        self._is_frozen = True
-        self._last = None
-
-    def clear_faults(self) -> None:
-        """Show and send everything as it is."""
-        self.is_garbled = self.is_nonsense = self._is_frozen = False
-
-    def show(self, wrench: Wrench) -> Wrench:
-        """Return what the device makes of `wrench` [N, N m]."""
-        if self.is_nonsense:
-            return _NOT_A_NUMBER
-        if self._is_frozen:
-            self._last = self._last or wrench
-            return self._last
-        return wrench
-
-    def carry(self, frame: bytes) -> bytes:
-        """Return what arrives of `frame`."""
-        if not self.is_garbled:
-            return frame
-        spoilt = frame[_GARBLED] ^ 0xFF
-        return frame[:_GARBLED] + bytes((spoilt,)) + frame[_GARBLED + 1 :]
-
 
 Source = Callable[[int], Sequence[float]]
 
@@ -255,6 +191,22 @@ class SensorStream:
             self._fault = None
         self._send(t_ns, self.faults.carry(data))
 
+    def _is_plain(self, t_ns: int, period_ns: float) -> bool:
+        """Whether a frame at `t_ns` shows gauges and clock as they are."""
+        return not (
+            self._is_silent
+            or t_ns < self._paused_until_ns
+            or self._wire_free_ns > t_ns + period_ns
+            or self._is_skipping
+            or self._is_saturated
+            or self._fault is not None
+            or self.ranges is not _NO_RANGES
+            or self.status
+            or self.warming
+            or self.is_clock_frozen
+            or self.faults.is_any
+        )
+
     def _measured(self, t_ns: int, wrench: Sequence[float]) -> Measurement:
         warmth = 0.0 if self.errors is None else self.errors.warmth
         if self.warming:
@@ -268,8 +220,7 @@ class SensorStream:
             saturated |= beyond
         fx, fy, fz, tx, ty, tz = wrench
         if not self.is_clock_frozen:
-            passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
-            self._device_us = self._clock_start_us + passed_ns // 1000
+            self._read_clock(t_ns)
         return Measurement(
             self.faults.show((fx, fy, fz, tx, ty, tz)),
             saturated,
@@ -278,6 +229,11 @@ class SensorStream:
             self._is_skipping,
             ROOM + warmth,
         )
+
+    def _read_clock(self, t_ns: int) -> None:
+        """Let the device's clock show what it shows at `t_ns`."""
+        passed_ns = round((t_ns - self.on_since_ns) * self.firmware.clock_rate)
+        self._device_us = self._clock_start_us + passed_ns // 1000
 
     def _send(self, t_ns: int, data: bytes) -> None:
         """Put `data` on the wire as soon as it is free, not before `t_ns`."""

@@ -9,6 +9,7 @@ from acquisition import PERIOD_NS, Clock, Record, SettingsError
 from fakes.bus import FakeCanBus
 from fakes.clock import SteppedClock
 from fakes.ground import Container, Terrain, make_terrain
+from fakes.kernels import mark_ready
 from fakes.plant import ArmPlant, Pace, PlantOptions, touched_place
 from fakes.pucks import (
     SENSOR_FORCE_ERRORS,
@@ -19,7 +20,7 @@ from fakes.pucks import (
     PuckNetwork,
 )
 from fakes.randomness import TrialGenerators, trial_generators
-from fakes.sensor import FakeSerialPort, SensorChoice, SensorErrors, make_stream
+from fakes.sensor import FakeSerialPort, SensorChoice, draw_errors, make_stream
 from fakes.truth import truth_records
 from fakes.world.faults import (
     BodyFaults,
@@ -117,7 +118,9 @@ class FakeRig:
             chosen = replace(chosen, has_sensor=True)
         self.random = self._rake(0)
         kind = (SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS) if chosen.has_sensor else ()
-        self.errors = SensorErrors(self.random.sensor, *kind)
+        self.errors = draw_errors(
+            self.random.sensor, *kind, is_compiled=self.plant.is_compiled
+        )
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
@@ -125,6 +128,8 @@ class FakeRig:
         self.stream = make_stream(
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
+        if self.plant.is_compiled:
+            mark_ready()
         self._port: FakeSerialPort | None = None
         self._cable: Cable | None = None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from fakes.ground import Terrain
 from fakes.ground.compiled import DONE, GIVEN, GROUND, CompiledGround
-from fakes.kernels import COMPILED, mark_ready
+from fakes.kernels import COMPILED
 from fakes.plant.body import HandLoad
 from fakes.plant.compiled.drives import take_drives
 from fakes.plant.compiled.motion import take_links
@@ -75,7 +75,6 @@ class CompiledBody:
         self.linearise()
         record["is_bearing"] = record["is_fresh"] = 1
         go_on(self._bodies, self._no_ground, self._rows)  # no substep is left yet
-        mark_ready()
 
     @property
     def q(self) -> Array:
