@@ -7,7 +7,7 @@ from typing import NoReturn
 import can
 
 from acquisition import NS_PER_S, Clock
-from fakes.pucks import OutFrame, PuckNetwork, WiredNetwork
+from fakes.pucks import OutFrame, PuckNetwork, lay_wire
 from wam.bus import DRAIN_AT_MOST, PythonCanDoor, as_frame
 from wam.bus import Frame as DoorFrame
 
@@ -23,14 +23,17 @@ class FakeCanBus(can.BusABC):
     controller that has left the bus (`is_off`) vanishes without a word, as in Linux.
     """
 
-    def __init__(self, network: PuckNetwork, clock: Clock) -> None:
+    def __init__(
+        self, network: PuckNetwork, clock: Clock, *, is_compiled: bool = False
+    ) -> None:
+        """Lay the wire; compiled functions see to its usual traffic, or Python."""
         self.channel_info = "fake bus"
         self.network = network
         self._faults, self._schedule = network.faults, network.schedule
         self._clock = clock
         self._inbox: deque[OutFrame] = deque()
         self._stuck: deque[can.Message] = deque()
-        self._wired = WiredNetwork(network)
+        self._wired = lay_wire(network, is_compiled=is_compiled)
         self._t_ns = -1  # how far it has gone on
         super().__init__(channel="fake")
 

@@ -139,7 +139,7 @@ def _places() -> list[Path]:
 def _source_digest() -> str:
     """Return a digest of the sources that the machine code is made of."""
     digest = hashlib.sha256()
-    for name in ("ground", "kernels", "plant", "sensor"):
+    for name in ("ground", "kernels", "plant", "pucks", "sensor"):
         for path in sorted((_FAKES / name).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:16]

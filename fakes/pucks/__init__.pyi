@@ -5,7 +5,7 @@ from .ft_puck import SENSOR_FORCE_ERRORS, SENSOR_TORQUE_ERRORS, Load
 from .network import PuckNetwork
 from .options import NetworkOptions
 from .safety_module import NOMINAL_VOLTAGE, PendantAction
-from .wire import WiredNetwork
+from .wire import WiredNetwork, lay_wire
 
 __all__ = [
     "FRAME_NS",
@@ -20,4 +20,5 @@ __all__ = [
     "PendantAction",
     "PuckNetwork",
     "WiredNetwork",
+    "lay_wire",
 ]

@@ -1,6 +1,6 @@
 """The seven simulated motor pucks of an arm, and the motors behind them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from functools import partial
 from operator import attrgetter
 from typing import Protocol
@@ -11,10 +11,11 @@ from fakes.pucks.motor_puck import READ_ONLY, MotorPuck
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower, power_after, power_at_start
 from fakes.pucks.safety_module import puck_mode_in
-from wam.bus import MOTOR_NODES, Property, encode_positions, wrap_positions
+from wam.bus import MOTOR_NODES, Group, Property, encode_positions, wrap_positions
 
 _node, _position_id = attrgetter("node"), attrgetter("position_id")
 _torque = attrgetter("torque")
+LOWER = 4  # motors of the lower arm; the others are the wrist's
 
 
 class MotorSide(Protocol):
@@ -114,6 +115,25 @@ class PuckBank:
                 puck.take_torque(units[puck.slot])
         self._motors.advance(self._schedule.now_ns)
         self._motors.set_torques(list(map(_torque, self._pucks)))
+
+    def share_torques(self, torques: MutableSequence[int]) -> None:
+        """Keep the torques of all motors [puck units] in `torques` from now on."""
+        for puck in self._pucks:
+            torques[puck.node - 1] = puck.torque
+            puck.torques = torques
+
+    def driven_pucks(self) -> list[MotorPuck] | None:
+        """Return all pucks if they run as of one kind and follow the usual groups."""
+        pucks = self._pucks
+        parts = {
+            Group.ARM: pucks,
+            Group.LOWER_TORQUE: pucks[:LOWER],
+            Group.WRIST_TORQUE: pucks[LOWER:],
+        }
+        are_usual = all(self._group(group) == part for group, part in parts.items())
+        are_alike = len({(puck.p_number, puck.t_header) for puck in pucks}) == 1
+        are_at_work = all(puck.life.is_speaking and puck.is_driven for puck in pucks)
+        return pucks if are_usual and are_alike and are_at_work else None
 
     def _wake_up(self) -> None:
         for puck in self._pucks:

@@ -23,6 +23,7 @@ class EventQueue:
         now_ns: the network's time; it never runs back.
         next_ns: when the next plan or the alarm is due, `NEVER` if there is none.
         emit: sends a frame of a device now (identifier, data); see `intercept`.
+        is_intercepted: something comes between devices and wire, or once did.
         outbox: frames that want onto the wire, until they are taken.
     """
 
@@ -30,7 +31,7 @@ class EventQueue:
         self.now_ns = t_ns
         self.next_ns = NEVER
         self.emit: Callable[[int, bytes], None] = self.put
-        self._is_intercepted = False
+        self.is_intercepted = False
         self._on_alarm: Callable[[], None] = lambda: None
         self._alarm_ns = NEVER
         self._plans: list[tuple[int, int, Callable[[], None]]] = []
@@ -47,11 +48,11 @@ class EventQueue:
     def intercept(self, emit: Callable[[int, bytes], None]) -> None:
         """Give every frame of a device to `emit` from now on, instead of `put`."""
         self.emit = emit
-        self._is_intercepted = True
+        self.is_intercepted = True
 
     def emit_all(self, can_ids: Sequence[int], payloads: Sequence[bytes]) -> None:
         """Send frames of devices now, in this order."""
-        if self._is_intercepted:
+        if self.is_intercepted:
             for can_id, data in zip(can_ids, payloads, strict=True):
                 self.emit(can_id, data)
         else:

@@ -1,9 +1,12 @@
 """One simulated motor puck: its power, its properties, its torque."""
 
+from collections.abc import MutableSequence
+
 from fakes.pucks.options import NetworkOptions
 from fakes.pucks.power import AWAKE, Power, PuckPower
 from wam.bus import (
     MAGNETIC_ENCODER,
+    MOTOR_NODES,
     Device,
     PuckMode,
     PuckRole,
@@ -30,10 +33,11 @@ class MotorPuck:
         position_id: identifier of its position replies.
         vers: its firmware.
         offset: its position less the encoder's [counts].
-        torque: torque it makes [puck units].
+        torques: of all motors [puck units], where its own is one.
         p_number: number of the property P in its firmware.
         t_header: first byte of a torque frame that it takes.
         slot: which of the four torques of a frame is its own, 0 to 3.
+        limit: the most that it makes, MT [puck units].
         is_driven: it follows torques.
     """
 
@@ -44,7 +48,7 @@ class MotorPuck:
         i = node - 1
         self.vers = options.vers[i]
         self.offset = 0
-        self.torque = 0
+        self.torques: MutableSequence[int] = [0] * len(MOTOR_NODES)
         self._table = nearest_documented(self.vers)
         self.p_number = property_number(Device.MOTOR, "P", self._table)
         self.t_header = 0x80 | property_number(Device.MOTOR, "T", self._table)
@@ -70,7 +74,16 @@ class MotorPuck:
         """Take over what every torque frame asks for."""
         self.is_driven = self._properties["MODE"] == _DRIVEN
         self.slot = (self._properties["PIDX"] - 1) & 3
-        self._limit = self._properties["MT"]
+        self.limit = self._properties["MT"]
+
+    @property
+    def torque(self) -> int:
+        """Torque it makes [puck units]."""
+        return int(self.torques[self.node - 1])
+
+    @torque.setter
+    def torque(self, units: int) -> None:
+        self.torques[self.node - 1] = units
 
     @property
     def is_awake(self) -> bool:
@@ -102,7 +115,7 @@ class MotorPuck:
     def take_torque(self, units: int) -> None:
         """Follow a torque [puck units], clipped to MT, if it is in torque mode."""
         if self.is_driven:
-            limit = self._limit
+            limit = self.limit
             self.torque = (
                 limit if units > limit else -limit if units < -limit else units
             )

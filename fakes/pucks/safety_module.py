@@ -4,7 +4,7 @@ Neither the heartbeat's limit nor the content of the broadcast is known outside 
 the one is an option, the other the mode that the pucks go to.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableSequence, Sequence
 from typing import Literal
 
 from acquisition import SafetyMode
@@ -66,6 +66,8 @@ class FakeSafetyModule:
         mode: the true mode.
         is_mute: its transmit wire is cut.
         is_disobedient: it ignores a host that lowers its mode.
+        speeds: what it knows of the arm's speed.
+        largest: largest torques commanded last, by group [puck units].
     """
 
     def __init__(
@@ -86,26 +88,19 @@ class FakeSafetyModule:
         self._levels: dict[str, SafetyLevel] = dict.fromkeys(MONITORS, _SAFE)
         if not options.has_power:
             self._levels["other"] = _FAULT
-        self._speeds = SpeedMonitor(options.cts)
+        self.speeds = SpeedMonitor(options.cts)
         self._too_fast_since_ns: int | None = None
         self._bus_voltage = NOMINAL_VOLTAGE
         self._is_deaf = False
         self._spared: dict[str, int] = {}  # limits as they were before `strain`
-        self._largest_command: dict[int, int] = dict.fromkeys(TORQUE_GROUPS, 0)
+        self.largest: MutableSequence[int] = [0] * len(TORQUE_GROUPS)
         self._properties = {
             **{"VERS": options.safety_vers, "ROLE": int(PuckRole.SAFETY)},
-            **{
-                "SN": 1010,
-                "ID": SAFETY_NODE,
-                "ERROR": 0,
-                "STAT": int(PuckStatus.READY),
-            },
+            **{"SN": 1010, "ID": SAFETY_NODE, "ERROR": 0},
+            "STAT": int(PuckStatus.READY),
             **{"GRPA": 1, "GRPB": 2, "GRPC": 3, "SAFE": 0, "IFAULT": 0},
-            **{
-                "VNOM": round(NOMINAL_VOLTAGE),
-                "ZERO": int(options.has_positions),
-                **_POWER_UP_LIMITS,
-            },
+            **{"VNOM": round(NOMINAL_VOLTAGE), "ZERO": int(options.has_positions)},
+            **_POWER_UP_LIMITS,
         }
         schedule.define_alarm(self._miss_beat)
         self._feel_beat()
@@ -121,6 +116,20 @@ class FakeSafetyModule:
             is_active_lit=self.mode is _ACTIVE,
             button=PendantButton.E_STOP if is_stopped else PendantButton.NONE,
         )
+
+    @property
+    def calm_limits(self) -> tuple[int, int, int] | None:
+        """Torque, speed [units of VL1] and pause [ns] up to which it says nothing.
+
+        None unless the arm is at work and everything was within the limits so far.
+        """
+        levels, limits = self._levels, self._properties
+        is_safe = levels["velocity"] is _SAFE and levels["torque"] is _SAFE
+        is_watched = not self._is_deaf and self._too_fast_since_ns is None
+        if self.mode is not _ACTIVE or not (is_safe and is_watched):
+            return None
+        largest = min(limits["TL1"], limits["TL2"])
+        return largest, min(limits["VL1"], limits["VL2"]), self._heartbeat_ns
 
     def press(self, action: PendantAction) -> None:
         """Press a button of the pendant."""
@@ -138,7 +147,7 @@ class FakeSafetyModule:
     def forget_positions(self) -> None:
         """Know no longer where the joints are, as after power-up."""
         self._properties["ZERO"] = 0
-        self._speeds.reset()
+        self.speeds.reset()
 
     def receive(self, request: Property) -> None:
         """Take a GET or SET sent to the module."""
@@ -185,12 +194,12 @@ class FakeSafetyModule:
         if self._is_deaf:
             return
         self._feel_beat()
-        self._speeds.on_positions(self._schedule.now_ns, positions)
+        self.speeds.on_positions(self._schedule.now_ns, positions)
         self._judge_speed()
 
     def hear_torques(self, group: int, units: Sequence[int]) -> None:
         """Judge a torque command as it stands on the bus, before a puck clips it."""
-        self._largest_command[group] = max(map(abs, units))
+        self.largest[TORQUE_GROUPS.index(group)] = max(map(abs, units))
         self._judge_torque()
 
     def _feel_beat(self) -> None:
@@ -225,12 +234,12 @@ class FakeSafetyModule:
     def _judge_speed(self) -> None:
         """Compare the speed with VL1 and VL2; a limit of 0 or less is off."""
         limits = self._properties
-        if self._speeds.bound() * COUNTS_PER_SPEED <= min(limits["VL1"], limits["VL2"]):
+        if self.speeds.bound() * COUNTS_PER_SPEED <= min(limits["VL1"], limits["VL2"]):
             self._too_fast_since_ns = None
             self._warn("velocity", is_warning=False)
             return
         is_zeroed = self._properties["ZERO"] == 1
-        speed = self._speeds.tip_speed() if is_zeroed else self._speeds.joint_speed()
+        speed = self.speeds.tip_speed() if is_zeroed else self.speeds.joint_speed()
         counts = speed * COUNTS_PER_SPEED
         if counts <= self._properties["VL2"] or self._properties["VL2"] <= 0:
             self._too_fast_since_ns = None
@@ -265,7 +274,7 @@ class FakeSafetyModule:
             self._levels[monitor] = _WARNING if is_warning else _SAFE
 
     def _judge_torque(self) -> None:
-        largest = max(self._largest_command.values())
+        largest = max(self.largest)
         if self.mode is _ACTIVE and largest > self._properties["TL2"]:
             self._fault("torque")
         else:
@@ -283,7 +292,7 @@ class FakeSafetyModule:
         before, self.mode = self.mode, mode
         if mode is SafetyMode.E_STOP:
             self._properties["ZERO"] = 0
-            self._speeds.reset()
+            self.speeds.reset()
             self._too_fast_since_ns = None
         self._feel_beat()
         frame = encode_reply(_MODE, puck_mode_in(mode), is_wide=False)

@@ -26,11 +26,7 @@ class SpeedMonitor:
         m2jp = np.linalg.inv(load_constants().j2mp)[:_MAIN_JOINTS, :_MAIN_JOINTS]
         per_count = [2 * pi / (count or 1) for count in cts[:_MAIN_JOINTS]]
         self._joints: list[_Row] = [(*row,) for row in (m2jp * per_count).tolist()]
-        self._seen: list[deque[tuple[int, int]]] = [
-            deque(maxlen=HISTORY + 1) for _ in range(_MAIN_JOINTS)
-        ]
-
-        self._by_node = list(enumerate(self._seen, 1))
+        self.reset()
         # Whatever the motors do at 1 count/s at most, neither of the speeds is larger.
         joints = [sum(map(abs, row)) for row in self._joints]
         tip = ELBOW * (joints[0] + joints[1]) + FOREARM * joints[3]
@@ -38,12 +34,18 @@ class SpeedMonitor:
 
     def reset(self) -> None:
         """Begin anew: the pucks have lost their power."""
-        for seen in self._seen:
-            seen.clear()
+        self._history: list[deque[tuple[int, int]]] = [
+            deque(maxlen=HISTORY + 1) for _ in range(_MAIN_JOINTS)
+        ]
+
+    @property
+    def _seen(self) -> Sequence[Sequence[tuple[int, int]]]:
+        """Times [ns] and positions [counts] by motor, oldest first."""
+        return self._history
 
     def on_positions(self, t_ns: int, positions: Mapping[int, int]) -> None:
         """Take positions [counts] by node, all latched at `t_ns`."""
-        for node, seen in self._by_node:
+        for node, seen in enumerate(self._history, 1):
             counts = positions.get(node)
             if counts is not None and (not seen or t_ns > seen[-1][0]):
                 seen.append((t_ns, counts))

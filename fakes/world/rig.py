@@ -124,7 +124,8 @@ class FakeRig:
         load = Load(self.plant.sensor_load, self.errors)
         self.network = PuckNetwork(self.plant, chosen, clock.now_ns(), load)
         self._body = BodyFaults(self.plant, self.network.schedule.after)
-        self.bus = FakeCanBus(self.network, clock)
+        is_compiled = self.plant.is_compiled
+        self.bus = FakeCanBus(self.network, clock, is_compiled=is_compiled)
         self.stream = make_stream(
             scene.sensor, self.plant.sensor_load, self.errors, clock.now_ns()
         )
