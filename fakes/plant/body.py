@@ -23,7 +23,7 @@ from fakes.ground import NO_CONTACT, Terrain
 from fakes.kernels import PINOCCHIO
 from fakes.plant.joints import JointDrives, JointLoads, JointState
 from fakes.plant.model import ArmAndHand
-from fakes.plant.push import Vector3
+from fakes.plant.push import HandView, Vector3
 from wam.model import Array
 
 GRIP = (40.0, 1.0)  # the hand keeps the forearm's turn: N m/rad, N m s/rad
@@ -88,12 +88,11 @@ class ArmBody(Protocol):
         """Return position, velocity and turning rate of the sole, nine numbers."""
         ...
 
-    def hand_motion(self) -> tuple[Vector3, Vector3]:
-        """Return position [m] and velocity [m/s] of the hand point."""
-        ...
+    def linearise(self) -> HandView:
+        """Take positions and Jacobians anew, once per cycle; return what a hand feels.
 
-    def linearise(self) -> None:
-        """Take positions and Jacobians anew, once per cycle."""
+        Positions [m] and velocities [m/s] of sole and hand point, terrain frame.
+        """
         ...
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
@@ -104,8 +103,8 @@ class ArmBody(Protocol):
         """Go on by `steps` substeps within a cycle."""
         ...
 
-    def take_ground(self) -> list[float]:
-        """Return the sum of the ground's wrenches since it was taken last, six."""
+    def end_cycle(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Return the sum of the ground's wrenches in the cycle, six, and `motion`."""
         ...
 
 
@@ -193,13 +192,8 @@ class PinocchioBody:
         """Return position, velocity and turning rate of the sole, nine numbers."""
         return (*self._sole_at, *self._rates[:6])
 
-    def hand_motion(self) -> tuple[Vector3, Vector3]:
-        """Return position [m] and velocity [m/s] of the hand point."""
-        x, y, z = self._rates[6:9]
-        return self._hand_at, (x, y, z)
-
-    def linearise(self) -> None:
-        """Take positions and Jacobians anew, once per cycle.
+    def linearise(self) -> HandView:
+        """Take positions and Jacobians anew, once per cycle; return what a hand feels.
 
         Within the 2 ms sole and hand move along them; the joints themselves and their
         dynamics are never linearised. Everything is in the terrain frame.
@@ -212,7 +206,6 @@ class PinocchioBody:
         x, y, z = sole.translation.tolist()
         self._sole_at = (x, y, z)
         x, y, z = hand.translation.tolist()
-        self._hand_at = (x, y, z)
         (_, xy, xz), (yx, _, yz), (zx, zy, _) = self._wanted.dot(
             hand.rotation.T
         ).tolist()
@@ -222,6 +215,8 @@ class PinocchioBody:
         A[6:12] = pin.getFrameJacobian(model, data, self._hand, _AXES)
         rates = A.dot(self.qd).tolist()
         self._rates, self._speeds = rates[:12], rates[12:]
+        vx, vy, vz, _, _, _, hx, hy, hz, _, _, _ = self._rates
+        return HandView(self._sole_at, (vx, vy, vz), (x, y, z), (hx, hy, hz))
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
         """Take anew what stays as it is for 2 ms from `t_ns` on."""
@@ -233,10 +228,10 @@ class PinocchioBody:
         for _ in range(steps):
             self._step(terrain)
 
-    def take_ground(self) -> list[float]:
-        """Return the sum of the ground's wrenches since it was taken last, six."""
-        taken, self._sum = self._sum, _NOTHING
-        return list(taken)
+    def end_cycle(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Return the sum of the ground's wrenches in the cycle, six, and `motion`."""
+        ended, self._sum = self._sum, _NOTHING
+        return ended, self.motion()
 
     def _begin_drives(self, t_ns: int) -> None:
         self.drives.begin_cycle(self._joints.rows, self._speeds, t_ns)

@@ -29,7 +29,6 @@ from fakes.plant.model import (
     motor_inertia,
     motor_weights,
 )
-from fakes.plant.push import HandView
 from fakes.truth import Truth
 from ft_sensor import TerrainFrame
 from wam.model import GRAVITY, ArmConstants, Array, MotorFriction, Tool
@@ -74,7 +73,8 @@ class ArmPlant:
         self.finger = (0.0, 0.0, 0.0)
         self.t_ns = 0
         self.truth: Truth | None = None
-        self._ground = [0.0] * 6  # mean of the ground's wrench over a cycle
+        # Mean wrench of the ground over a cycle.
+        self._ground: Wrench = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._push = (0.0, 0.0, 0.0)  # force of the hand
         self._body: ArmBody = _build_body(parts, constants, self.friction, q, options)
         self.disturbance = self._body.disturbance
@@ -167,7 +167,7 @@ class ArmPlant:
     @property
     def contact_force(self) -> tuple[float, float, float]:
         """Force of the ground on the foot in the terrain frame, mean of a cycle [N]."""
-        x, y, z = self._ground[:3]
+        x, y, z, _, _, _ = self._ground
         return x, y, z
 
     @property
@@ -192,22 +192,18 @@ class ArmPlant:
     def _begin_cycle(self) -> None:
         """Take anew what stays as it is for 2 ms."""
         body = self._body
-        body.linearise()
-        x, y, z, vx, vy, vz, _, _, _ = body.motion()
-        view = HandView((x, y, z), (vx, vy, vz), *body.hand_motion())
-        self._push = x, y, z = self.hand.step(view)
+        self._push = x, y, z = self.hand.step(body.linearise())
         ux, uy, uz = self._up
         grip = GRIP if self.hand.is_holding else NO_GRIP
         body.begin_cycle(HandLoad((x + ux, y + uy, z + uz), grip), self.t_ns)
 
     def _end_cycle(self) -> None:
-        ground = [total / self._substeps for total in self._body.take_ground()]
-        self._ground = ground
+        (x, y, z, tx, ty, tz), motion = self._body.end_cycle()
+        n = self._substeps
+        self._ground = x, y, z, tx, ty, tz = x / n, y / n, z / n, tx / n, ty / n, tz / n
         # The hand that holds the arm gives way to nothing that small.
         fx, fy, fz = self.finger
-        x, y, z, *moment = ground
-        felt = (x + fx, y + fy, z + fz, *moment)
-        motion = self._body.motion()
+        felt = (x + fx, y + fy, z + fz, tx, ty, tz)
         self._wrist.end_cycle(self._body.rotation, felt, motion[3:])
         if self.truth is not None:
             row = (*self.q.tolist(), *motion[:6], -x, y, z, *self._push)

@@ -15,7 +15,7 @@ from fakes.plant.compiled.motion import take_links
 from fakes.plant.compiled.substeps import BODY, begin_cycle, go_on
 from fakes.plant.joints import BEARING_NS
 from fakes.plant.model import ArmAndHand
-from fakes.plant.push import Vector3
+from fakes.plant.push import HandView
 from wam.model import ArmConstants, Array, MotorFriction
 
 _OFFSETS = {name: place[1] for name, place in (BODY.fields or {}).items()}
@@ -62,34 +62,39 @@ class CompiledBody:
         record["midway"] = times[1]
         self.disturbance = record["disturbance"]
         self._motion, self._hand_rates = record["motion"], record["hand_rates"]
-        self._hand_at, self._rotation = record["hand_at"], record["foot_rotation"]
-        self._sum = record["sum"]
+        self._rotation, self._sum = record["foot_rotation"], record["sum"]
+        # Sum of the ground's wrenches, place of the hand, motion; place, motion, speed.
+        self._ended = np.frombuffer(self._bytes, float, 18, _OFFSETS["sum"])
+        self._felt = np.frombuffer(self._bytes, float, 15, _OFFSETS["hand_at"])
         self._disturbed = record["disturbed"]
-        self._left, self._is_driven = self._bodies["left"], self._bodies["is_driven"]
+        self._is_driven = self._bodies["is_driven"]
         turns = np.array(constants.cts) / (2.0 * np.pi)
         self._to_counts = turns[:, None] * constants.j2mp
         self._rows = np.stack((q, np.zeros(7), np.zeros(7)))
+        self._is_taken = False  # by somebody who may keep it
         self.hold(is_held=True)
         self.linearise()
         record["wanted"] = record["R"][5] @ record["hand_turn"]
         self.linearise()
         record["is_bearing"] = record["is_fresh"] = 1
-        go_on(self._bodies, self._no_ground, self._rows)  # no substep is left yet
+        go_on(self._bodies, self._no_ground, self._rows, 0)  # no substep is left yet
 
     @property
     def q(self) -> Array:
         """Joint positions [rad], shape (7,); as they are now, also later."""
+        self._is_taken = True
         return self._rows[0]
 
     @property
     def qd(self) -> Array:
         """Joint velocities [rad/s], shape (7,); as they are now, also later."""
+        self._is_taken = True
         return self._rows[1]
 
     @property
     def rotation(self) -> Array:
         """Frame 7 to terrain as it was when the cycle began, shape (3, 3)."""
-        return self._rotation.copy()
+        return self._rotation
 
     def move(self, q: Array) -> None:
         """Be at `q` [rad] with the velocities of now."""
@@ -124,15 +129,14 @@ class CompiledBody:
         """Return position, velocity and turning rate of the sole, nine numbers."""
         return self._motion.tolist()
 
-    def hand_motion(self) -> tuple[Vector3, Vector3]:
-        """Return position [m] and velocity [m/s] of the hand point."""
-        x, y, z = self._hand_at.tolist()
-        vx, vy, vz, _, _, _ = self._hand_rates.tolist()
-        return (x, y, z), (vx, vy, vz)
+    def linearise(self) -> HandView:
+        """Take positions and Jacobians anew, once per cycle; return what a hand feels.
 
-    def linearise(self) -> None:
-        """Take positions and Jacobians anew, once per cycle."""
+        Positions [m] and velocities [m/s] of sole and hand point, terrain frame.
+        """
         begin_cycle(self._bodies, self._rows)
+        ax, ay, az, x, y, z, vx, vy, vz, _, _, _, bx, by, bz = self._felt.tolist()
+        return HandView((x, y, z), (vx, vy, vz), (ax, ay, az), (bx, by, bz))
 
     def begin_cycle(self, load: HandLoad, t_ns: int) -> None:
         """Take anew what stays as it is for 2 ms from `t_ns` on."""
@@ -145,13 +149,15 @@ class CompiledBody:
         if terrain is not None and not isinstance(terrain, CompiledGround):
             self._go_on_given(steps, terrain)
             return
-        self._rows = rows = self._rows.copy()  # what was taken of the old ones stays
-        self._left[0] = steps
+        if self._is_taken:  # what was taken of the old ones stays
+            self._rows, self._is_taken = self._rows.copy(), False
+        bodies, rows = self._bodies, self._rows
         if terrain is None:
-            go_on(self._bodies, self._no_ground, rows)
+            go_on(bodies, self._no_ground, rows, steps)
             return
-        while (event := go_on(self._bodies, terrain.records, rows)) != DONE:
+        while (event := go_on(bodies, terrain.records, rows, steps)) != DONE:
             terrain.draw(event, float(self._motion[0]))
+            steps = 0
 
     def _go_on_given(self, steps: int, terrain: Terrain) -> None:
         """Go on over a ground that Python steps."""
@@ -160,11 +166,11 @@ class CompiledBody:
             x, y, z, vx, vy, vz, wx, wy, wz = self._motion.tolist()
             motion = (x, y, z, vx, vy, vz, wx, wy, wz)
             self._given["contact"] = terrain.step(dt, motion)
-            self._rows, self._left[0] = self._rows.copy(), 1
-            go_on(self._bodies, self._given, self._rows)
+            self._rows = self._rows.copy()
+            go_on(self._bodies, self._given, self._rows, 1)
 
-    def take_ground(self) -> list[float]:
-        """Return the sum of the ground's wrenches since it was taken last, six."""
-        taken = self._sum.tolist()
-        self._sum[:] = 0.0
-        return taken
+    def end_cycle(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Return the sum of the ground's wrenches in the cycle, six, and `motion`."""
+        ended = self._ended.tolist()
+        self._sum.fill(0.0)
+        return ended[:6], ended[9:]

@@ -1,6 +1,7 @@
 # pyright: basic
 """What the gauges in the wrist feel, by the equations of `fakes.plant.gauges`."""
 
+from collections.abc import Sequence
 from struct import Struct
 
 import numpy as np
@@ -9,9 +10,9 @@ from fakes.kernels import inline, kernel
 from fakes.plant.gauges import Wrench, WristGauges
 from wam.model import GRAVITY, Array, Tool
 
-_TAKEN = Struct("18d")
-# Force and moment of the ground, rates of the foot before and now, what is up; the same
-# in the frame of the sensor, with accelerations in the place of the rates before.
+_TAKEN = Struct("12d")
+# Force and moment of the ground, rates of the foot now and before, what is up; in the
+# frame of the sensor: force and moment, accelerations, rates now, what is up.
 _GAUGES = np.dtype(
     [
         ("taken", float, (7, 3)),
@@ -44,9 +45,15 @@ class CompiledGauges(WristGauges):
             records[name][0] = getattr(self, f"_{name}")
         self._shown = records["shown"][0]
 
+    def end_cycle(
+        self, rotation: Array, ground: Sequence[float], rates: Sequence[float]
+    ) -> None:
+        """Take what happened in a cycle; see `WristGauges.end_cycle`."""
+        _TAKEN.pack_into(self._bytes, 0, *ground, *rates)
+        _feel(self._records, rotation)
+        self._load = None
+
     def _compute(self) -> Wrench:
-        _TAKEN.pack_into(self._bytes, 0, *self._ground, *self._before, *self._rates)
-        _feel(self._records, self._rotation)
         fx, fy, fz, tx, ty, tz = self._shown.tolist()
         return fx, fy, fz, tx, ty, tz
 
@@ -66,8 +73,9 @@ def _feel(records, rotation):
     g = records[0]
     for k in range(3):
         for i in (2, 3):
-            g.felt[i, k] = (g.taken[i + 2, k] - g.taken[i, k]) / g.period
-        for i in (0, 1, 4, 5, 6):
+            g.felt[i, k] = (g.taken[i, k] - g.taken[i + 2, k]) / g.period
+            g.felt[i + 2, k] = g.taken[i + 2, k] = g.taken[i, k]
+        for i in (0, 1, 6):
             g.felt[i, k] = g.taken[i, k]
     for i in range(7):
         x, y, z = g.felt[i, 0], g.felt[i, 1], g.felt[i, 2]

@@ -41,6 +41,7 @@ _OF_A_CYCLE = [
     ("midway", float),  # into the cycle, where the Jacobians are taken [s]
     ("A", float, (12, 7)),
     ("foot_rotation", float, (3, 3)),
+    ("sum", float, (6,)),  # of the ground's wrench in the cycle
     ("hand_at", float, (3,)),
     ("motion", float, (9,)),  # of the sole, see fakes.ground.contact
     ("hand_rates", float, (6,)),

@@ -27,7 +27,6 @@ BODY = np.dtype(
         # Force on the hand with the weight that the person carries, stiffness and
         # damping of the grip [N m/rad, N m s/rad].
         ("hand_load", float, (5,)),
-        ("sum", float, (6,)),  # of the ground's wrench
         ("left", np.int64),  # substeps
     ],
     align=True,
@@ -41,9 +40,14 @@ def begin_cycle(bodies, rows):
 
 
 @kernel
-def go_on(bodies, grounds, rows):
-    """Go on by the substeps that are left; return what a ground's step waits for."""
+def go_on(bodies, grounds, rows, steps):
+    """Go on by `steps`, or by what is left of them (0).
+
+    Return what a ground's step waits for.
+    """
     b, g = bodies[0], grounds[0]
+    if steps:
+        b.left = steps
     if b.is_driven:
         take_sent(b)
     if b.is_fresh:
