@@ -4,14 +4,19 @@ import ctypes
 import errno
 import gc
 import os
+import struct
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 _MCL_CURRENT, _MCL_FUTURE = 1, 2
 _NEEDS = {
     "SCHED_FIFO": "root, CAP_SYS_NICE or `ulimit -r`",
     "memory locked": "root, CAP_IPC_LOCK or `ulimit -l unlimited`",
+    "processors awake": "root or a udev rule for /dev/cpu_dma_latency",
 }
+_LATENCY = Path("/dev/cpu_dma_latency")  # longest wake-up that is allowed [us]
+_NO_SLEEP = struct.pack("=i", 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +28,15 @@ class RealtimeRequest:
         core: processor to stay on; None = any.
         nice: for ordinary scheduling.
         is_locked: keep all memory resident and let no garbage collector run.
+        is_awake: let no processor sleep so deeply that it wakes late, as long as the
+            process lives; not asked of a kernel whose processors never sleep.
     """
 
     priority: int = 0
     core: int | None = None
     nice: int = 0
     is_locked: bool = False
+    is_awake: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +79,8 @@ def request(wanted: RealtimeRequest) -> list[Grant]:
         gc.freeze()
         gc.disable()
         grants.append(_try("memory locked", _lock_memory))
+    if wanted.is_awake and _LATENCY.exists():
+        grants.append(_try("processors awake", _stay_awake))
     return grants
 
 
@@ -97,6 +107,14 @@ def _lock_memory() -> None:
     if libc.mlockall(_MCL_CURRENT | _MCL_FUTURE):
         number = ctypes.get_errno()
         raise OSError(number, os.strerror(number))
+
+
+def _stay_awake() -> None:
+    """Ask for wake-ups without delay; the kernel forgets it with the descriptor.
+
+    It stays open until the process ends, and no child inherits it.
+    """
+    os.write(os.open(_LATENCY, os.O_WRONLY), _NO_SLEEP)
 
 
 def _try(what: str, call: Callable[[], object]) -> Grant:

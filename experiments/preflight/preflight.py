@@ -242,7 +242,7 @@ def _check_rights(rig: Rig, add: Add) -> dict[str, str]:
             if not g.is_granted
         ]
     if fields:
-        text = "; ".join(refused) or "real-time scheduling, memory locked"
+        text = "; ".join(refused) or "real-time scheduling, memory locked, awake"
         add(WARNING if refused else GOOD, "scheduler", text)
     return fields
 

@@ -78,7 +78,8 @@ class ControlWorker:
         self._loop_server: LoopServer | None = None
         self._is_orphaned = False
         signal.signal(signal.SIGTERM, self._note_orphaned)
-        wish = RealtimeRequest(CONTROL_PRIORITY, settings.get("core"), is_locked=True)
+        core = settings.get("core")
+        wish = RealtimeRequest(CONTROL_PRIORITY, core, is_locked=True, is_awake=True)
         self._grants = request(wish)
 
     def serve(self) -> None:

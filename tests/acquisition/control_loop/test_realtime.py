@@ -1,5 +1,6 @@
 import errno
 import os
+from pathlib import Path
 
 import pytest
 
@@ -55,3 +56,45 @@ def test_the_loop_has_a_core_of_its_own_where_there_are_two(
 ):
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: allowed)
     assert choose_cores() == chosen
+
+
+def test_processors_are_kept_awake_by_a_descriptor_that_stays_open(
+    tmp_path, monkeypatch
+):
+    device = tmp_path / "cpu_dma_latency"
+    device.write_bytes(b"")
+    opened = []
+
+    def keep(path, flags, *rest):
+        opened.append(real_open(path, flags, *rest))
+        return opened[-1]
+
+    real_open = os.open
+    monkeypatch.setattr(os, "open", keep)
+    monkeypatch.setattr("acquisition.control_loop.realtime._LATENCY", device)
+    (grant,) = request(RealtimeRequest(is_awake=True))
+    assert (grant.what, grant.is_granted) == ("processors awake", True)
+    assert device.read_bytes() == bytes(4)  # 0 us, as the kernel reads it
+    (descriptor,) = opened
+    assert os.fstat(descriptor).st_size == 4
+    assert not os.get_inheritable(descriptor)
+    os.close(descriptor)
+
+
+def test_sleep_that_may_not_be_forbidden_is_named_with_what_it_needs(monkeypatch):
+    def refuse(*_):
+        raise OSError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(os, "open", refuse)
+    monkeypatch.setattr("acquisition.control_loop.realtime._LATENCY", Path(__file__))
+    (grant,) = request(RealtimeRequest(is_awake=True))
+    assert not grant.is_granted
+    assert "EACCES" in grant.reason
+    assert "udev" in grant.reason
+
+
+def test_a_kernel_without_sleep_is_asked_for_nothing(monkeypatch, tmp_path):
+    monkeypatch.setattr(
+        "acquisition.control_loop.realtime._LATENCY", tmp_path / "nothing"
+    )
+    assert request(RealtimeRequest(is_awake=True)) == []
