@@ -18,10 +18,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from acquisition import available_cores
 from analysis.figures import PAGE_ORDER, Picture, ReportSection
 from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
 from analysis.report.page_model import ReportFigure, ShownNumbers
-from analysis.study import Store, Study, available_cores, run_tasks
+from analysis.study import Store, Study, run_tasks
 
 if TYPE_CHECKING:
     from analysis.figures import FigureSpec

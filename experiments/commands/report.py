@@ -23,6 +23,12 @@ EXAMPLES = """\
   traction report S012                             one session, in its own folder
   traction report --all --what-if smoothing=25     the study under another choice"""
 
+_WORK = (  # what fits and figures need, the first needed first
+    *("analysis.breakaway.fitting", "analysis.study.relatives", "analysis.study.store"),
+    *("analysis.foresight.judged", "analysis.terrains.export", "analysis.report.page"),
+    *("matplotlib.backends.backend_agg", "analysis.figures.curves"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `report`."""
@@ -42,6 +48,9 @@ def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     import json
 
+    from acquisition import prepare_workers
+
+    prepare_workers(_WORK)
     from experiments.operator import Console, PageRecorder
     from experiments.report import (
         ReportRequest,
