@@ -26,7 +26,7 @@ EXAMPLES = """\
 _WORK = (  # what fits and figures need, the first needed first
     *("analysis.breakaway.fitting", "analysis.study.relatives", "analysis.study.store"),
     *("analysis.foresight.judged", "analysis.terrains.export", "analysis.report.page"),
-    *("matplotlib.backends.backend_agg", "analysis.figures.curves"),
+    *("scipy.signal", "matplotlib.backends.backend_agg", "analysis.figures.curves"),
 )
 
 
