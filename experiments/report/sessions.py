@@ -52,13 +52,13 @@ from experiments.report.truth_errors import (
     truth_tables,
 )
 from experiments.session import (
+    FOLDS,
     SessionFolder,
     iso_utc,
     photos_of,
     write_new_text,
 )
 
-FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 REPORTED = (*FITTERS, GP_SE_NOISE, GP_SE_TRIAL)  # Fig. 9, and those beyond the paper
 EXPORTED = (*FITTERS, GP_SE_TRIAL)
 
