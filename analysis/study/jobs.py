@@ -1,4 +1,4 @@
-"""The one door to dask: independent tasks on cores or on a cluster."""
+"""The one door to dask, by joblib: independent tasks on cores or on a cluster."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
@@ -255,19 +255,19 @@ def _on_cluster(
 
     Tasks that are shared go to every worker once.
     """
-    from distributed import KilledWorker, as_completed
+    from distributed import KilledWorker
+    from joblib import Parallel, delayed, parallel_config
 
+    shared = _shared(batches)
+    calls = _calls(batches, left, _taken, shared)
     with _client(address) as client:
-        shared = {
-            k: client.scatter([tasks], broadcast=True, hash=False)[0]
-            for k, tasks in _shared(batches).items()
-        }
-        calls = _calls(batches, left, _taken, shared)
-        futures = [client.submit(*call, pure=False) for call in calls]
-        try:
-            yield from (result for _, result in as_completed(futures, True))
-        except KilledWorker as error:
-            raise WorkerLostError from error
+        scattered = list(shared.values()) or None
+        with parallel_config("dask", client=client, scatter=scattered):
+            parallel: Any = Parallel(return_as="generator_unordered")
+            try:
+                yield from parallel(delayed(call)(*of) for call, *of in calls)
+            except KilledWorker as error:
+                raise WorkerLostError from error
 
 
 def _taken(
