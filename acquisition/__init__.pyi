@@ -49,6 +49,15 @@ from .settings import (
 )
 from .simulation import DeviceServer, ServedDevices, SimulationControl, TruthSource
 from .temporary_folders import remove_abandoned, temporary_folder
+from .worker_processes import (
+    WorkerLostError,
+    available_cores,
+    prepare_workers,
+    read_shared,
+    run_calls,
+    running_workers,
+    shared_file,
+)
 
 __all__ = [
     "CYCLE",
@@ -94,10 +103,12 @@ __all__ = [
     "Vector",
     "Vector3",
     "Whole",
+    "WorkerLostError",
     "WrenchSample",
     "WrenchSensor",
     "are_between",
     "are_within",
+    "available_cores",
     "control_loop",
     "encode_log",
     "encode_string",
@@ -105,10 +116,15 @@ __all__ = [
     "keep_memory",
     "openblas_settings",
     "parse_toml",
+    "prepare_workers",
+    "read_shared",
     "read_text",
     "recording",
     "remove_abandoned",
+    "run_calls",
+    "running_workers",
     "schema_text",
+    "shared_file",
     "temporary_folder",
     "trial_file",
     "utc_offset_ns",

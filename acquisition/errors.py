@@ -1,6 +1,7 @@
 """The errors of Traction: one root, one child per kind of failure."""
 
 from pathlib import Path
+from typing import Any
 
 
 class TractionError(Exception):
@@ -25,11 +26,19 @@ class TractionError(Exception):
         self.arm_state = arm_state
         self.saved = saved
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let another process raise it here, whatever its constructor takes."""
+        return _restored, (type(self), self.args), vars(self)
+
     def __str__(self) -> str:
         arm = f"ARM: {self.arm_state}." if self.arm_state else ""
         return " ".join(
             part for part in (self.message, arm, self.hint, self.saved) if part
         )
+
+
+def _restored(kind: type[TractionError], args: tuple[object, ...]) -> TractionError:
+    return Exception.__new__(kind, *args)
 
 
 class SettingsError(TractionError):

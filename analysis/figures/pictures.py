@@ -49,22 +49,21 @@ def png_of_few_colours(pixels: Pixels, dpi: int) -> bytes:
         dpi: pixels per inch, for the file.
     """
     packed = np.ascontiguousarray(pixels).view("<u4")[..., 0] & _WHITE
-    drawn = np.flatnonzero(packed != _WHITE)  # a tenth of a figure: the rest is paper
-    inks = packed.ravel()[drawn]
+    flat = packed.ravel()
+    begins = np.flatnonzero(flat[1:] != flat[:-1]) + 1
+    starts = np.concatenate([[0], begins])  # of runs of one colour, a tenth of a figure
+    lengths = np.diff(starts, append=flat.size)
+    inks = flat[starts].astype(np.intp)
     seen = np.zeros(_WHITE + 1, dtype=np.bool_)
     seen[inks] = True
-    seen[_WHITE] = drawn.size < packed.size
     colours = np.flatnonzero(seen)
-    number = np.empty(seen.size, dtype=np.int32)
+    number = np.empty(seen.size, dtype=np.intp)
     number[colours] = np.arange(colours.size)
     numbers = number[inks]
-    counts = np.bincount(numbers, minlength=colours.size)
-    if seen[_WHITE]:  # the last: it is the largest number
-        counts[-1] = packed.size - drawn.size
+    counts = np.bincount(numbers, weights=lengths).astype(np.intp)
     shades = np.column_stack([colours, colours >> 8, colours >> 16]).astype(np.uint8)
     palette, places = _palette(shades, counts)
-    indices = np.full(packed.shape, places[-1])
-    indices.ravel()[drawn] = places[numbers]
+    indices = np.repeat(places[numbers], lengths).reshape(packed.shape)
     image = Image.fromarray(indices, "P")
     image.putpalette(palette.tobytes())
     png = io.BytesIO()

@@ -103,10 +103,63 @@ class GroundModel:
     surfaces: tuple[tuple[int, RidgeLogistic], ...]
 
 
+class SurfaceRecogniser:
+    """Probability of rocky ground, sliding tick by sliding tick.
+
+    Attributes:
+        window: the last sliding ticks.
+    """
+
+    __slots__ = ("_is_asked_early", "_judged", "_rocky", "_surfaces", "window")
+
+    def __init__(
+        self, surfaces: Sequence[tuple[int, RidgeLogistic]], slid: int = 0
+    ) -> None:
+        """Begin without a tick.
+
+        Args:
+            surfaces: as of `GroundModel`.
+            slid: ticks that the foot has slid since it was set down.
+        """
+        self._surfaces, self.window = surfaces, GroundWindow(slid)
+        self._rocky: float | None = None
+        self._judged = 0  # ticks of the window when it was judged
+        # the shortest window alone keeps its last answer of the first 0.5 s
+        self._is_asked_early = [size for size, _ in surfaces] == [WINDOWS[0]]
+
+    def push(self, tick: int, v: float, F_t: float, F_n: float) -> None:
+        """Take a sliding tick; arguments as of `GroundWindow.push`."""
+        self.window.push(tick, v, F_t, F_n)
+        if self._is_asked_early:
+            self._judge()
+
+    @property
+    def rocky(self) -> float | None:
+        """Probability of rocky ground; None before 0.25 s of sliding."""
+        if self._judged != self.window.count:
+            self._judge()
+        return self._rocky
+
+    def _judge(self) -> None:
+        """Take the surer of the windows of 0.5 and 1 s; the first 0.25 s before."""
+        self._judged = count = self.window.count
+        best = None
+        for size, regression in self._surfaces:
+            if size > count:
+                break
+            if size == WINDOWS[0] and count >= WINDOWS[1]:
+                continue
+            p = regression.probability(self.window.features(size))
+            if best is None or abs(p - 0.5) >= abs(best - 0.5) or size == WINDOWS[1]:
+                best = p
+        if best is not None:
+            self._rocky = best
+
+
 class GroundRecogniser:
     """Probability of every known terrain, sliding tick by sliding tick."""
 
-    __slots__ = ("_model", "_odds", "_recent", "_rocky", "_sums", "_window")
+    __slots__ = ("_model", "_odds", "_recent", "_sums", "_surface")
 
     def __init__(self, model: GroundModel) -> None:
         self._model = model
@@ -118,30 +171,29 @@ class GroundRecogniser:
 
     def forget(self) -> None:
         """Forget the ground but not that the foot has slid: samples were lost."""
-        self._begin(slid=self._window.slid)
+        self._begin(slid=self.window.slid)
 
     def _begin(self, slid: int) -> None:
         count = len(self._model.laws)
         self._odds = [0.0] * count
         self._sums = [0.0] * count
         self._recent: list[tuple[float, ...]] = []
-        self._window = GroundWindow(slid)
-        self._rocky: float | None = None
+        self._surface = SurfaceRecogniser(self._model.surfaces, slid)
 
     @property
     def is_informed(self) -> bool:
         """Whether the foot has slid for 0.25 s since the beginning."""
-        return self._window.count >= WINDOWS[0]
+        return self.window.count >= WINDOWS[0]
 
     @property
     def rocky(self) -> float | None:
         """Probability of rocky ground; None before 0.25 s of sliding."""
-        return self._rocky
+        return self._surface.rocky
 
     @property
     def window(self) -> GroundWindow:
         """The last sliding ticks."""
-        return self._window
+        return self._surface.window
 
     def push(self, tick: int, v: float, F_t: float, F_n: float) -> None:
         """Take a sliding tick; arguments as of `GroundWindow.push`."""
@@ -158,27 +210,12 @@ class GroundRecogniser:
         most = max(odds)
         for k, value in enumerate(odds):  # the largest is kept at zero
             odds[k] = max(value - most, -_BOUND)
-        self._window.push(tick, v, F_t, F_n)
-        self._judge_surface()
-
-    def _judge_surface(self) -> None:
-        """Take the surer of the windows of 0.5 and 1 s; the first 0.25 s before."""
-        count, best = self._window.count, None
-        for size, regression in self._model.surfaces:
-            if size > count:
-                break
-            if size == WINDOWS[0] and count >= WINDOWS[1]:
-                continue
-            p = regression.probability(self._window.features(size))
-            if best is None or abs(p - 0.5) >= abs(best - 0.5) or size == WINDOWS[1]:
-                best = p
-        if best is not None:
-            self._rocky = best
+        self._surface.push(tick, v, F_t, F_n)
 
     def probabilities(self) -> tuple[list[float], float]:
         """Return the probability of every terrain, and that it is none of them."""
         weights = [exp(value) for value in self._odds]
-        laws, rocky = self._model.laws, self._rocky
+        laws, rocky = self._model.laws, self.rocky
         if rocky is not None:
             share = {"rocky": rocky, "flat": 1.0 - rocky}
             totals = dict.fromkeys(share, 0.0)

@@ -49,12 +49,14 @@ class _Sums:
         self.values = [0.0] * 11
 
     def add(self, terms: Sequence[float], dropped: Sequence[float] | None) -> None:
-        values = self.values
-        for k, term in enumerate(terms):
-            values[k] += term
-        if dropped is not None:
-            for k, term in enumerate(dropped):
-                values[k] -= term
+        pairs = zip(self.values, terms, strict=True)
+        if dropped is None:
+            self.values = [value + term for value, term in pairs]
+        else:
+            self.values = [
+                value + term - old
+                for (value, term), old in zip(pairs, dropped, strict=True)
+            ]
 
 
 class GroundWindow:

@@ -10,7 +10,7 @@ it runs.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,18 +45,16 @@ class RidgeLogistic:
 
     def probability(self, features: Sequence[float]) -> float:
         """Return the probability of one row of features, shape (n,)."""
-        weights = self.weights
+        weights = iter(self.weights)
         z: list[float] = []
-        logit, at = weights[0], 1
+        logit = next(weights)
         for value, mean, scale in zip(features, self.mean, self.scale, strict=True):
             step = (value - mean) / scale
             step = _REACH if step > _REACH else -_REACH if step < -_REACH else step
             z.append(step)
-            logit += weights[at] * step
-            at += 1
-        for i, j in self.pairs:
-            logit += weights[at] * z[i] * z[j]
-            at += 1
+            logit += next(weights) * step
+        for (i, j), weight in zip(self.pairs, weights, strict=True):
+            logit += weight * z[i] * z[j]
         if logit > _LARGEST_LOGIT:
             logit = _LARGEST_LOGIT
         elif logit < -_LARGEST_LOGIT:
@@ -137,13 +135,12 @@ def fit_logistic(
     w = np.zeros(design.shape[1])
     share = float(weight @ truth) / float(weight.sum())
     w[0] = np.log(share / (1.0 - share))
+    place = loss.at(w)
     for _ in range(_STEPS):
-        after = loss.improved(w)
-        is_done = float(np.abs(after - w).max()) < _CONVERGED
-        w = after
-        if is_done:
+        before, place = place, loss.improved(place)
+        if float(np.abs(place.w - before.w).max()) < _CONVERGED:
             break
-    columns = (mean, scale, w)
+    columns = (mean, scale, place.w)
     plain_mean, plain_scale, plain_w = (tuple(c.tolist()) for c in columns)
     return RidgeLogistic(plain_mean, plain_scale, pairs, plain_w)
 
@@ -163,6 +160,14 @@ def _design(features: Array, mean: Array, scale: Array, pairs: Pairs) -> Array:
     return np.column_stack([np.ones(len(z)), z, *products])
 
 
+class _Place(NamedTuple):
+    """Weights, what they say of every row, and what is lost with them."""
+
+    w: Array
+    logit: Array
+    loss: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Loss:
     """Weighted log loss with a ridge.
@@ -179,20 +184,20 @@ class _Loss:
     weight: Array
     penalty: Array
 
-    def value(self, w: Array) -> float:
+    def at(self, w: Array) -> _Place:
         logit = self.design @ w
         lost = np.logaddexp(0.0, np.where(self.truth, -logit, logit))
-        return float(self.weight @ lost + 0.5 * self.penalty @ w**2)
+        loss = float(self.weight @ lost + 0.5 * self.penalty @ w**2)
+        return _Place(w, logit, loss)
 
-    def improved(self, w: Array) -> Array:
+    def improved(self, place: _Place) -> _Place:
         """Return the weights after a Newton step, halved until nothing is lost."""
-        p = _logistic(self.design @ w)
+        w, p = place.w, _logistic(place.logit)
         gradient = self.design.T @ (self.weight * (p - self.truth)) + self.penalty * w
         bend = (self.design.T * (self.weight * p * (1.0 - p))) @ self.design
         step = np.linalg.solve(bend + np.diag(self.penalty), gradient)
-        before = self.value(w)
         for halvings in range(_HALVINGS):
-            after = w - 0.5**halvings * step
-            if self.value(after) <= before:
+            after = self.at(w - 0.5**halvings * step)
+            if after.loss <= place.loss:
                 return after
-        return w
+        return place

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.foresight.calibration import calibration_error
-from analysis.foresight.ground import GroundModel, GroundRecogniser
+from analysis.foresight.ground import GroundModel, SurfaceRecogniser
 from analysis.foresight.ticks import ForesightRun, TrialTicks, leads_of, ticks_of
 from analysis.foresight.watching import (
     FLAT_SURFACE,
@@ -199,16 +199,15 @@ def _judge_trial(
     """Add the answers of a trial, from its beginning and begun anew every second."""
     is_rocky, slid = trial.surface == ROCKY_SURFACE, _slid(trial)
     first = _first_run([tick.tick for tick in slid])
-    recogniser = GroundRecogniser(model)
+    recogniser = SurfaceRecogniser(model.surfaces)
     asked = {first + moment: k for k, moment in enumerate(MOMENTS)}
-    for count, tick in enumerate(slid, 1):
+    for count, tick in enumerate(slid[: first + MOMENTS[-1]], 1):
         recogniser.push(*tick)
         if count in asked and recogniser.rocky is not None:
             right = (recogniser.rocky > 0.5) == is_rocky
             answers.begun[asked[count]].append(right)
-    recogniser.reset()
     for start in range(0, len(slid) - MOMENTS[-1], MOMENTS[-1]):
-        recogniser.forget()
+        recogniser = SurfaceRecogniser(model.surfaces, slid=start)
         for count, tick in enumerate(slid[start : start + MOMENTS[-1]], 1):
             recogniser.push(*tick)
             if count in MOMENTS and recogniser.rocky is not None:
@@ -265,7 +264,7 @@ def _time_back(
     surface: str,
 ) -> float:
     """Return the time to 95 % on the surface that a foot slides onto [s]."""
-    recogniser = GroundRecogniser(model)
+    recogniser = SurfaceRecogniser(model.surfaces)
     for tick in before:
         recogniser.push(*tick)
     offset = before[-1].tick + 1 - after[0].tick

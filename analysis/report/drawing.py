@@ -14,21 +14,21 @@ from enum import Enum
 from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 
+from acquisition import available_cores
 from analysis.figures import PAGE_ORDER, Picture, ReportSection
 from analysis.report.foresight_page import FORESIGHT_KEY, foresight_figure
 from analysis.report.page_model import ReportFigure, ShownNumbers
-from analysis.study import Store, Study, available_cores, run_tasks
+from analysis.study import Store, Study, run_tasks
 
 if TYPE_CHECKING:
     from analysis.figures import FigureSpec
 
 _KEYS = (*PAGE_ORDER, FORESIGHT_KEY)
 _MOST_DRAWING = 4  # processes
-_EACH = 2  # batches of a process: figures take unlike times
 _MANY_TERRAINS = 2  # from which on they pay: the workers are there, of the fits
 _PLAIN = (type(None), bool, int, float, str, bytes, Enum)
 _DRAWN_BY = ("matplotlib", "numpy", "pillow")  # besides the analysis
@@ -44,34 +44,56 @@ def report_figures(shown: ShownNumbers, n_jobs: int = 1) -> list[ReportFigure]:
         shown: what they show.
         n_jobs: processes that draw; they share no figure, so pictures are the same.
     """
-    count = n_jobs if n_jobs == 1 else _EACH * n_jobs
-    batches = [FigureBatch(shown, k, count) for k in range(count)]
-    drawn: dict[str, ReportFigure] = {}
-    for batch in run_tasks(draw_batch, batches, n_jobs):
-        drawn |= {figure.picture.key: figure for figure in batch}
+    drawn = {
+        figure.picture.key: figure
+        for figure in run_tasks(draw_figure, FigureTasks(shown), n_jobs)
+        if figure is not None
+    }
     return [drawn[key] for key in _KEYS if key in drawn]
 
 
 @dataclass(frozen=True, slots=True)
-class FigureBatch:
-    """Figures that are drawn one after the other.
+class FigureTask:
+    """A figure to draw.
 
     Attributes:
-        shown: what they show.
-        first: number of its first figure.
-        step: from one of its figures to the next.
+        shown: what it shows.
+        key: which.
     """
 
     shown: ShownNumbers
-    first: int
-    step: int
+    key: str
 
 
-def draw_batch(batch: FigureBatch) -> list[ReportFigure]:
-    """Return the figures of a batch that there are numbers for."""
-    keys = _KEYS[batch.first :: batch.step]
-    figures = [_draw(key, batch.shown) for key in keys]
-    return [figure for figure in figures if figure is not None]
+class FigureTasks(Sequence[FigureTask]):
+    """Every figure, those first that take longest."""
+
+    def __init__(self, shown: ShownNumbers) -> None:
+        self._shown = shown
+
+    def __len__(self) -> int:
+        """Return the number of figures."""
+        return len(_KEYS)
+
+    @overload
+    def __getitem__(self, index: int) -> FigureTask: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[FigureTask]: ...
+    def __getitem__(self, index: int | slice) -> FigureTask | list[FigureTask]:
+        """Return a figure with what it shows."""
+        keys = _KEYS[::-1][index]
+        if isinstance(keys, str):
+            return FigureTask(self._shown, keys)
+        return [FigureTask(self._shown, key) for key in keys]
+
+    def outline(self, index: int) -> object:
+        """Return the key of the figure."""
+        return _KEYS[::-1][index]
+
+
+def draw_figure(task: FigureTask) -> ReportFigure | None:
+    """Return a figure; None where there are no numbers for it."""
+    return _draw(task.key, task.shown)
 
 
 def _draw(key: str, shown: ShownNumbers) -> ReportFigure | None:

@@ -67,7 +67,7 @@ def write_report(study: Study, out_dir: Path, context: ReportContext) -> Path:
     Raises:
         SettingsError: the folder cannot be written.
     """
-    results = compute_results(study, context.rig, context.break_away)
+    results = context.results or compute_results(study, context.rig)
     fits = json.dumps(all_numbers(results, context), allow_nan=False, indent=1)
     write_atomic(out_dir / "fits.json", fits.encode())
     table = to_csv(study, findings_rows(results))

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from analysis.breakaway import BreakAwayModel
 from analysis.figures import Picture, ReportSection
 from analysis.findings import RigTrial, StudyResults
 from analysis.foresight import ForesightCurves, ForesightModel
@@ -138,7 +137,7 @@ class ReportContext:
         foresight_curves: what a figure shows of it on held-out trials; None = nothing.
         photos: of the bed after the trials.
         with_pdf: figures are filed as PDF, too.
-        break_away: models of break-away by terrain; None = the report fits them.
+        results: what follows from the study; None = it is computed.
         store: results of earlier reports; None = everything is computed.
     """
 
@@ -156,7 +155,7 @@ class ReportContext:
     foresight_curves: ForesightCurves | None = None
     photos: Sequence[BedPhoto] = field(default=())
     with_pdf: bool = False
-    break_away: Mapping[str, BreakAwayModel] | None = None
+    results: StudyResults | None = None
     store: Store | None = None
 
     @property

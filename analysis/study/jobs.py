@@ -1,37 +1,31 @@
-"""The one door to joblib and dask: independent tasks on cores or on a cluster."""
+"""The one door to dask, by joblib: independent tasks on cores or on a cluster."""
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from ipaddress import ip_address
+from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 from urllib.parse import urlsplit
 
-from joblib import Parallel, delayed, parallel_config
-
-from acquisition import SettingsError, keep_memory
-
-
-class WorkerLostError(SettingsError):
-    """A process that worked on a task is gone: ended from outside."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            "A process that was fitting was ended from outside, as the system does "
-            "where memory runs out.",
-            hint="Close other programs and run the command again: fits that were "
-            "finished are kept.",
-        )
-
+from acquisition import (
+    SettingsError,
+    WorkerLostError,
+    available_cores,
+    keep_memory,
+    prepare_workers,
+    read_shared,
+    run_calls,
+    running_workers,
+    shared_file,
+)
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 Progress = Callable[[int, int], None]
 
 _FEW = 3  # tasks that cost less than starting workers
-_MAPPED = 20_000  # bytes of an array that is not copied into every task
+_FITTING = ("analysis.study.terrain_fit", "analysis.study.store")  # imports of workers
 _PATIENCE = 10.0  # s to reach a scheduler
 
 
@@ -96,22 +90,6 @@ class Store(Protocol):
     def put(self, task: Any, result: Any) -> None:  # noqa: ANN401
         """Keep a result."""
         ...
-
-
-def available_cores() -> int:
-    """Return the number of cores this process may use."""
-    return max(1, len(os.sched_getaffinity(0)))
-
-
-_started = [1]  # numbers of local processes that tasks were given to, and this one
-
-
-def running_workers() -> int:
-    """Return how many processes earlier tasks have started; 1 where there are none.
-
-    Tasks that take less time than starting them are worth giving to these only.
-    """
-    return min(max(_started), available_cores())
 
 
 def run_tasks(
@@ -194,41 +172,49 @@ def _stream(
     count = where.count(len(left))
     if not left:
         return
-    every = [batch.tasks for batch in batches]
-    shared: list[Any] = [tasks for tasks in every if isinstance(tasks, SharedTasks)]
-    calls: Iterable[Any] = (
-        delayed(_numbered)(batches[k].function, (k, n), every[k])
-        if isinstance(every[k], SharedTasks)
-        else delayed(_one_threaded)(batches[k].function, (k, n), every[k][n])
-        for k, n in left
-    )
     if where.scheduler is not None:
-        with _cluster(where.scheduler, shared):
-            yield from _parallel(calls)
+        yield from _on_cluster(where.scheduler, batches, left)
     elif count <= 1:
         yield from (
-            _one_threaded(batches[k].function, (k, n), every[k][n]) for k, n in left
+            _one_threaded(batches[k].function, (k, n), batches[k].tasks[n])
+            for k, n in left
         )
     else:
-        _started.append(count)
-        with parallel_config(
-            "loky", n_jobs=count, inner_max_num_threads=1, max_nbytes=_MAPPED
-        ):
-            yield from _parallel(calls)
+        shared = _shared(batches)
+        with shared_file(shared) if shared else nullcontext() as file:
+            files = dict.fromkeys(shared, file)
+            prepare_workers(_FITTING)
+            yield from run_calls(_calls(batches, left, _read_and_taken, files), count)
 
 
-def _numbered(
-    function: Callable[[Any], Any], place: Place, tasks: Sequence[Any]
+def _shared(batches: Sequence[Batch]) -> dict[int, Sequence[Any]]:
+    """Return the tasks that are shared, by the number of their batch."""
+    every = enumerate(batch.tasks for batch in batches)
+    return {k: tasks for k, tasks in every if isinstance(tasks, SharedTasks)}
+
+
+def _calls(
+    batches: Sequence[Batch],
+    left: Sequence[Place],
+    taking: Callable[..., Any],
+    shared: Mapping[int, Any],
+) -> list[Any]:
+    """Return what to call for every task left, and with what.
+
+    `taking` finds a shared task in what `shared` has for its batch.
+    """
+    return [
+        (taking, batches[k].function, (k, n), shared[k])
+        if k in shared
+        else (_one_threaded, batches[k].function, (k, n), batches[k].tasks[n])
+        for k, n in left
+    ]
+
+
+def _read_and_taken(
+    function: Callable[[Any], Any], place: Place, file: Path
 ) -> tuple[Place, Any]:
-    return _one_threaded(function, place, tasks[place[1]])
-
-
-def _parallel(calls: Iterable[Any]) -> Iterator[Any]:
-    stream: Any = Parallel(return_as="generator_unordered")(calls)
-    try:
-        yield from stream
-    except BrokenExecutor as error:
-        raise WorkerLostError from error
+    return _taken(function, place, read_shared(file)[place[0]])
 
 
 def _one_threaded(
@@ -262,13 +248,37 @@ def is_guarded(address: str) -> bool:
     return scheme == "tls" or is_loopback
 
 
-@contextmanager
-def _cluster(address: str, shared: Sequence[Any]) -> Iterator[None]:
-    """Send the tasks of the block to the Dask scheduler at `address`.
+def _on_cluster(
+    address: str, batches: Sequence[Batch], left: Sequence[Place]
+) -> Iterator[Any]:
+    """Yield (place, result) from the Dask scheduler at `address`.
 
-    What is `shared` by them goes to every worker once.
+    Tasks that are shared go to every worker once.
     """
-    from distributed import Client, KilledWorker
+    from distributed import KilledWorker
+    from joblib import Parallel, delayed, parallel_config
+
+    shared = _shared(batches)
+    calls = _calls(batches, left, _taken, shared)
+    with _client(address) as client:
+        scattered = list(shared.values()) or None
+        with parallel_config("dask", client=client, scatter=scattered):
+            parallel: Any = Parallel(return_as="generator_unordered")
+            try:
+                yield from parallel(delayed(call)(*of) for call, *of in calls)
+            except KilledWorker as error:
+                raise WorkerLostError from error
+
+
+def _taken(
+    function: Callable[[Any], Any], place: Place, tasks: Sequence[Any]
+) -> tuple[Place, Any]:
+    return _one_threaded(function, place, tasks[place[1]])
+
+
+def _client(address: str) -> Any:  # noqa: ANN401
+    """Return a connection to the Dask scheduler at `address`."""
+    from distributed import Client
 
     if not is_guarded(address):
         raise SettingsError(
@@ -278,15 +288,10 @@ def _cluster(address: str, shared: Sequence[Any]) -> Iterator[None]:
             "certificates in Dask's configuration, or leave --scheduler out.",
         )
     try:
-        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+        return Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SettingsError(
             f"No Dask scheduler answers at {address} within {_PATIENCE:.0f} s.",
             hint="Start one with `dask scheduler` and workers with `dask worker`, or "
             "leave --scheduler out.",
         ) from error
-    with client, parallel_config("dask", client=client, scatter=list(shared) or None):
-        try:
-            yield
-        except KilledWorker as error:
-            raise WorkerLostError from error

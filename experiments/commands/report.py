@@ -23,6 +23,12 @@ EXAMPLES = """\
   traction report S012                             one session, in its own folder
   traction report --all --what-if smoothing=25     the study under another choice"""
 
+_WORK = (  # what fits and figures need, the first needed first
+    *("analysis.breakaway.fitting", "analysis.study.relatives", "analysis.study.store"),
+    *("analysis.foresight.judged", "analysis.terrains.export", "analysis.report.page"),
+    *("scipy.signal", "matplotlib.backends.backend_agg", "analysis.figures.curves"),
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `report`."""
@@ -42,6 +48,11 @@ def run(args: argparse.Namespace) -> int:
     """Write the report of one session or of a study."""
     import json
 
+    if not args.scheduler and not _is_kept(Path(args.data)):
+        from acquisition import available_cores, prepare_workers
+
+        if available_cores() > 1:
+            prepare_workers(_WORK)  # first, as it imports while this process does
     from experiments.operator import Console, PageRecorder
     from experiments.report import (
         ReportRequest,
@@ -75,6 +86,18 @@ def run(args: argparse.Namespace) -> int:
     else:
         console.say(f"Open in a browser: {page}")
     return 0
+
+
+def _is_kept(data: Path) -> bool:
+    """Whether results have been kept since the last trial was recorded."""
+    from experiments.session import FOLDS
+
+    results, trials = [data / FOLDS], data.glob("sessions/*/trials")
+    kept, recorded = (
+        max((path.stat().st_mtime_ns for path in paths if path.is_dir()), default=0)
+        for paths in (results, trials)
+    )
+    return kept > recorded
 
 
 def _as_json(page: Path, sessions: list[str], missing: list[str]) -> str:

@@ -55,6 +55,7 @@ def study_foresight(
     trials: Mapping[str, Sequence[HeldTrial]],
     break_away: Mapping[str, BreakAwayModel],
     store: Store | None = None,
+    meanwhile: Callable[[], object] = lambda: None,
 ) -> StudyForesight:
     """Return what the trials of a study teach, and what that is worth on others.
 
@@ -63,10 +64,13 @@ def study_foresight(
         trials: of the study, by terrain; read anew where nothing is kept.
         break_away: models by terrain.
         store: outcomes of earlier reports.
+        meanwhile: called here, once or more, while other processes learn.
     """
     task = plan_judged(trials, study.kinds, break_away)
     judged = judged_foresight(
-        task, lambda: watched_trials(study, trials), store, study.options.n_jobs
+        task,
+        lambda: watched_trials(study, trials),
+        *(store, study.options.n_jobs, meanwhile),
     )
     if judged.curves is None:
         return StudyForesight(judged.model, (), {})
@@ -98,6 +102,7 @@ def judged_foresight(
     watched: Callable[[], Sequence[WatchedTrial]],
     store: Store | None,
     n_jobs: int | None = 1,
+    meanwhile: Callable[[], object] = lambda: None,
 ) -> JudgedForesight:
     """Return what trials teach and what that is worth; from the store where it is kept.
 
@@ -106,11 +111,17 @@ def judged_foresight(
         watched: gives its trials, watched; called only where nothing is kept.
         store: outcomes of earlier reports.
         n_jobs: processes; one per core where it is None.
+        meanwhile: called here, once or more, while other processes learn.
     """
     kept = None if store is None else store.get(task)
     if isinstance(kept, JudgedForesight):
         return kept
-    outcome = judge(watched(), task.break_away, partial(run_tasks, workers=n_jobs))
+
+    def learning(_done: int, _total: int) -> None:
+        meanwhile()
+
+    run = partial(run_tasks, workers=n_jobs, progress=learning)
+    outcome = judge(watched(), task.break_away, run)
     if store is not None:
         store.put(task, outcome)
     return outcome

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 
 from acquisition import SessionError, SettingsError, SystemClock, TrialFileError
 from analysis.data import load_trial, summed_up, terrain_kind
-from analysis.findings import HeldTrial, TrialFiles, with_tares
+from analysis.findings import HeldTrial, TrialFiles, compute_results, with_tares
 from analysis.foresight import JUDGED_TYPES, fit_foresight
 from analysis.report import (
     DRAWN_TYPES,
@@ -52,13 +53,13 @@ from experiments.report.truth_errors import (
     truth_tables,
 )
 from experiments.session import (
+    FOLDS,
     SessionFolder,
     iso_utc,
     photos_of,
     write_new_text,
 )
 
-FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 REPORTED = (*FITTERS, GP_SE_NOISE, GP_SE_TRIAL)  # Fig. 9, and those beyond the paper
 EXPORTED = (*FITTERS, GP_SE_TRIAL)
 
@@ -252,10 +253,13 @@ def report_sessions(
     break_away = break_away_of(study, store)
     variants = order.choices.variants
     others = repeat_study(study, analysed.files, variants, console, store)
-    foresight = study_foresight(study, trials, break_away, store)
+    every = [trial for group in trials.values() for trial in group]
+    rig = with_tares([trial.health for trial in every], every)
+    findings = cache(partial(compute_results, study, rig, break_away))
+    foresight = study_foresight(study, trials, break_away, store, findings)
     own = sessions[0].path if len(sessions) == 1 else data / "study"
     context = _context(sessions, order, analysed, foresight, others)
-    context = replace(context, break_away=break_away, store=store)
+    context = replace(context, rig=rig, results=findings(), store=store)
     page = write_report(study, order.out or own, context)
     console.table(*summary_table(study))
     return page
@@ -271,10 +275,10 @@ def _context(
     """Return what the report shows beyond the study."""
     study, trials = analysed.study, analysed.trials
     photos, unsound = photos_of(sessions)
-    every = [trial for group in trials.values() for trial in group]
+    count = sum(len(group) for group in trials.values())
     return ReportContext(
         title="Traction " + (sessions[0].id if len(sessions) == 1 else "study"),
-        subtitle=f"{len(every)} trials on {', '.join(trials)}",
+        subtitle=f"{count} trials on {', '.join(trials)}",
         is_simulated=study.simulated,
         is_foreign=False,
         generated_utc=iso_utc(SystemClock().utc_ns()),
@@ -290,7 +294,6 @@ def _context(
         },
         warnings=[*order.missing, *analysed.problems, *unsound],
         photos=[BedPhoto(*photo) for photo in photos],
-        rig=with_tares([trial.health for trial in every], every),
         foresight=foresight.model if len(sessions) > 1 else None,
         foresight_curves=foresight.curves,
         with_pdf=order.with_pdf,

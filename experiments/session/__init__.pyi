@@ -48,6 +48,7 @@ from .stance_task import (
 )
 from .states import Event, SessionPhase, table_lines
 from .store import (
+    FOLDS,
     JOURNAL_FILE,
     SessionFolder,
     create_session,
@@ -70,6 +71,7 @@ from .unfinished import (
 )
 
 __all__ = [
+    "FOLDS",
     "JOURNAL_FILE",
     "KEEP",
     "LOCK_FILE",

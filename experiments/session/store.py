@@ -31,6 +31,7 @@ from experiments.session.data_files import (
 )
 
 JOURNAL_FILE, STANCE_FILE = "events.jsonl", "stance.json"
+FOLDS = ".folds"  # below the data: finished folds, so that a study resumes
 _FOLDER = re.compile(
     r"^(?P<date>\d{4}-\d\d-\d\d)_(?P<id>S\d{3,})_(?P<terrain>[A-Za-z0-9-]+)"
     r"(?P<fake>\.fake)?$"

@@ -1,10 +1,12 @@
 import os
 import signal
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from acquisition import TrialFileError
 from analysis.study.jobs import (
     Batch,
     WorkerLostError,
@@ -43,6 +45,17 @@ def test_no_tasks_are_no_trouble():
 def test_an_error_in_a_task_is_not_swallowed():
     with pytest.raises(ValueError, match="7"):
         run_tasks(fail, [7], 1)
+
+
+def miss(number):
+    raise TrialFileError(Path(f"T0{number}.mcap"), "is no trial", hint="Leave it out.")
+
+
+def test_an_error_of_a_worker_keeps_what_it_says():
+    with pytest.raises(TrialFileError, match=r"mcap: is no trial") as caught:
+        run_tasks(miss, [1, 2, 3, 4], 2)
+    assert caught.value.path.name in {"T01.mcap", "T02.mcap", "T03.mcap", "T04.mcap"}
+    assert (caught.value.reason, caught.value.hint) == ("is no trial", "Leave it out.")
 
 
 def end_at_three(number):
@@ -106,6 +119,16 @@ def test_tasks_of_one_body_of_data_are_known_by_their_numbers(n_jobs):
 def test_workers_map_the_data_that_tasks_share():
     *_, last = run_tasks(total, Sums(np.arange(50_000.0)), 2)
     assert last == (10.0, "memmap")
+
+
+def itself(values):
+    return values
+
+
+def test_what_workers_map_comes_back_as_a_plain_array():
+    *_, last = run_tasks(itself, Sums(np.arange(50_000.0)), 2)
+    assert type(last) is np.ndarray
+    assert last.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 @pytest.mark.parametrize("n_jobs", [1, 2])

@@ -1,6 +1,9 @@
+import os
 import subprocess
 import sys
 from pathlib import Path
+
+from experiments.__main__ import main
 
 _NAMES_LOADED = (
     "import sys; from experiments.__main__ import main; "
@@ -23,3 +26,20 @@ def test_to_verify_loads_no_library_of_reports(tmp_path: Path):
     loaded = loaded_by("verify", "--all", "--data", str(tmp_path))
     assert "experiments.commands.verify" in loaded
     assert not loaded & {"matplotlib", "pinocchio", "scipy", "jinja2", "analysis.study"}
+
+
+def test_a_report_prepares_workers_unless_its_results_are_kept(tmp_path, monkeypatch):
+    prepared = []
+    monkeypatch.setattr("acquisition.prepare_workers", prepared.append)
+    monkeypatch.setattr("acquisition.available_cores", lambda: 2)
+    trials = tmp_path / "sessions" / "2026-01-01_S001_S0.fake" / "trials"
+    trials.mkdir(parents=True)
+    report = ["report", "--all", "--data", str(tmp_path)]
+    assert main(report) == 2  # there is no trial
+    assert len(prepared) == 1
+    kept, recorded = tmp_path / ".folds", trials.stat().st_mtime_ns
+    kept.mkdir()
+    for age, count in ((1, 1), (-1, 2)):
+        os.utime(kept, ns=(recorded + age, recorded + age))
+        main(report)
+        assert len(prepared) == count
