@@ -1,5 +1,6 @@
 from . import kernels, noise, trial_noise
 from .arcsine import Arcsine
+from .ascent import Start
 from .ground import Ground, GroundRows
 from .hierarchy import (
     GroundPosterior,
@@ -11,7 +12,6 @@ from .hierarchy import (
 from .kernels import Kernel, SquaredExponential
 from .likelihood import Likelihood, factorise
 from .noise import ConstantNoise, LogLinearNoise
-from .quasi_newton import Start
 from .refit import refit_gp
 from .regression import GaussianProcess, LeaveOut, fit_gp
 from .trial_noise import TrialNoise, TrialRows

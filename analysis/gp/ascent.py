@@ -1,10 +1,10 @@
 """One climb: from a start to a top of the likelihood, or just below a known one.
 
-By BFGS in a box. Where an approximation is good (`low_rank`), it is climbed first. Its
-second derivatives are good where its values no longer are: with them the likelihood
-itself is climbed to the top in some three evaluations, and on a ridge they tell a top
-from a place where a climb came to stand. A climb that comes beside a known top goes on
-with the second derivatives of that.
+By BFGS in a box. Where an approximation is good (`approach`), it is climbed first, and
+that is all where other starts lead higher. Only what may be the best top is climbed to
+the end: with the approximation's second derivatives, in one step or two. These also
+tell a top from a place on a ridge where a climb came to stand. A climb that comes
+beside a known top goes on with the second derivatives of that.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,50 +12,50 @@ from typing import NamedTuple
 
 import numpy as np
 
+from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.kernels import Kernel
-from analysis.gp.likelihood import split
-from analysis.gp.low_rank import Near
-from analysis.gp.noise import Noise
+from analysis.gp.approach import (
+    ANY,
+    GOOD,
+    Approach,
+    Approximated,
+    approached,
+    curvature,
+    settled,
+)
 from analysis.gp.quasi_newton import (
     Objective,
     Place,
     SearchBox,
-    Start,
     Until,
     maximised,
+    newton_step,
 )
 
 _SAME_TOP = (0.2, 0.1)  # largest difference of thetas, and of likelihoods
 _BESIDE = (1.0, 3.0)  # the same, for second derivatives to be alike
-_REACH = 2.0  # of theta that an approximation is climbed over before it is made anew
-_NEARLY = 1.0  # a shorter way needs no other approximation
 _GAIN = 1e-5  # log likelihood below which a step is not worth an exact evaluation
-_COARSE = 1e-3  # the same of an approximation
-# twice the error that approximations aim at, and that they may have at most: on the
-# way, one after the other, where starts climb them beside a top, for second derivatives
-_FAIR, _GOOD, _ANY = ((0.1, 5.0),) * 3, (0.1, 0.3), (0.1, np.inf)
-_DIFFERENCE = 1e-4  # of theta, for second derivatives
-_SETTLED, _CURVATURES = 0.2, 3  # of theta that they are good for, and their number
-_FLAT = 1e-2  # smallest second derivative that counts
+_LAST = 2e-3  # below which a step that keeps its promise is the last one
+_KEPT = 0.3  # largest difference of a gain from its promise, in shares of it
+_HOPEFUL = 4.0  # log likelihood below the best top, on the way: it may be on a ridge
+_RIVAL = 0.5  # the same at an approximation's top: it may still become the best
+_FIRM = 0.3  # smallest second derivative of a top that is no ridge
 _LOST = (1.0, 3, 0.05)  # below the best top, steps, and their share of what is missing
 
 
-class Approximated(NamedTuple):
-    """An objective with cheap approximations.
+class Start(NamedTuple):
+    """One start of a search and what it reached.
 
     Attributes:
-        exact: theta -> likelihood and its slope; may raise SettingsError.
-        near: theta, errors -> the same of an approximation around theta; None where its
-            error would be too large.
+        theta: hyperparameters at its end: a top, or just below the top of another.
+        lml: log marginal likelihood there, priors included.
+        evaluations: how often the exact likelihood was evaluated; where it never was,
+            `lml` is that of an approximation, and another start reached more.
     """
 
-    exact: Objective
-    near: Callable[[Array, tuple[float, float]], Objective | None]
-
-    def __call__(self, theta: Array) -> tuple[float, Array]:
-        """Return the exact likelihood and its slope."""
-        return self.exact(theta)
+    theta: tuple[float, ...]
+    lml: float
+    evaluations: int
 
 
 class Top(NamedTuple):
@@ -66,12 +66,21 @@ class Top(NamedTuple):
         lml: log marginal likelihood there, priors included.
         evaluations: how often the exact likelihood was evaluated.
         bend: minus the second derivatives there, shape (p, p), roughly.
+        approach: how it was reached, where it is the top of an approximation only and
+            `lml` the value of that.
     """
 
     theta: Array
     lml: float
     evaluations: int
     bend: Array | None = None
+    approach: Approach | None = None
+
+    @classmethod
+    def of(cls, approach: Approach) -> "Top":
+        """Return the top of an approximation."""
+        place = approach.place
+        return cls(place.theta, place.lml, 0, place.bend, approach)
 
     @property
     def start(self) -> Start:
@@ -93,14 +102,32 @@ def climb(
     return _Climb(objective, box, known).top(np.clip(start, *box.bounds.T))
 
 
+def refined(objective: Objective, box: SearchBox, tops: Sequence[Top]) -> list[Top]:
+    """Return tops, those of approximations that may be the best climbed to the end.
+
+    Args:
+        objective: theta -> likelihood and its slope.
+        box: where theta is sought.
+        tops: what starts have reached.
+    """
+    ends = list(tops)
+    for k in np.argsort([-top.lml for top in tops], kind="stable").tolist():
+        approach, exact = ends[k].approach, [top for top in ends if not top.approach]
+        best = max((top.lml for top in exact), default=-np.inf)
+        if approach is None or ends[k].lml < best - _HOPEFUL:
+            continue
+        if _top_at(ends[k], exact, _SAME_TOP, is_below=True) is None:
+            ends[k] = _Climb(objective, box, exact).end(approach)
+    return ends
+
+
 class _Climb:
     """One climb; the arguments are those of `climb`."""
 
     def __init__(
         self, objective: Objective, box: SearchBox, known: Sequence[Top]
     ) -> None:
-        self._objective, self._box = objective, box
-        self._near = objective.near if isinstance(objective, Approximated) else _none
+        self._objective, self._box = _approximated(objective), box
         # what ended just below a top is none that others may end below
         self._tops = [
             top
@@ -113,10 +140,42 @@ class _Climb:
 
     def top(self, theta: Array) -> Top:
         """Return where it ends that begins at theta."""
-        if self._best is not None and self._near(self._best.theta, _GOOD) is None:
-            return self._climbed(theta)  # tops are rough here
-        place = self._approached(theta)
-        return self._climbed(theta) if place is None else self._corrected(place)
+        if self._best is not None and self._is_rough(self._best):
+            return self._climbed(theta)
+        approach = approached(self._objective, theta, self._box, self._is_found)
+        if approach is None:
+            return self._climbed(theta)
+        place = approach.place
+        if self._is_found(place) or approach.is_good():
+            return Top.of(approach)
+        near = self._objective.near(place.theta, GOOD)
+        if near is not None:
+            return Top.of(Approach(Place.at(near, place.theta, place.bend), near))
+        return self._corrected(self._at(place.theta))
+
+    def end(self, approach: Approach) -> Top:
+        """Return the top that an approach leads to.
+
+        That of the approximation, where it is firm and too low to be the best.
+        """
+        place = settled(approach, self._box)
+        is_low = self._best is not None and place.lml < self._best.lml - _RIVAL
+        if is_low and self._is_firm(place):
+            return Top.of(Approach(place, approach.near))
+        return self._corrected(self._at(place.theta, place.bend))
+
+    def _is_rough(self, top: Top) -> bool:
+        """Return whether no approximation is good at a top."""
+        return not top.approach and self._objective.near(top.theta, GOOD) is None
+
+    def _is_firm(self, place: Place) -> bool:
+        """Return whether a place is on a top by second derivatives, not on a ridge."""
+        low, high = self._box.bounds.T
+        is_free = (place.theta > low) & (place.theta < high)
+        if place.bend is None or not is_free.any():
+            return False
+        bends = np.linalg.eigvalsh(place.bend[np.ix_(is_free, is_free)])
+        return float(bends[0]) > _FIRM
 
     def _climbed(self, theta: Array) -> Top:
         """Return where climbing the likelihood alone leads."""
@@ -126,37 +185,48 @@ class _Climb:
             return self._corrected(place._replace(bend=None))
         return self._reached(place)
 
-    def _approached(self, theta: Array) -> Place | None:
-        """Return where climbing approximations leads; None where there is none."""
-        found, until = None, Until(_COARSE, self._is_found)
-        for error in _FAIR:
-            near = self._near(theta, error)
-            if near is None:
-                break
-            before, region = theta, self._box.around(theta, _REACH)
-            place, _ = maximised(near, Place.at(near, theta), region, until)
-            found, theta = place._replace(bend=None), place.theta
-            if until.is_enough(place):
-                break
-            if np.abs(theta - before).max() < _NEARLY:
-                found = _settled(near, place, region)
-                break
-        return None if found is None else self._at(found.theta, found.bend)
-
     def _corrected(self, place: Place) -> Top:
         """Return the top that a place leads to with second derivatives."""
         if place.bend is None and not self._is_below(place):
-            twin = self._beside(place)
-            if twin is None:
-                near = self._near(place.theta, _ANY)
-                bend = near and _curvature(near, place.theta, self._box)
-            else:
-                bend = twin.bend
-            place = place._replace(bend=bend)
+            place = place._replace(bend=self._bend_at(place))
+        if self._is_firm(place):
+            place = self._maximised(place, self._is_below, _LAST)
+            last = None if self._is_below(place) else self._last_step(place)
+            if last is not None:
+                return self._reached(last)
         return self._reached(self._maximised(place, self._is_below))
 
-    def _maximised(self, place: Place, is_there: Callable[[Place], bool]) -> Place:
-        until = Until(_GAIN, lambda place: is_there(place) or self._is_lost(place))
+    def _bend_at(self, place: Place) -> Array | None:
+        """Return minus the second derivatives, of a top beside or an approximation."""
+        twin = self._beside(place)
+        if twin is not None:
+            return twin.bend
+        near = self._objective.near(place.theta, ANY)
+        if near is None:
+            return None
+        return curvature(near, Place.at(near, place.theta), self._box)
+
+    def _last_step(self, place: Place) -> Place | None:
+        """Return where a step leads that promises little and keeps it.
+
+        Its slope is not evaluated, and remains that of before. None where the step
+        promises more, or gains less or more than that: it bends otherwise there.
+        """
+        end, gain = newton_step(place, self._box)
+        if not _GAIN < gain < _LAST:
+            return None
+        self._spent += 1
+        try:
+            lml = float(self._objective.value(end))
+        except SettingsError:
+            return None
+        is_kept = abs(lml - place.lml - gain) < _KEPT * gain
+        return place._replace(theta=end, lml=lml) if is_kept else None
+
+    def _maximised(
+        self, place: Place, is_there: Callable[[Place], bool], gain: float = _GAIN
+    ) -> Place:
+        until = Until(gain, lambda place: is_there(place) or self._is_lost(place))
         place, spent = maximised(self._objective, place, self._box, until)
         self._spent += spent
         return place
@@ -191,35 +261,13 @@ class _Climb:
         return None if top is None or top.bend is None else top
 
 
-def _none(theta: Array, trace: tuple[float, float]) -> None:
-    """Return that there is no approximation."""
-
-
-def _settled(near: Objective, place: Place, box: SearchBox) -> Place:
-    """Return the top of an approximation, with its second derivatives."""
-    bend = None
-    for _ in range(_CURVATURES):
-        before = place.theta
-        bend = _curvature(near, before, box)
-        place, _ = maximised(near, place._replace(bend=bend), box, Until(_COARSE))
-        if np.abs(place.theta - before).max() < _SETTLED:
-            break
-    return place._replace(bend=bend)
-
-
-def _curvature(near: Objective, theta: Array, box: SearchBox) -> Array:
-    """Return minus the second derivatives of an approximation, shape (p, p).
-
-    Directions along which it is flat, or bends upwards, count as bent a little.
-    """
-    inwards = np.where(theta < box.bounds.mean(axis=1), _DIFFERENCE, -_DIFFERENCE)
-    slope = Place.at(near, theta).slope
-    rows = [
-        (slope - Place.at(near, theta + step).slope) / step.sum()
-        for step in np.diag(inwards)
-    ]
-    bends, ways = np.linalg.eigh(0.5 * (np.array(rows) + np.array(rows).T))
-    return (ways * np.maximum(bends, _FLAT)) @ ways.T
+def _approximated(objective: Objective) -> Approximated:
+    """Return an objective with its approximations; there are none of a plain one."""
+    if isinstance(objective, Approximated):
+        return objective
+    return Approximated(
+        objective, lambda theta: objective(theta)[0], lambda theta, trace: None
+    )
 
 
 def _top_at(
@@ -244,38 +292,3 @@ def _top_at(
         if is_near and (gap >= 0.0 or not is_below):
             return top
     return None
-
-
-def objective_of(
-    model: tuple[Kernel, Noise], likelihood: Objective, near: Near
-) -> Approximated:
-    """Return what is climbed: the likelihood times the noise's prior.
-
-    Args:
-        model: kernel and noise.
-        likelihood: the exact one.
-        near: its approximations.
-    """
-    made: dict[tuple[bytes, tuple[float, float]], Objective | None] = {}
-
-    def near_with_prior(theta: Array, trace: tuple[float, float]) -> Objective | None:
-        key = theta.tobytes(), trace
-        if key not in made:
-            found = near(theta, trace)
-            made[key] = None if found is None else _with_prior(model, found)
-        return made[key]
-
-    return Approximated(_with_prior(model, likelihood), near_with_prior)
-
-
-def _with_prior(model: tuple[Kernel, Noise], likelihood: Objective) -> Objective:
-    """Return the likelihood with the noise's prior, and its slope."""
-    kernel, noise = model
-
-    def objective(theta: Array) -> tuple[float, Array]:
-        lml, slope = likelihood(theta)
-        prior, prior_slope = noise.log_prior(split(kernel, theta)[1])
-        slope[-prior_slope.size :] += prior_slope
-        return lml + prior, slope
-
-    return objective

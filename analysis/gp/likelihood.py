@@ -68,7 +68,7 @@ def factorise(
     """
     C = np.empty(K.shape, order="F") if memory is None else memory
     for share in _JITTERS:
-        jitter = share * float(np.mean(np.diagonal(K)))
+        jitter = share and share * float(np.mean(np.diagonal(K)))
         # the upper triangle in C's order is the lower one in Fortran's
         np.copyto(C, K.T)
         C.T.flat[:: S.size + 1] += S + jitter
@@ -88,7 +88,7 @@ class _Solved(NamedTuple):
 
     Attributes:
         lml: log marginal likelihood.
-        L: lower Cholesky factor of the covariance, shape (n, n).
+        factor: the covariance, factorised.
         alpha: C^-1 r, shape (n,).
         contract: the kernel's contraction.
         contract_noise: the noise's, which is given the diagonal of the weight.
@@ -96,7 +96,7 @@ class _Solved(NamedTuple):
     """
 
     lml: float
-    L: Array
+    factor: Factor
     alpha: Array
     contract: Contraction
     contract_noise: Contraction
@@ -111,6 +111,9 @@ class Likelihood:
         X: inputs, shape (n, d).
         r: outputs with the mean function taken off, shape (n,).
         trials: where the rows come from; None where they share nothing but the kernel.
+
+    Attributes:
+        covariance: what gives the kernel's part of C; memory of its own.
     """
 
     def __init__(
@@ -120,12 +123,12 @@ class Likelihood:
         r: Array,
         trials: TrialRows | None = None,
     ) -> None:
-        self._kernel, self._noise = model
-        self._X, self._r = X, r
-        self._shared = shared_over(self._noise, X, trials)
-        self._covariance = self._kernel.over(X)
+        self.model, self.X, self.r, self.trials = model, X, r, trials
+        self.covariance = model[0].over(X)
+        self._shared = shared_over(model[1], X, trials)
         shape = (r.size, r.size)
         self._C, self._inverse = (np.zeros(shape, order="F") for _ in range(2))
+        self._last: tuple[bytes, Array, float] = b"", r, 0.0
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
         """Return the likelihood and its gradient in theta.
@@ -137,7 +140,7 @@ class Likelihood:
             SettingsError: the covariance cannot be factorised.
         """
         at = self._solved(theta)
-        minus = self._minus_weight(at.L, at.alpha)
+        minus = self._minus_weight(at.factor.L, at.alpha)
         on_diagonal = -np.diagonal(minus)
         minus.T.flat[:: at.alpha.size + 1] *= 0.5
         slope_noise = at.contract_noise(on_diagonal)
@@ -155,16 +158,34 @@ class Likelihood:
         """
         return self._solved(theta).lml
 
+    def weights(self, theta: Array) -> tuple[Array, float]:
+        """Return C^-1 r, shape (n,), and the jitter that C needs.
+
+        Raises:
+            SettingsError: the covariance cannot be factorised.
+        """
+        if self._last[0] != theta.tobytes():
+            self._solved(theta)
+        return self._last[1:]
+
+    def thinned(self, most: int) -> "Likelihood":
+        """Return the likelihood of every so many rows, at most so many."""
+        thin = slice(None, None, -(-self.r.size // most))
+        trials = None if self.trials is None else self.trials.take(thin)
+        return Likelihood(self.model, self.X[thin], self.r[thin], trials)
+
     def _solved(self, theta: Array) -> "_Solved":
-        theta_kernel, theta_noise = split(self._kernel, theta)
-        K, contract = self._covariance(theta_kernel)
-        S, contract_noise = self._noise.evaluate(theta_noise, self._X)
+        kernel, noise = self.model
+        theta_kernel, theta_noise = split(kernel, theta)
+        K, contract = self.covariance(theta_kernel)
+        S, contract_noise = noise.evaluate(theta_noise, self.X)
         shared = self._shared(theta_noise)
         factor = factorise(K, S, self._C, shared.blocks)
-        alpha = factor.solve(self._r)
-        lml = -0.5 * float(self._r @ alpha) - 0.5 * alpha.size * np.log(2.0 * np.pi)
+        alpha = factor.solve(self.r)
+        lml = -0.5 * float(self.r @ alpha) - 0.5 * alpha.size * np.log(2.0 * np.pi)
         lml -= float(np.sum(np.log(np.diagonal(factor.L))))
-        return _Solved(lml, factor.L, alpha, contract, contract_noise, shared)
+        self._last = theta.tobytes(), alpha, factor.jitter
+        return _Solved(lml, factor, alpha, contract, contract_noise, shared)
 
     def _minus_weight(self, L: Array, alpha: Array) -> Array:
         """Return the lower triangle of C^-1 - alpha alpha', zero above."""

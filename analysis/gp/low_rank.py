@@ -21,15 +21,17 @@ most, r'C^-1 r too large by at most t times its value.
 """
 
 from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array, Indices
-from analysis.gp.kernels import Kernel
-from analysis.gp.likelihood import lapack, split
+from analysis.gp.kernels import Contraction, Kernel
+from analysis.gp.likelihood import Likelihood, lapack, split
 from analysis.gp.noise import Noise
-from analysis.gp.trial_noise import ColumnsAt, TrialRows, columns_over
+from analysis.gp.trial_noise import ColumnsAt, columns_over
 
 _FEWEST = 40  # pivots: they have to serve where lengths are shorter, too
 _MOST = 80  # pivots beyond which an evaluation costs half of an exact one
@@ -37,6 +39,32 @@ _LEAST = 1e-3  # t at which there is nothing left to choose pivots from
 _JITTER = 1e-9  # of the pivots' variances
 
 Columns = Callable[[Array], ColumnsAt]
+
+
+class _Whitened(NamedTuple):
+    """What value and gradient share at one theta.
+
+    Attributes:
+        lml: log marginal likelihood.
+        F: k(P, X), shape (m, n).
+        root: S^-1/2, shape (n,).
+        L_inverse: shape (m, m).
+        U: U, and S^-1/2 r as one more row.
+        B_factor: inverse Cholesky factor of B, with that row too.
+        contract: the kernel's contraction.
+        noise: S, shape (n,), and its contraction.
+        columns: what rows of one trial share.
+    """
+
+    lml: float
+    F: Array
+    root: Array
+    L_inverse: Array
+    U: Array
+    B_factor: Array
+    contract: Contraction
+    noise: tuple[Array, Contraction]
+    columns: ColumnsAt
 
 
 class LowRankLikelihood:
@@ -62,6 +90,7 @@ class LowRankLikelihood:
         self._X, self._r, self._pivots = X, r, pivots
         self._columns = columns
         self._cross = self._kernel.over(X[pivots], X)
+        self._last: tuple[bytes, _Whitened] | None = None
         self._constant = -0.5 * r.size * np.log(2.0 * np.pi)
 
     def __call__(self, theta: Array) -> tuple[float, Array]:
@@ -70,14 +99,37 @@ class LowRankLikelihood:
         Raises:
             SettingsError: the pivots' covariance cannot be factorised.
         """
+        at = self._at(theta)
+        S, contract_noise = at.noise
+        weight, on_diagonal, inner = self._weights(at)
+        slope_noise = contract_noise(on_diagonal / S)
+        m = self._pivots.size
+        slope_noise += at.columns.contract(np.diagonal(inner)[m:] - 1.0)
+        return at.lml, np.concatenate([at.contract(weight), slope_noise])
+
+    def value(self, theta: Array) -> tuple[float, float]:
+        """Return the likelihood alone, and t there.
+
+        Raises:
+            SettingsError: the pivots' covariance cannot be factorised.
+        """
+        if self._last and self._last[0] == theta.tobytes():
+            at = self._last[1]
+        else:
+            at = self._at(theta)
+        variances = self._kernel.diagonal(split(self._kernel, theta)[0], self._X)
+        seen = at.U[: self._pivots.size].ravel()
+        return at.lml, float(variances @ (at.root * at.root) - seen @ seen)
+
+    def _at(self, theta: Array) -> _Whitened:
         theta_kernel, theta_noise = split(self._kernel, theta)
         F, contract = self._cross(theta_kernel)
-        S, contract_noise = self._noise.evaluate(theta_noise, self._X)
+        noise = self._noise.evaluate(theta_noise, self._X)
         columns = self._columns(theta_noise)
-        root, m = 1.0 / np.sqrt(S), self._pivots.size
+        root, m = 1.0 / np.sqrt(noise[0]), self._pivots.size
         A = F[:, self._pivots]
         A.flat[:: m + 1] *= 1.0 + _JITTER
-        L_inverse, _ = _inverse_factor(A)
+        L_inverse = _inverse_factor(A)
 
         U = np.empty((m + len(columns.Phi) + 1, self._r.size))
         np.multiply(F, root, out=U[:m])
@@ -89,32 +141,22 @@ class LowRankLikelihood:
         np.multiply(self._r, root, out=U[-1])
         B = U @ U.T
         B.flat[: -1 : len(B) + 1] += 1.0
-        B_factor, log_det = _inverse_factor(B)
+        B_factor = _inverse_factor(B)
         rest = 1.0 / float(B_factor[-1, -1])
-        lml = self._constant - log_det + np.log(rest) - 0.5 * rest * rest
-        lml += float(np.log(root).sum())
+        half_log_det = -np.log(np.diagonal(B_factor)[:-1]).sum() - np.log(root).sum()
+        lml = float(self._constant - half_log_det - 0.5 * rest * rest)
+        at = _Whitened(lml, F, root, L_inverse, U, B_factor, contract, noise, columns)
+        self._last = theta.tobytes(), at
+        return at
 
-        weight, on_diagonal, inner = self._weights(F, root, L_inverse, U, B_factor)
-        slope_noise = contract_noise(on_diagonal / S)
-        slope_noise += columns.contract(np.diagonal(inner)[m:] - 1.0)
-        return float(lml), np.concatenate([contract(weight), slope_noise])
-
-    def _weights(
-        self, F: Array, root: Array, L_inverse: Array, U: Array, B_factor: Array
-    ) -> tuple[Array, Array, Array]:
+    def _weights(self, at: _Whitened) -> tuple[Array, Array, Array]:
         """Return what derivatives are contracted with.
-
-        Args:
-            F: k(P, X), shape (m, n).
-            root: S^-1/2, shape (n,).
-            L_inverse: shape (m, m).
-            U: U, and S^-1/2 r as one more row.
-            B_factor: inverse Cholesky factor of B, with that row too.
 
         Returns:
             What dF is contracted with, that of dA taken in at the pivots' columns,
             shape (m, n); the diagonal of S W, shape (n,); and b b' + B^-1.
         """
+        F, root, L_inverse, U, B_factor = at[1:6]
         m = len(F)
         b, half = B_factor[-1, :-1] / -B_factor[-1, -1], B_factor[:-1, :-1]
         inner = half.T @ half
@@ -139,30 +181,31 @@ def choose_pivots(K: Array, S: Array, trace: tuple[float, float]) -> Indices | N
     """Return the rows that serve as pivots; None where it takes too many.
 
     Args:
-        K: covariances of all rows, shape (n, n); only the upper triangle is read.
+        K: covariances of all rows, shape (n, n); only the upper triangle is read, and
+            all is overwritten.
         S: variances of the noise, shape (n,).
         trace: t that pivots are chosen for, and that they may leave where there are
             never enough.
     """
     root = 1.0 / np.sqrt(S)
-    scaled = K * root
-    scaled *= root[:, None]
-    total, n = float(np.trace(scaled)), root.size
+    K *= root
+    K *= root[:, None]
+    total, n = float(np.trace(K)), root.size
     # the upper triangle in C's order is the lower one in Fortran's
-    L, order, rank, _ = lapack("pstrf")(
-        scaled.T, tol=_LEAST / n, lower=1, overwrite_a=1
-    )
+    L, order, rank, _ = lapack("pstrf")(K.T, tol=_LEAST / n, lower=1, overwrite_a=1)
     if not rank:  # no function at all
         return None
-    columns = np.tril(L[:, : min(rank, _MOST)])
-    tail = total - np.cumsum(np.einsum("nm,nm->m", columns, columns))
+    most = min(rank, _MOST)
+    head, rest = np.tril(L[:most, :most]), L[most:, :most]
+    seen = np.einsum("nm,nm->m", head, head) + np.einsum("nm,nm->m", rest, rest)
+    tail = total - np.cumsum(seen)
     needed = 1 + int(np.count_nonzero(tail > trace[0]))
     count = min(max(needed, _FEWEST), _MOST, n // 3, rank)
     return order[:count] - 1 if tail[count - 1] < trace[1] else None
 
 
-def _inverse_factor(A: Array) -> tuple[Array, float]:
-    """Return L^-1 of A = L L', lower, and log det L; A is overwritten.
+def _inverse_factor(A: Array) -> Array:
+    """Return L^-1 of A = L L', lower; A is overwritten.
 
     Raises:
         SettingsError: A is not positive definite.
@@ -170,35 +213,35 @@ def _inverse_factor(A: Array) -> tuple[Array, float]:
     L, info = lapack("potrf")(A.T, lower=1, clean=1, overwrite_a=1)
     if info:
         raise SettingsError("The covariance of the pivots is not positive definite.")
-    log_det = float(np.log(np.diagonal(L)).sum())
-    return lapack("trtri")(L, lower=1, overwrite_c=1)[0], log_det
+    return lapack("trtri")(L, lower=1, overwrite_c=1)[0]
 
 
 # theta, t -> an approximation that is good around it; None where there is none
-Near = Callable[[Array, tuple[float, float]], "LowRankLikelihood | None"]
+Near = Callable[[Array, tuple[float, float]], LowRankLikelihood | None]
 
 
-def near_over(
-    model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None
-) -> Near:
+def near_over(likelihood: Likelihood) -> Near:
     """Return what gives the low-rank likelihood around any theta.
 
     There is none where it would take too many pivots, or a residual drifts along the
     trials: that has no few columns.
     """
-    columns = columns_over(model[1], X, trials)
+    model, X, r = likelihood.model, likelihood.X, likelihood.r
+    columns = columns_over(model[1], X, likelihood.trials)
     if columns is None:
         return lambda theta, trace: None
 
     kernel, noise = model
-    covariance = kernel.over(X)
 
-    def near(theta: Array, trace: tuple[float, float]) -> LowRankLikelihood | None:
-        theta_kernel, theta_noise = split(kernel, theta)
+    @cache
+    def made(
+        place: tuple[float, ...], trace: tuple[float, float]
+    ) -> LowRankLikelihood | None:
+        theta_kernel, theta_noise = split(kernel, np.array(place))
         S, _ = noise.evaluate(theta_noise, X)
-        pivots = choose_pivots(covariance(theta_kernel)[0], S, trace)
+        pivots = choose_pivots(likelihood.covariance(theta_kernel)[0], S, trace)
         if pivots is None:
             return None
         return LowRankLikelihood(model, X, r, pivots, columns)
 
-    return near
+    return lambda theta, trace: made(tuple(theta.tolist()), trace)

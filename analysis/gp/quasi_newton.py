@@ -1,4 +1,4 @@
-"""The top that a start leads to by BFGS in a box, and what searches hand round.
+"""The top that a start leads to by BFGS in a box.
 
 An objective has few parameters and costs a thousand times what a step costs, so minus
 its second derivatives are kept as a matrix (Nocedal and Wright 2006, algorithm 18.2 for
@@ -29,20 +29,6 @@ _ARMIJO = 1e-4  # share of the promised rise that a step has to keep
 _SHORTER = (0.1, 0.6)  # a step that does not is shortened to
 _DAMPED = 0.2  # smallest share of its curvature that one step leaves of a direction
 _RESCALED = (0.2, 20.0)  # by what the first step teaches
-
-
-class Start(NamedTuple):
-    """One start of the search and what it reached.
-
-    Attributes:
-        theta: hyperparameters at its end: a top, or just below the top of another.
-        lml: log marginal likelihood there, priors included.
-        evaluations: how often the exact likelihood was evaluated.
-    """
-
-    theta: tuple[float, ...]
-    lml: float
-    evaluations: int
 
 
 class Place(NamedTuple):
@@ -172,6 +158,12 @@ def maximised(
         parabola.learn(better.theta - place.theta, place.slope - better.slope)
         place = better
     return place._replace(bend=parabola.bend), spent
+
+
+def newton_step(place: Place, box: SearchBox) -> tuple[Array, float]:
+    """Return the top in a box of the parabola at a place, and the gain it promises."""
+    end, rise = _Parabola(box, place.bend).step(place)
+    return end, 0.5 * rise
 
 
 def _stepped(

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.data import Array
-from analysis.gp.ascent import objective_of
+from analysis.gp.approach import objective_of
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.low_rank import near_over
@@ -70,20 +70,20 @@ def _climbed(
     Where it `is_searched` for other tops, too, one more start is chosen.
     """
     offset = float(y.mean()) if process.offset else 0.0
-    rows = (process.X, y - offset, process.trials)
-    likelihood = Likelihood(model, *rows)
-    objective = objective_of(model, likelihood, near_over(model, *rows))
-    exact = likelihood.value if is_searched else None
+    likelihood = Likelihood(model, process.X, y - offset, process.trials)
+    objective = objective_of(likelihood, near_over(likelihood))
+    exact = objective.value if is_searched else None
     sd = float(np.std(y - offset))
     optimum = climb_from(model, objective, process.X, sd, starts, exact)
-    fitted = replace(
+    alpha, jitter = likelihood.weights(optimum.theta)
+    return replace(
         process,
         noise=model[1],
         theta=optimum.theta,
+        alpha=alpha,
         offset=offset,
         lml=optimum.lml,
         starts=optimum.starts,
+        jitter=jitter,
         at_bound=optimum.at_bound,
     )
-    factor = fitted.factor()
-    return replace(fitted, alpha=factor.solve(y - offset), jitter=factor.jitter)

@@ -11,11 +11,11 @@ from scipy.linalg import solve_triangular
 
 from acquisition import SettingsError
 from analysis.data import Array
+from analysis.gp.ascent import Start
 from analysis.gp.kernels import Kernel, SquaredExponential
-from analysis.gp.likelihood import Factor, factorise, lapack, split
+from analysis.gp.likelihood import Factor, Likelihood, factorise, lapack, split
 from analysis.gp.noise import ConstantNoise, Noise
-from analysis.gp.quasi_newton import Start
-from analysis.gp.search import posterior_search, spread
+from analysis.gp.search import likeliest, spread
 from analysis.gp.trial_noise import TrialRows, shared_over
 
 MINIMUM_ROWS = 20
@@ -221,20 +221,21 @@ def fit_gp(
     noise = noise or ConstantNoise()
     centre, scale = inputs.mean(axis=0), spread(inputs)
     X, offset = (inputs - centre) / scale, float(y.mean()) if is_centred else 0.0
-    optimum = posterior_search((kernel, noise), X, y - offset, trials)
-    factor = _factor((kernel, noise), optimum.theta, X, trials)
+    likelihood = Likelihood((kernel, noise), X, y - offset, trials)
+    optimum = likeliest(likelihood)
+    alpha, jitter = likelihood.weights(optimum.theta)
     return GaussianProcess(
         kernel=kernel,
         noise=noise,
         theta=optimum.theta,
         X=X,
-        alpha=factor.solve(y - offset),
+        alpha=alpha,
         offset=offset,
         centre=centre,
         scale=scale,
         lml=optimum.lml,
         starts=optimum.starts,
-        jitter=factor.jitter,
+        jitter=jitter,
         at_bound=optimum.at_bound,
         trials=trials,
     )

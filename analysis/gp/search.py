@@ -6,7 +6,8 @@ that a kernel offers, by the likelihood of a part of the rows. The third is chos
 these have reached their tops: as the noise is known by then, the likelihood of all rows
 tells where another top may be. A fourth begins at the best top with an input switched
 off, where its length is long. A start that comes to stand just below a top that was
-reached before is left there.
+reached before is left there, and of the tops that approximations have only those that
+may be the best are climbed to the end.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,12 +17,13 @@ import numpy as np
 
 from acquisition import SettingsError
 from analysis.data import Array
-from analysis.gp.ascent import Top, climb, objective_of
+from analysis.gp.approach import GOOD, objective_of
+from analysis.gp.ascent import Start, Top, climb, refined
 from analysis.gp.kernels import Kernel
 from analysis.gp.likelihood import Likelihood
 from analysis.gp.low_rank import near_over
 from analysis.gp.noise import Noise
-from analysis.gp.quasi_newton import Objective, SearchBox, Start
+from analysis.gp.quasi_newton import Objective, SearchBox
 from analysis.gp.trial_noise import TrialRows
 
 Score = Callable[[Array], float]
@@ -100,7 +102,7 @@ def maximise(
     for start in _idle_starts(model, best, exact, box):
         began.append(start)
         reached.append(climb(objective, start, box, reached))
-    return _optimum(model, box, (began, reached))
+    return _optimum(model, box, (began, refined(objective, box, reached)))
 
 
 def climb_from(
@@ -134,7 +136,7 @@ def climb_from(
         for start in _idle_starts(model, best, exact, box):
             began.append(start)
             reached.append(climb(objective, start, box, reached))
-    return _optimum(model, box, (began, reached))
+    return _optimum(model, box, (began, refined(objective, box, reached)))
 
 
 def distinct_tops(kernel: Kernel, reached: Sequence[Start]) -> list[Array]:
@@ -188,8 +190,8 @@ def _first_starts(
     """Return two of the points offered: the best, and the best that is far from it."""
     ranked = sorted(offered, key=lambda theta: -_scored(rough, theta))
     first, *others = ranked
-    far = [theta for theta in others if _gap(kernel, theta, [first]) >= _APART]
-    return [first, (far or others)[0]]
+    far = (theta for theta in others if _gap(kernel, theta, [first]) >= _APART)
+    return [first, next(far, others[0])]
 
 
 def _last_start(
@@ -214,15 +216,17 @@ def _last_start(
     began, reached = known
     count = len(kernel.names)
     tops = [top.theta for top in reached]
-    best = tops[int(np.argmax([top.lml for top in reached]))]
-    moved = kernel.moves(best[:count])
-    unused = [t[:count] for t in offered if _gap(kernel, t, began) >= _APART]
+    top = max(reached, key=lambda top: top.lml)
+    best, score = top.theta, _score_near(top, exact)
+    others = kernel.moves(best[:count]) or [
+        theta[:count] for theta in offered if _gap(kernel, theta, began) >= _APART
+    ]
     points = [
         np.clip(np.concatenate([point, best[count:]]), *box.bounds.T)
-        for point in moved or unused
+        for point in others
     ]
     far = [point for point in points if _gap(kernel, point, tops) >= _ELSEWHERE]
-    return max(far or offered, key=lambda theta: _scored(exact, theta))
+    return max(far or offered, key=lambda theta: _scored(score, theta))
 
 
 def _idle_starts(
@@ -233,14 +237,14 @@ def _idle_starts(
     On a straight trend a long length and an endless one are two tops. Of several inputs
     the likeliest one to be idle is chosen.
     """
-    kernel, _ = model
+    (kernel, _), score = model, _score_near(best, exact)
     starts = []
     for k, name in enumerate(kernel.names):
         theta = best.theta.copy()
         is_length = name.rpartition("_")[2].startswith("l")
         if is_length and _LONG < theta[k] < box.bounds[k, 1] - _NEIGHBOURS:
             theta[k] = box.bounds[k, 1]
-            starts.append((_scored(exact, theta), k, theta))
+            starts.append((_scored(score, theta), k, theta))
     if not starts or max(starts)[0] < best.lml - _RIVAL:
         return []
     return [max(starts)[2]]
@@ -251,6 +255,24 @@ def _gap(kernel: Kernel, theta: Array, others: Sequence[Array]) -> float:
     shape = [k for k, name in enumerate(kernel.names) if not name.endswith("log_sf")]
     flat = np.minimum(np.vstack([theta, *others])[:, shape], _FLAT)
     return float(np.abs(flat[1:] - flat[0]).max(axis=1).min())
+
+
+def _score_near(top: Top, exact: Score) -> Score:
+    """Return the likelihood of all rows, by the approximation of a top where good.
+
+    Args:
+        top: how it was approached.
+        exact: theta -> likelihood of all rows.
+    """
+
+    def score(theta: Array) -> float:
+        if top.approach is not None:
+            value, error = top.approach.near.value(theta)
+            if error < GOOD[1]:
+                return value
+        return exact(theta)
+
+    return score
 
 
 def _scored(score: Score, theta: Array) -> float:
@@ -264,11 +286,13 @@ def posterior_search(
     model: tuple[Kernel, Noise], X: Array, r: Array, trials: TrialRows | None = None
 ) -> Optimum:
     """Return the hyperparameters of largest likelihood times the noise's prior."""
-    likelihood = Likelihood(model, X, r, trials)
-    thin = slice(None, None, -(-r.size // _ROUGH))
-    rough = Likelihood(
-        model, X[thin], r[thin], None if trials is None else trials.take(thin)
-    )
-    scores = StartScores(rough.value, likelihood.value)
-    objective = objective_of(model, likelihood, near_over(model, X, r, trials))
+    return likeliest(Likelihood(model, X, r, trials))
+
+
+def likeliest(likelihood: Likelihood) -> Optimum:
+    """Return the hyperparameters of largest likelihood times the noise's prior."""
+    model, X, r = likelihood.model, likelihood.X, likelihood.r
+    objective = objective_of(likelihood, near_over(likelihood))
+    rough = likelihood.thinned(_ROUGH)
+    scores = StartScores(rough.value, objective.value)
     return maximise(model, objective, X, float(np.std(r)), scores)

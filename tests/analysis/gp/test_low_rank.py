@@ -70,6 +70,23 @@ def test_with_enough_pivots_it_is_the_exact_likelihood(model):
     np.testing.assert_allclose(slope, exact_slope, atol=1e-4)
 
 
+@pytest.mark.parametrize("model", MODELS, ids=NAMES)
+def test_its_value_comes_with_the_scaled_trace(model):
+    X, r, trials = rows()
+    pivots = np.arange(0, 120, 8)
+    likelihood = low_rank(model, X, r, trials, pivots)
+    rng = np.random.default_rng(6)
+    for theta in (drawn(model, rng), drawn(model, rng)):
+        expected = low_rank(model, X, r, trials, pivots)(theta)[0]
+        count = len(model[0].names)
+        S = model[1].evaluate(theta[count:], X)[0]
+        for value, t in (likelihood.value(theta), likelihood.value(theta)):
+            assert value == expected
+            trace = left(model[0], theta[:count], S, X, pivots)
+            assert t == pytest.approx(trace, rel=1e-4, abs=1e-6)
+        assert likelihood(theta)[0] == expected
+
+
 def left(kernel, theta, S, X, pivots):
     """Return sum_i R_ii / S_ii of what the pivots leave."""
     K = kernel.matrix(theta, X, X)
@@ -115,7 +132,7 @@ def test_pivots_leave_no_more_than_they_may(model, trace):
 
 def test_a_rough_function_has_no_approximation():
     X, r, _ = rows()
-    near = near_over((SE, ConstantNoise()), X, r, None)
+    near = near_over(Likelihood((SE, ConstantNoise()), X, r))
     # lengths of the distance between rows: every row tells something of its own
     assert near(np.log([3.0, 0.05, 0.05, 0.3]), (0.1, 0.1)) is None
     assert near(np.log([1.0, 2.0, 2.0, 0.3]), (0.1, 0.1)) is not None
@@ -125,5 +142,5 @@ def test_a_drift_along_the_trials_has_no_approximation():
     X, r, trials = rows()
     noise = TrialNoise(has_drift=True)
     theta = np.log([1.0, 2.0, 2.0, 0.3, 0.3, 0.5, 0.5])
-    assert near_over((SE, noise), X, r, trials)(theta, (1.0, 1e3)) is None
+    assert near_over(Likelihood((SE, noise), X, r, trials))(theta, (1.0, 1e3)) is None
     assert columns_over(noise, X, trials) is None
