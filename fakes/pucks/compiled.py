@@ -52,7 +52,7 @@ _REPLIES = [
 ]
 _ALL_NS = _REPLIES[-1][0]
 _MODULUS, _HALF = 1 << 22, 1 << 21  # of a position on the wire [counts]
-_SIGNS = sum(0x2000 << 14 * k for k in range(4))
+_SIGNS = sum(0x2000 << 14 * k for k in range(4))  # of the torques in a frame
 
 
 class CyclicWire(WiredNetwork):

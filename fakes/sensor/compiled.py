@@ -32,7 +32,7 @@ from ft_sensor.vendors import bota
 _SIX = (6,)
 _OF_SCALES = ("drift", "drift_time", "walk", "walk_time", "white", "resolution")
 _OF_LOAD = ("creep", "hysteresis", "lagging", "stretch")
-ERRORS = np.dtype(
+_ERRORS = np.dtype(
     [
         ("load", float, _SIX),  # first: it is packed into the record's beginning
         ("shown", float, _SIX),
@@ -54,7 +54,6 @@ ERRORS = np.dtype(
         ("slow_ns", np.int64),
         ("step_ns", np.int64),
         ("is_begun", np.int64),
-        ("at", np.int64),  # which of the normal numbers is the next one
     ],
     align=True,
 )
@@ -78,8 +77,8 @@ class CompiledErrors(SensorErrors):
         torque: ErrorScale = TORQUE_ERRORS,
     ) -> None:
         """Draw the sensor and the state that it is switched on in from `rng`."""
-        self._bytes = bytearray(ERRORS.itemsize)
-        self.records = np.frombuffer(self._bytes, ERRORS)
+        self._bytes = bytearray(_ERRORS.itemsize)
+        self.records = np.frombuffer(self._bytes, _ERRORS)
         self._record = record = self.records[0]
         super().__init__(rng, force, torque)
         for name in _OF_SCALES:
