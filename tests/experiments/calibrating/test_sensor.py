@@ -79,9 +79,7 @@ def _drifting(scale, factor):
 def calibrate(what, folder, *options, rig=OtherRig, errors=SensorErrors):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(plain_world, "FakeRig", rig)
-        patch.setattr(
-            fakes.world.rig, "draw_errors", lambda rng, *_, **__: errors(rng)
-        )
+        patch.setattr(fakes.world.rig, "draw_errors", lambda rng, *_, **__: errors(rng))
         patch.setattr(walk, "SETTLE", 0.2)
         patch.setattr(sensor, "AVERAGE", 0.4)
         patch.setattr(calibration_poses, "POINT_SPEED", 0.8)
