@@ -19,7 +19,14 @@ from fakes.pucks.event_queue import FRAME_NS, NEVER, OutFrame
 from fakes.pucks.network import PuckNetwork
 from fakes.pucks.speed_monitor import HISTORY, SpeedMonitor
 from fakes.pucks.wire import WiredNetwork
-from wam.bus import MOTOR_NODES, Group, group_id, position_reply_id
+from wam.bus import (
+    MOTOR_NODES,
+    POSITION_MODULUS,
+    TORQUE_SIGNS,
+    Group,
+    group_id,
+    position_reply_id,
+)
 from wam.driver import COUNTS_PER_SPEED
 
 _SEVEN, _MONITORED = (7,), 4  # motors, and those that tell the speed of the arm
@@ -51,8 +58,7 @@ _REPLIES = [
     (n * _REPLY_NS, position_reply_id(n), 3 * n - 3, 3 * n) for n in MOTOR_NODES
 ]
 _ALL_NS = _REPLIES[-1][0]
-_MODULUS, _HALF = 1 << 22, 1 << 21  # of a position on the wire [counts]
-_SIGNS = sum(0x2000 << 14 * k for k in range(4))  # of the torques in a frame
+_HALF = POSITION_MODULUS // 2  # positions are signed
 
 
 class CyclicWire(WiredNetwork):
@@ -231,7 +237,7 @@ def _latch(pucks, t_ns):
     for i in range(_MONITORED):
         _remember(p, i, t_ns, _wrapped(p, i))
     for i in range(7):
-        position = (p.counts[i] + p.offsets[i]) % _MODULUS
+        position = (p.counts[i] + p.offsets[i]) % POSITION_MODULUS
         for k in range(3):
             p.replies[3 * i + k] = position >> (16 - 8 * k) & 0xFF
     return True
@@ -240,7 +246,7 @@ def _latch(pucks, t_ns):
 @inline
 def _wrapped(p, i):
     """Return a position as the wire carries it, signed [counts]."""
-    return (p.counts[i] + p.offsets[i] + _HALF) % _MODULUS - _HALF
+    return (p.counts[i] + p.offsets[i] + _HALF) % POSITION_MODULUS - _HALF
 
 
 @kernel
@@ -269,7 +275,7 @@ def _take(pucks, part, word):
     Return whether it was done.
     """
     p = pucks[0]
-    word ^= _SIGNS
+    word ^= TORQUE_SIGNS
     largest = 0
     for k in range(4):
         largest = max(largest, abs(_torque(word, k)))

@@ -17,10 +17,8 @@ from fakes.randomness import NormalArray
 from fakes.sensor.bota import BotaFirmware
 from fakes.sensor.errors import (
     CREEP_TIME,
-    FORCE_ERRORS,
     PER_DEGREE,
     SLOW_NS,
-    TORQUE_ERRORS,
     WARMTH_TIME,
     ErrorScale,
     SensorErrors,
@@ -70,17 +68,12 @@ class CompiledErrors(SensorErrors):
 
     is_compiled = True
 
-    def __init__(
-        self,
-        rng: np.random.Generator,
-        force: ErrorScale = FORCE_ERRORS,
-        torque: ErrorScale = TORQUE_ERRORS,
-    ) -> None:
-        """Draw the sensor and the state that it is switched on in from `rng`."""
+    def __init__(self, rng: np.random.Generator, *scales: ErrorScale) -> None:
+        """Draw the sensor from `rng`; see `SensorErrors`."""
         self._bytes = bytearray(_ERRORS.itemsize)
         self.records = np.frombuffer(self._bytes, _ERRORS)
         self._record = record = self.records[0]
-        super().__init__(rng, force, torque)
+        super().__init__(rng, *scales)
         for name in _OF_SCALES:
             record[name] = [getattr(scale, name) for scale in self._scales]
         record["warmth_sd"] = self._warmth_sd
@@ -91,8 +84,7 @@ class CompiledErrors(SensorErrors):
         record["creep"], record["hysteresis"], record["lagging"] = np.transpose(rows)
         record["step_ns"] = -1
         self._shown = record["shown"]
-        normals = np.zeros(_MOST_DRAWN), np.zeros(1, np.int64)
-        _show(self.records.copy(), *normals, 0)  # compiled before it is needed
+        _compile(self.records.copy())
 
     @property
     def warmth(self) -> float:
@@ -253,14 +245,6 @@ class CompiledBotaStream(SensorStream):
         self._raw = np.frombuffer(self._bytes, np.uint8)
         self._bota = firmware
         super().__init__(firmware, source, errors, start_ns, clock_start_us)
-        if isinstance(errors, CompiledErrors):
-            self._compile(errors)
-
-    def _compile(self, errors: CompiledErrors) -> None:
-        """Have the machine code before the first sample is due."""
-        normals = np.zeros(_MOST_DRAWN), np.zeros(1, np.int64)
-        frame = self._frames.copy(), self._raw.copy()
-        _take(errors.records.copy(), normals, frame, (0, 0, 0))
 
     def _take_sample(self, t_ns: int, period_ns: float) -> None:
         errors = self.errors
@@ -279,6 +263,15 @@ class CompiledBotaStream(SensorStream):
             (t_ns, self._device_us, self._bota.is_raw << 3),
         )
         self._send(t_ns, bytes(self._bytes[1:_END]))
+
+
+def _compile(errors: np.ndarray) -> None:
+    """Have the machine code before the first sample is due; `errors` are nobody's."""
+    normals = np.zeros(_MOST_DRAWN), np.zeros(1, np.int64)
+    frames = np.frombuffer(bytearray(_FRAME.itemsize), _FRAME)
+    _show(errors, *normals, 0)
+    normals[1][0] = 0
+    _take(errors, normals, (frames, frames.view(np.uint8)), (0, 0, 0))
 
 
 @kernel

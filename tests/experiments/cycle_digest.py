@@ -1,11 +1,13 @@
 """Digests of the cycles that one seed of the simulation records.
 
 `python -m tests.experiments.cycle_digest` writes them anew after a change that is meant
-to alter the simulation, the control law or the layout of a cycle.
+to alter the simulation, the control law or the layout of a cycle; with the name of one
+implementation and a folder it prints those.
 """
 
 import hashlib
 import json
+import sys
 import tempfile
 from pathlib import Path
 
@@ -60,8 +62,18 @@ def record(folder: Path, dynamics: str) -> Path:
     return only_session(folder)
 
 
+def tell(dynamics: str, folder: str) -> None:
+    """Print the digests of one implementation, recorded in `folder`."""
+    digests = digests_of(record(Path(folder), dynamics))
+    found = {"processor": processor(), "digests": digests}
+    sys.stdout.write(json.dumps(found) + "\n")
+
+
 def main() -> None:
-    """Write the digests of this machine's simulation."""
+    """Write the digests of this machine's simulation, or tell those of one."""
+    if len(sys.argv) > 1:
+        tell(*sys.argv[1:])
+        return
     digests: dict[str, dict[str, str]] = {}
     for dynamics in (COMPILED, PINOCCHIO):
         with tempfile.TemporaryDirectory() as folder:

@@ -22,10 +22,10 @@ MOTOR_NODES = range(1, 8)
 GROUP_BIT = 0x400
 SENDER_MASK = 0x3E0
 TORQUE_LIMIT = 8191  # a 14-bit field, -8192 is never sent
-_POSITION_MODULUS = 1 << 22
-_POSITION_MASK = _POSITION_MODULUS - 1
+POSITION_MODULUS = 1 << 22
+_POSITION_MASK = POSITION_MODULUS - 1
 _POSITION_SIGN = 1 << 21
-_TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
+TORQUE_SIGNS = 0x2000 << 42 | 0x2000 << 28 | 0x2000 << 14 | 0x2000
 _FORCE_PER_N = 256.0
 _TORQUE_PER_NM = 4096.0
 _ACCELERATION_SCALE = 1024.0
@@ -160,7 +160,7 @@ def _checked_number(number: int) -> int:
 def wrap_positions(counts: Sequence[int]) -> list[int]:
     """Return motor positions [encoder counts] as 22 bits carry them, signed."""
     half = _POSITION_SIGN
-    return [(count + half) % _POSITION_MODULUS - half for count in counts]
+    return [(count + half) % POSITION_MODULUS - half for count in counts]
 
 
 def encode_position(counts: int) -> bytes:
@@ -170,7 +170,7 @@ def encode_position(counts: int) -> bytes:
 
 def encode_positions(counts: Sequence[int]) -> list[bytes]:
     """Return three bytes for each motor position, wrapped at 22 bits as on a puck."""
-    return [(count % _POSITION_MODULUS).to_bytes(3, "big") for count in counts]
+    return [(count % POSITION_MODULUS).to_bytes(3, "big") for count in counts]
 
 
 def decode_position(data: Payload) -> int:
@@ -229,7 +229,7 @@ def decode_torques(data: Payload) -> tuple[int, int, int, int]:
     """
     if len(data) != 8 or not data[0] & 0x80:
         raise FrameError("Not a packed torque frame", data)
-    word = int.from_bytes(data[1:], "big") ^ _TORQUE_SIGNS
+    word = int.from_bytes(data[1:], "big") ^ TORQUE_SIGNS
     return (
         (word >> 42 & 0x3FFF) - 0x2000,
         (word >> 28 & 0x3FFF) - 0x2000,

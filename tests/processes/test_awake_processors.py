@@ -1,0 +1,42 @@
+"""The process that drives the arm keeps the processors from sleeping."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from experiments.rig.rig import FakeOptions, build_rig
+from experiments.settings.load import load_settings
+
+pytestmark = pytest.mark.wall_clock
+LATENCY = Path("/dev/cpu_dma_latency")
+
+
+def holders():
+    """Return the processes that hold the kernel's promise of short wake-ups."""
+    found = set()
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            opened = [path.readlink() for path in (process / "fd").iterdir()]
+        except OSError:
+            continue  # another user's, or gone
+        if LATENCY in opened:
+            found.add(int(process.name))
+    return found
+
+
+@pytest.mark.skipif(not os.access(LATENCY, os.W_OK), reason="it may not be asked for")
+def test_one_process_asks_for_it_and_takes_it_along():
+    before = holders()
+    settings = load_settings(None)
+    rig = build_rig(settings, settings.row("S0"), FakeOptions(is_fast=False, seed=1))
+    try:
+        rig.backend.start_arm()
+        grants = [grant for group in rig.backend.grants().values() for grant in group]
+        asked = [grant.is_granted for grant in grants if "awake" in grant.what]
+        assert asked == [True]
+        (holder,) = holders() - before
+        assert holder != os.getpid()
+    finally:
+        rig.backend.close()
+    assert holders() == before
